@@ -1,33 +1,36 @@
-"""The two halves of a drivetrain under a small importer of FMI 3.0, against one solution of the whole.
+"""The two halves of a drivetrain under our master algorithms, against one solution of the whole.
 
-python -m benchmarks.half_drivetrains             # prints a table
+python -m benchmarks.half_drivetrains              # prints a table
+python -m benchmarks.half_drivetrains --log        # prints the calls of one contact
 python -m benchmarks.half_drivetrains --reference  # writes fmus/halves/reference.csv and contacts.csv
-
-The importer takes all of FMI 3.0 that a contact between FMUs needs: event mode, early return, intermediate updates,
-output derivatives and saved states. It is the smallest one, not the fastest: windows of one fixed length.
 """
 
 import argparse
 import csv
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import fmpy
 import numpy as np
-from fmpy.fmi3 import FMU3Slave
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from orchestrator.building.native_build import ensure_native
+from orchestrator.fmi.instances import fmu_instance
+from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi
+from orchestrator.master.protocol import EventUpdate, StepOutcome
+from orchestrator.master.result import Recording
+from orchestrator.master.session import Session
+from orchestrator.master.signals import Square
+from orchestrator.master.system import Connection, SignalSource, System
 
 J_M, B_M, RATIO, TAU = 0.4, 0.1, 3.984, 0.05
 J_L, STIFFNESS, DAMPING, B_L = 5.6, 3300.0, 1.0, 1.0
 AMPLITUDE, PERIOD, STOP = 40.0, 0.8, 2.0
-SAME = 1e-12  # s: instants that are one
-SETTLED = 1e-11  # of the torque at the end of a window
+SHOWN = {"sends", "receives", "get_state", "set_state", "step", "enter_event_mode", "update_discrete_states"}
+SHOWN |= {"leave_event_mode"}
 FOLDER = Path(__file__).resolve().parents[1] / "fmus" / "halves"
 
 
@@ -85,164 +88,88 @@ def _guards(side: int, alpha: float) -> list[Any]:
 # The halves --------------------------------------------------------------------------------------------------------
 
 
-class Half:
-    """One FMU in event mode; ``feed`` returns its inputs at a time inside a step, by name."""
-
-    def __init__(self, path: Path, folder: str) -> None:
-        fmpy.extract(str(path), folder)
-        description = fmpy.read_model_description(folder)
-        self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.feed: Callable[[float], dict[str, float]] = lambda _: {}
-        self.steps = 0
-        identifier = description.coSimulation.modelIdentifier
-        self.fmu = FMU3Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier=identifier, instanceName="i")
-        self.fmu.instantiate(eventModeUsed=True, earlyReturnAllowed=True, intermediateUpdate=self._update)
-
-    def _update(self, _: Any, time: float, setting: bool, *more: Any) -> None:
-        if setting:
-            self.set(**self.feed(time))
-
-    def set(self, **values: float) -> None:
-        """Set variables."""
-        self.fmu.setFloat64([self.references[name] for name in values], list(values.values()))
-
-    def get(self, *names: str) -> list[float]:
-        """Return variables."""
-        return list(self.fmu.getFloat64([self.references[name] for name in names]))
-
-    def rate(self, name: str) -> float:
-        """Return the derivative of an output."""
-        return float(self.fmu.getOutputDerivatives([self.references[name]], [1])[0])
-
-    def start(self) -> None:
-        """Initialise."""
-        self.fmu.enterInitializationMode(startTime=0.0)
-        self.fmu.exitInitializationMode()
-        self.settle()
-
-    def settle(self) -> None:
-        """End event mode."""
-        self.fmu.updateDiscreteStates()
-        self.fmu.enterStepMode()
-
-    def step(self, time: float, step: float) -> tuple[bool, float]:
-        """Step; return whether an event is due, and the time reached."""
-        self.steps += 1
-        event, _, _, reached = self.fmu.doStep(time, step)
-        return bool(event), float(reached)
+def couple(paths: Mapping[str, Path], alpha: float) -> System:
+    """Return both FMUs, coupled, under the square torque."""
+    instances = (
+        fmu_instance("motor", paths["MotorHalf"], events=True),
+        fmu_instance("load", paths["LoadHalf"], {"alpha": alpha}, events=True),
+    )
+    connections = (
+        Connection("motor.theta_m", "load.theta_m"),
+        Connection("motor.omega_m", "load.omega_m"),
+        Connection("load.T_shaft", "motor.T_shaft"),
+    )
+    return System(instances, connections, (SignalSource("motor.u", Square(AMPLITUDE, PERIOD)),))
 
 
-def cubic(begin: float, end: float, y: Sequence[float], rates: Sequence[float]) -> Callable[[float], float]:
-    """Return Hermite's cubic through two values and derivatives."""
-    h = end - begin
-    mean = (y[1] - y[0]) / h
-    c, d = (3.0 * mean - 2.0 * rates[0] - rates[1]) / h, (rates[0] + rates[1] - 2.0 * mean) / h**2
-    return lambda t: y[0] + (t - begin) * (rates[0] + (t - begin) * (c + (t - begin) * d))
+def simulate(paths: Mapping[str, Path], alpha: float, algorithm: Algorithm) -> Recording:
+    """Run both halves; the recording has theta_m and theta_l."""
+    with Session(couple(paths, alpha), ["motor.theta_m", "load.theta_l"], algorithm, STOP) as session:
+        return session.run()
 
 
-@dataclass
-class Run:
-    """What a run found: times, both angles, contact changes and calls of fmi3DoStep."""
-
-    times: list[float] = field(default_factory=lambda: [0.0])
-    angles: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
-    contacts: list[float] = field(default_factory=list)
-    calls: int = 0
-
-
-class Importer:
-    """Both halves; a window is swept until the torque at its end has settled, and ends at an event of the load."""
-
-    def __init__(self, paths: dict[str, Path], alpha: float, folder: str) -> None:
-        self.motor = Half(paths["MotorHalf"], f"{folder}/motor")
-        self.load = Half(paths["LoadHalf"], f"{folder}/load")
-        self.motor.set(u=torque(0.0))
-        self.load.set(alpha=alpha)
-        self.motor.start()
-        self.load.start()
-
-    def run(self, step: float) -> Run:
-        """Run to the end in windows of ``step`` [s]."""
-        found, time = Run(), 0.0
-        for n in range(1, round(STOP / step) + 1):
-            end = n * step
-            self.motor.set(u=torque(time))
-            while time < end - SAME:
-                time, event = self.cross(time, end)
-                if event:
-                    found.contacts.append(time)
-                    self.handle()
-            time = end
-            found.times.append(end)
-            found.angles.append((self.motor.get("theta_m")[0], self.load.get("theta_l")[0]))
-        found.calls = self.motor.steps + self.load.steps
-        return found
-
-    def handle(self) -> None:
-        """Go through one event with both, and pass on the torque, which may have jumped."""
-        for half in (self.motor, self.load):
-            half.fmu.enterEventMode()
-        self.load.fmu.updateDiscreteStates()
-        self.motor.set(T_shaft=self.load.get("T_shaft")[0])
-        self.motor.settle()
-        self.load.settle()
-
-    def cross(self, begin: float, end: float) -> tuple[float, bool]:
-        """Take both to the end of a window or to an event in it; return where they are, and whether there is one."""
-        motor, load = self.motor, self.load
-        states = [(half, half.fmu.getFMUState()) for half in (motor, load)]
-        theta, omega = motor.get("theta_m", "omega_m")
-        first = (load.get("T_shaft")[0], load.rate("T_shaft") + self.torque_rate())
-        last, last_rate = first[0] + (end - begin) * first[1], first[1]
-        before = np.inf
-        accelerations = [motor.rate("omega_m"), 0.0]
-        while True:
-            shaft = cubic(begin, end, (first[0], last), (first[1], last_rate))
-            motor.fmu.setFMUState(states[0][1])
-            motor.set(T_shaft=first[0])
-            motor.feed = lambda t, shaft=shaft: {"T_shaft": shaft(t)}  # type: ignore[misc]
-            motor.step(begin, end - begin)
-            theta_end, omega_end = motor.get("theta_m", "omega_m")
-            accelerations[1] = motor.rate("omega_m")
-            angle = cubic(begin, end, (theta, theta_end), (omega, omega_end))
-            speed = cubic(begin, end, (omega, omega_end), accelerations)
-            load.fmu.setFMUState(states[1][1])
-            load.set(theta_m=theta, omega_m=omega)
-            load.feed = lambda t, a=angle, s=speed: {"theta_m": a(t), "omega_m": s(t)}  # type: ignore[misc]
-            event, reached = load.step(begin, end - begin)
-            last, last_rate = load.get("T_shaft")[0], load.rate("T_shaft") + self.torque_rate()
-            if reached - begin < SAME:  # the event is where the window begins: the motor stays there
-                motor.fmu.setFMUState(states[0][1])
-                end = reached
-                break
-            whole = end - reached < SAME
-            if whole and abs(last - before) <= SETTLED * max(1.0, abs(last)):
-                break
-            before = last if whole else np.inf
-            end = end if whole else reached
-        for half, state in states:
-            half.fmu.freeFMUState(state)
-        return end, event
-
-    def torque_rate(self) -> float:
-        """Return what the motor's acceleration adds to the derivative of the torque, whose half holds the speed."""
-        touching = self.load.fmu.getInt32([self.load.references["contact"]])[0] != 0
-        return DAMPING * self.motor.rate("omega_m") / RATIO if touching else 0.0
-
-
-def simulate(paths: dict[str, Path], alpha: float, step: float) -> Run:
-    """Run both halves."""
-    with TemporaryDirectory() as folder:
-        return Importer(paths, alpha, folder).run(step)
-
-
-def compare(paths: dict[str, Path], alpha: float, step: float) -> tuple[Run, float, float, int]:
+def compare(paths: Mapping[str, Path], alpha: float, algorithm: Algorithm) -> tuple[Recording, float, float, int]:
     """Return a run, its largest error of both angles [rad] and of contact instants [s], and how many there are."""
-    run = simulate(paths, alpha, step)
-    rows, events = solve(alpha, np.array(run.times))
-    errors = np.abs(np.array(run.angles) - rows[:, [0, 3]])
-    late = np.abs(np.array(run.contacts) - np.array(events)) if len(events) == len(run.contacts) else np.array([np.inf])
-    return run, float(errors.max()), float(late.max()), len(events)
+    run = simulate(paths, alpha, algorithm)
+    rows, found = solve(alpha, run.time)
+    contacts = found if alpha > 0.0 else []
+    error = float(np.abs(run.values.T - rows[:, [0, 3]]).max())
+    times = run.statistics.events.times
+    late = float(np.abs(np.subtract(times, contacts)).max(initial=0.0)) if len(times) == len(contacts) else np.inf
+    return run, error, late, len(contacts)
+
+
+class Logged:
+    """A slave whose calls in a run are written down: names, times and what comes back."""
+
+    def __init__(self, slave: Any, log: list[str]) -> None:
+        self._slave, self._log = slave, log
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._slave, name)
+        if name not in SHOWN:
+            return found
+        if name in ("sends", "receives"):
+            return lambda names, buffer: self._moved(name[:-1], names, found(names, buffer))
+
+        def call(*arguments: Any) -> Any:
+            answer = found(*arguments)
+            times = ", ".join(f"{a:.6f}" for a in arguments if isinstance(a, float))
+            match answer:
+                case StepOutcome(reached, event):
+                    said = f" -> {reached:.6f}{', event' if event else ''}"
+                case EventUpdate(again):
+                    said = f" -> {'again' if again else 'settled'}"
+                case _:
+                    said = ""
+            self._log.append(f"{self._slave.name}.{name}({times}){said}")
+            return answer
+
+        return call
+
+    def _moved(self, call: str, names: Sequence[str], move: Callable[[], None]) -> Callable[[], None]:
+        def moved() -> None:
+            move()
+            self._log.append(f"{self._slave.name}.{call}({', '.join(names)})")
+
+        return moved
+
+
+def log_contact(paths: Mapping[str, Path], alpha: float = 0.01, step: float = 1e-3) -> list[str]:
+    """Return the calls of the communication step of Gauss-Seidel in which the first contact is made."""
+    system, log = couple(paths, alpha), list[str]()
+    instances = [
+        replace(i, create=lambda name, i=i: Logged(i.create(name), log))  # type: ignore[misc]
+        for i in system.instances
+    ]
+    contact = solve(alpha, np.array([STOP]))[1][0]
+    with Session(
+        replace(system, instances=tuple(instances)), ["load.contact"], GaussSeidel(step), step * np.ceil(contact / step)
+    ) as session:
+        session.run()
+    starts = [n for n, line in enumerate(log) if line.startswith("motor.get_state")]
+    event = next(n for n, line in enumerate(log) if line.endswith("event"))
+    return log[max(n for n in starts if n < event) : max(n for n, line in enumerate(log) if "leave" in line) + 1]
 
 
 def write_reference(alpha: float = 0.01) -> None:
@@ -260,19 +187,32 @@ def write_reference(alpha: float = 0.01) -> None:
 
 
 def main() -> None:
-    """Print the table, or write the reference."""
+    """Print the table or the log of a contact, or write the reference."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--reference", action="store_true")
-    if parser.parse_args().reference:
+    parser.add_argument("--log", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.reference:
         write_reference()
         return
     with TemporaryDirectory() as folder:
         paths = ensure_native(["MotorHalf", "LoadHalf"], Path(folder), here=True, fmi=3)
-        print("half-gap [rad], window [s], contact changes, calls, error [rad], error of instants [s]")
-        for alpha in (0.005, 0.01, 0.02, 0.05, 0.1):
-            for step in (2e-3, 1e-3):
-                run, error, late, count = compare(paths, alpha, step)
-                print(f"{alpha}, {step}, {count}, {run.calls}, {error:.1e}, {late:.1e}")
+        if arguments.log:
+            print("\n".join(log_contact(paths)))
+            return
+        print("half-gap [rad], algorithm, contact changes, events, calls, error [rad], error of instants [s]")
+        for tolerance in (1e-8, 1e-7):
+            for alpha in (0.0, 0.005, 0.01, 0.02, 0.05, 0.1):
+                print_row(paths, alpha, Adaptive(1e-3, tolerance), f"adaptive {tolerance:g}")
+        for name, kind in (("gauss_seidel", GaussSeidel), ("jacobi", Jacobi), ("iterated", Iterated)):
+            print_row(paths, 0.01, kind(1e-3), f"{name} 0.001 s")
+
+
+def print_row(paths: Mapping[str, Path], alpha: float, algorithm: Algorithm, name: str) -> None:
+    """Print one line of the table."""
+    run, error, late, count = compare(paths, alpha, algorithm)
+    calls, events = sum(run.statistics.do_steps.values()), len(run.statistics.events.times)
+    print(f"{alpha}, {name}, {count}, {events}, {calls:,}, {error:.1e}, {late:.1e}", flush=True)
 
 
 if __name__ == "__main__":

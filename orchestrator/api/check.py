@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.api.shown import Block, Result
-from orchestrator.checking.batch import check_fmus, chosen_policy, find_fmus
+from orchestrator.checking.batch import check_fmus, find_fmus, policy_of
 from orchestrator.checking.check import CheckOptions
 from orchestrator.checking.findings import Finding, FmuFindings
 from orchestrator.checking.formats.code_quality import as_code_quality
@@ -130,5 +130,5 @@ def check(
         "memory_limit": memory_limit,
         "size_limit": size_limit,
     }
-    rules = policy if isinstance(policy, Policy) else chosen_policy(policy)
+    rules = policy if isinstance(policy, Policy) else policy_of(policy)
     return CheckResult(tuple(check_fmus(paths, options, rules, progress)), given)

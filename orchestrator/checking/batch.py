@@ -24,7 +24,7 @@ def check_fmus(
     return verdicts
 
 
-def chosen_policy(path: Path | str | None) -> Policy:
+def policy_of(path: Path | str | None) -> Policy:
     """Return the policy of a file, or the default one."""
     return Policy() if path is None else read_policy(Path(path))
 

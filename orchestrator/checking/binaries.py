@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, Interface
-from orchestrator.checking.findings import Finding, listed
+from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.library_headers import LibraryHeader, inspect
 from orchestrator.checking.rules import Version
 from orchestrator.checking.rules_model import C_NAME
@@ -126,7 +126,7 @@ def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
     for interface in d.interfaces:
         absent = [(e, s) for e, s in interface.sources if posixpath.normpath(f"sources/{s}") not in names]
         if absent:
-            message = f"source files must be in sources/, but are not: {listed([f'`{s}`' for _, s in absent])}"
+            message = f"source files must be in sources/, but are not: {list_names([f'`{s}`' for _, s in absent])}"
             yield Finding("file.source-missing", xpath(absent[0][0], "name"), message)
     for folder in folders:
         other = folder in WITHOUT_NAME if version == "2.0" else _WITH_ABI.fullmatch(folder)
@@ -165,7 +165,7 @@ def _check_library(
         return
     missing = [f for f in functions_of(d.dialect.version, interface.kind) if not _exports(library, data, f)]
     if missing:
-        message = f"the library must export all FMI functions, but lacks {listed(missing)}"
+        message = f"the library must export all FMI functions, but lacks {list_names(missing)}"
         yield Finding("binary.exports", path, message)
     python = sorted(u for u in library.undefined or () if u.startswith(("Py", "_Py")))
     if python and not any("python" in n for n in library.needed or ()):

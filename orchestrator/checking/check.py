@@ -5,7 +5,7 @@ from pathlib import Path
 
 from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.dynamic import check_dynamic, obstacle
-from orchestrator.checking.findings import Execution, Finding, FmuFindings, has_errors, ordered
+from orchestrator.checking.findings import Execution, Finding, FmuFindings, has_errors, order_findings
 from orchestrator.checking.static import StaticResult, check_static
 from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.isolation.walls import support
@@ -52,7 +52,7 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
             result.files.close()
     facts = result.facts | ({"walls": _walls(options.trust)} if executions else {})
     version = "" if result.description is None else result.description.dialect.version
-    return FmuFindings(str(path), ordered(findings), version, result.stages, executions, reason, facts)
+    return FmuFindings(str(path), order_findings(findings), version, result.stages, executions, reason, facts)
 
 
 def _obstacle(result: StaticResult) -> str:

@@ -8,7 +8,7 @@ from lxml import etree
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, number
-from orchestrator.checking.findings import Finding, listed
+from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.xml_reading import xpath
 
@@ -135,7 +135,7 @@ def _build(d: Description, root: etree._Element, names: set[str]) -> Iterator[Fi
     files = ((e, e.get("name", "")) for e in root.iter("SourceFile"))
     absent = [(e, name) for e, name in files if name and posixpath.normpath(f"sources/{name}") not in names]
     if absent:
-        message = f"source files must be in sources/, but are not: {listed([f'`{name}`' for _, name in absent])}"
+        message = f"source files must be in sources/, but are not: {list_names([f'`{name}`' for _, name in absent])}"
         yield Finding("build.file", xpath(absent[0][0], "name", BUILD), message)
     for element in root.iter("IncludeDirectory"):
         folder = posixpath.normpath(f"sources/{element.get('name', '')}")

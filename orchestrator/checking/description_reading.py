@@ -111,8 +111,8 @@ def _variability(kind: str, causality: str, dialect: FmiDialect) -> str:
     return "continuous" if kind in REAL else "discrete"
 
 
-def _starts(element: etree._Element, own: Mapping[str, str], dialect: FmiDialect) -> tuple[str, ...] | None:
-    text = own.get("start")
+def _starts(element: etree._Element, declared: Mapping[str, str], dialect: FmiDialect) -> tuple[str, ...] | None:
+    text = declared.get("start")
     if dialect is FMI2:
         return None if text is None else (text,)
     texts = [e.get("value", "") for e in element.findall("Start")]

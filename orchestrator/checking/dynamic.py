@@ -123,20 +123,20 @@ class _Watcher:
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
         before = _snapshot(self.fmu)
-        with Process(self._started) as process:
+        with Process(self._start) as process:
             library = Library(process, job.version, job.variables)
             try:
                 self._probes(library, job, names)
             except ChildError as error:
-                self._ended_early(error, library.current)
+                self._report_end(error, library.current)
             left = process.jail.finish() or process.left
-            self._skipped(names)
-            self._left_behind(before, process.jail, left)
+            self._report_skipped(names)
+            self._report_remains(before, process.jail, left)
             self.stages |= dict.fromkeys(("run", "afterwards"), "")
         return self.findings
 
-    def _started(self) -> Jail:
-        entry = "orchestrator.checking.host:opened"
+    def _start(self) -> Jail:
+        entry = "orchestrator.checking.host:open_host"
         return Jail(entry, write=[self.fmu], limits=self.limits, walls=self.walls, adopt=True)
 
     def _probes(self, library: Library, job: ProbeJob, names: tuple[str, ...]) -> None:
@@ -167,7 +167,7 @@ class _Watcher:
             self._said.add((rule, message))
             self.findings.append(Finding(rule, path or f"({self.interface}{self.probe})", f"{message} {when}".rstrip()))
 
-    def _ended_early(self, error: ChildError, function: str) -> None:
+    def _report_end(self, error: ChildError, function: str) -> None:
         where = f"during {function}" if function else f"in the probe `{self.probe}`"
         if self.probe == "misuse" and function and error.reason not in ("memory", "disk"):
             self._add("misuse.crash", f"a call that is to be refused must return, but {error} {where}")
@@ -183,7 +183,7 @@ class _Watcher:
         else:
             self._add("run.failed", f"the probe `{self.probe}` must end, but {error} ({error.said})")
 
-    def _skipped(self, names: tuple[str, ...]) -> None:
+    def _report_skipped(self, names: tuple[str, ...]) -> None:
         """Say what was not reached, and why."""
         missing = [name for name in names if name not in self.stages]
         ended = f"the run ended in the probe `{self.probe}`"
@@ -191,7 +191,7 @@ class _Watcher:
         if missing[1:] or "load" not in self.stages:
             self._add("run.skipped", f"not carried out after that: {', '.join(missing[1:] or missing)}")
 
-    def _left_behind(self, before: dict[str, tuple[int, int]], jail: Jail, left: bool) -> None:
+    def _report_remains(self, before: dict[str, tuple[int, int]], jail: Jail, left: bool) -> None:
         self.probe = "afterwards"
         written = _files(jail.scratch, "tmp")
         if written:

@@ -133,13 +133,13 @@ class FmuFindings:
         return self.count("error") == 0
 
 
-def listed(names: Sequence[str], most: int = 12) -> str:
+def list_names(names: Sequence[str], most: int = 12) -> str:
     """Names for a message, not too many of them."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 
 
-def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+def order_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Errors first, each kept in the order found, equal ones as one, at most ``MOST_PER_RULE`` of one rule.
 
     Returns:
@@ -147,7 +147,7 @@ def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """
     seen: Counter[str] = Counter()
     kept = []
-    for finding in _grouped(findings):
+    for finding in _group(findings):
         seen[finding.rule] += 1
         if seen[finding.rule] <= MOST_PER_RULE:
             kept.append(finding)
@@ -157,7 +157,7 @@ def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(kept, key=lambda f: SEVERITIES.index(f.severity)))
 
 
-def _grouped(findings: Iterable[Finding]) -> Iterator[Finding]:
+def _group(findings: Iterable[Finding]) -> Iterator[Finding]:
     """Findings of one rule with the same message as one, at the first place in a file; those of a probe stay apart."""
     places: dict[tuple[str, str, str], dict[str, None]] = {}
     for finding in findings:

@@ -107,7 +107,7 @@ class _Fault:
     count: int = 0
 
 
-def known_attributes(kind: str, version: str) -> frozenset[str]:
+def attributes_of(kind: str, version: str) -> frozenset[str]:
     """The attributes that the standard has for a type.
 
     Args:

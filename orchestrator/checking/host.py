@@ -47,7 +47,7 @@ class _EventInfo(ctypes.Structure):
     _fields_ = (*((f"flag{i}", c_int) for i in range(5)), ("next", c_double))
 
 
-def opened(_: Any) -> Callable[[Any], Any]:
+def open_host(_: Any) -> Callable[[Any], Any]:
     """Return the handler of requests ``[name of a method of Host, argument, ...]``."""
     host = Host()
     return lambda request: getattr(host, request[0])(*request[1:])
@@ -73,9 +73,9 @@ class Host:
         self._clock_update = _CLOCK_UPDATE(lambda _: None)
         self._lock, self._unlock = _LOCK(lambda: self._count(1)), _LOCK(lambda: self._count(-1))
 
-    def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, message: int, *rest: Any) -> None:
+    def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, message: int, *values: Any) -> None:
         self._errors += status in _ERRORS
-        self._take(fill_in(message, rest))
+        self._take(fill_in(message, values))
 
     def _log_3(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
         self._errors += status in _ERRORS
@@ -127,7 +127,7 @@ class Host:
         component = self._handle.fmi2Instantiate(
             name.encode(), kind, guid.encode(), resources.encode(), ctypes.byref(callbacks), 0, 1
         )
-        return self._made(component, callbacks)
+        return self._make(component, callbacks)
 
     def instantiate_3(
         self, function: str, name: str, token: str, resources: str | None, flags: list[bool], required: list[int]
@@ -154,13 +154,13 @@ class Host:
         elif function.endswith("ScheduledExecution"):
             rest = (self._clock_update, self._lock, self._unlock)
         component = getattr(self._handle, function)(*head, c_void_p(), self._log3, *rest)
-        return self._made(component, rest)
+        return self._make(component, rest)
 
-    def _made(self, component: int | None, kept: Any) -> list[Any]:
+    def _make(self, component: int | None, number: Any) -> list[Any]:
         if not component:
             return [None, self._messages]
         self._number += 1
-        self._instances[self._number] = (c_void_p(component), kept)
+        self._instances[self._number] = (c_void_p(component), number)
         return [self._number, self._messages]
 
     def free(self, instance: int, function: str) -> None:
@@ -253,7 +253,7 @@ class Host:
                 return (ctypes.byref(state),), lambda: not state
             case "new state":
                 fresh = c_void_p()
-                return (ctypes.byref(fresh),), lambda: self._kept(fresh)
+                return (ctypes.byref(fresh),), lambda: self._keep(fresh)
             case "out bytes":
                 data = (ctypes.c_char * value[0])()
                 return (data,), lambda: data.raw
@@ -269,7 +269,7 @@ class Host:
             values[0] = initial
         return (values,), lambda: [v[:_LONGEST_TEXT] if isinstance(v, bytes) else v for v in list(values)[:count]]
 
-    def _kept(self, state: c_void_p) -> int:
+    def _keep(self, state: c_void_p) -> int:
         self._number += 1
         self._states[self._number] = state
         return self._number

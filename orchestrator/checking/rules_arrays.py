@@ -73,7 +73,7 @@ def check_clocks(d: Description) -> Iterator[Finding]:
         if v.kind == "Clock":
             yield from _clock(v)
             yield from _priority(d, v)
-        yield from _clocked(v, clocks)
+        yield from _check_clocks(v, clocks)
         if v.previous is not None:
             yield from _previous(d, v, previous)
             previous.setdefault(v.previous, v.name)
@@ -150,7 +150,7 @@ def _priority(d: Description, v: DescribedVariable) -> Iterator[Finding]:
         yield Finding("clock.priority", v.path(), message)
 
 
-def _clocked(v: DescribedVariable, clocks: dict[int | None, DescribedVariable]) -> Iterator[Finding]:
+def _check_clocks(v: DescribedVariable, clocks: dict[int | None, DescribedVariable]) -> Iterator[Finding]:
     if "clocks" not in v.element.attrib:
         return
     path = v.path("clocks")

@@ -8,7 +8,7 @@ from lxml import etree
 
 from orchestrator.checking.description import Description, Interface, number
 from orchestrator.checking.findings import Finding
-from orchestrator.checking.grammar import known_attributes
+from orchestrator.checking.grammar import attributes_of
 from orchestrator.checking.units import dimension_of
 from orchestrator.checking.xml_reading import xpath
 
@@ -65,7 +65,7 @@ def _interface(d: Description, interface: Interface) -> Iterator[Finding]:
         message = "the FMU says that it needs an execution tool: it is no stand-alone FMU"
         yield Finding("model.execution-tool", xpath(element, "needsExecutionTool"), message)
     if d.dialect.version == "3.0":
-        known = known_attributes(interface.kind, "3.0")
+        known = attributes_of(interface.kind, "3.0")
         for attribute in element.attrib:
             if str(attribute) not in known and not str(attribute).startswith("{"):
                 message = f"an attribute that the standard has not must have a namespace, but `{attribute}` has none"

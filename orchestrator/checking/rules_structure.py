@@ -37,9 +37,9 @@ def check_structure(d: Description) -> Iterator[Finding]:
         clocked = [v for v in d.variables if v.clocks]
         where = d.dialect.initial_unknowns
         what = "outputs, states and derivatives with initial approx or calculated, and calculated parameters"
-        expected = required_initial_unknowns(d)
+        expected = initial_unknowns_of(d)
         yield from _set(d, where, d.initial_unknowns, expected, clocked, "structure.initial-unknowns", what)
-    yield from _clocked_states(d)
+    yield from _check_clocked_states(d)
     for u in d.event_indicators:
         v = d.variable(u.variable)
         if v is not None and (v.kind not in REAL or v.variability != "continuous"):
@@ -47,7 +47,7 @@ def check_structure(d: Description) -> Iterator[Finding]:
             yield Finding("structure.event-indicators", u.path(d.dialect.identity), message)
 
 
-def required_initial_unknowns(d: Description) -> list[DescribedVariable]:
+def initial_unknowns_of(d: Description) -> list[DescribedVariable]:
     """The variables that the list of initial unknowns must have."""
     expected = [v for v in d.variables if v.causality == "output" and v.initial in _FREE and not v.clocks]
     expected += [v for v in d.variables if v.causality == "calculatedParameter"]
@@ -59,7 +59,7 @@ def required_initial_unknowns(d: Description) -> list[DescribedVariable]:
     return expected
 
 
-def _clocked_states(d: Description) -> Iterator[Finding]:
+def _check_clocked_states(d: Description) -> Iterator[Finding]:
     listed = {u.variable for u in d.clocked_states}
     for u in d.clocked_states:
         v = d.variable(u.variable)
@@ -75,14 +75,14 @@ def _clocked_states(d: Description) -> Iterator[Finding]:
 def _set(
     d: Description,
     where: str,
-    found: tuple[StructureEntry, ...],
+    entries: tuple[StructureEntry, ...],
     expected: list[DescribedVariable],
     allowed: list[DescribedVariable],
     rule: str,
     what: str,
 ) -> Iterator[Finding]:
     """Findings where a list has not all that is ``expected``, or more than that and what is ``allowed``."""
-    numbers = {u.variable for u in found if u.variable is not None}
+    numbers = {u.variable for u in entries if u.variable is not None}
     wanted = {d.identity(v) for v in expected}
     spare = {d.identity(v) for v in allowed}
     section = where.partition("/")[0]
@@ -105,7 +105,7 @@ def _unknowns(d: Description, section: tuple[StructureEntry, ...]) -> Iterator[F
         v = d.variable(u.variable)
         path = u.path(d.dialect.identity)
         if v is None:
-            yield Finding("structure.index", path, f"{_wanted(d)}, but is {u.variable}")
+            yield Finding("structure.index", path, f"{_expected_text(d)}, but is {u.variable}")
         elif u.variable in seen:
             yield Finding(
                 "structure.duplicate", path, f"a variable must be listed once, but `{v.name}` is listed again"
@@ -118,7 +118,7 @@ def _unknowns(d: Description, section: tuple[StructureEntry, ...]) -> Iterator[F
         yield from _dependencies(d, u, initial)
 
 
-def _wanted(d: Description) -> str:
+def _expected_text(d: Description) -> str:
     if d.dialect.version == "2.0":
         return f"an index must be from 1 to {len(d.variables)}"
     return "a value reference must be that of a variable"
@@ -145,7 +145,7 @@ def _dependencies(d: Description, u: StructureEntry, initial: bool) -> Iterator[
     for known_number in u.dependencies or ():
         known = d.variable(known_number)
         if known is None:
-            yield Finding("structure.dependencies", path, f"{_wanted(d)}, but is {known_number}")
+            yield Finding("structure.dependencies", path, f"{_expected_text(d)}, but is {known_number}")
         elif initial and known.causality in ("output", "local", "calculatedParameter") and known.initial != "exact":
             message = "a dependency must be an input, a parameter or have initial exact, but"
             yield Finding("structure.dependencies", path, f"{message} `{known.name}` is none of these")

@@ -26,7 +26,7 @@ def check_variables(d: Description) -> Iterator[Finding]:
         yield from _start(d.dialect, v)
         if v.kind in NUMERIC:
             yield from _bounds(v)
-        yield from _declared_type(types, v)
+        yield from _check_declared_type(types, v)
         yield from _real_only(d, v, states)
         yield from _multiple_set(d, v)
     independent = [v for v in d.variables if v.causality == "independent"]
@@ -151,7 +151,7 @@ def _bounds(v: DescribedVariable) -> Iterator[Finding]:
             yield Finding("variable.not-finite", v.path(attribute), message)
 
 
-def _declared_type(types: Mapping[str, SimpleType], v: DescribedVariable) -> Iterator[Finding]:
+def _check_declared_type(types: Mapping[str, SimpleType], v: DescribedVariable) -> Iterator[Finding]:
     name = v.own.get("declaredType")
     if name is None:
         return

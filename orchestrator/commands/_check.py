@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from orchestrator.checking.batch import chosen_policy
+from orchestrator.checking.batch import policy_of
 from orchestrator.checking.check import CheckOptions
 from orchestrator.checking.findings import SEVERITIES
 from orchestrator.checking.formats.code_quality import as_code_quality
@@ -82,7 +82,7 @@ def read_arguments(args: argparse.Namespace) -> Policy:
     if args.github and not os.environ.get(_SUMMARY):
         raise InputError(f"`--github` must be given where {_SUMMARY} names a file, but it names none")
     usual = Path(FILE_NAME)
-    policy = chosen_policy(args.policy or (usual if usual.is_file() else None))
+    policy = policy_of(args.policy or (usual if usual.is_file() else None))
     given = {"fail_on": args.fail_on, "baseline": args.baseline and str(args.baseline)}
     return msgspec.structs.replace(policy, **{name: value for name, value in given.items() if value})
 

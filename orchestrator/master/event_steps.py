@@ -13,6 +13,7 @@ from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi
 from orchestrator.master.event_stage import EventStage, slack
 from orchestrator.master.events import MOST_EVENTS, EventIteration
 from orchestrator.master.fixed_point import fixed_point
+from orchestrator.master.input_leads import InputLeads
 from orchestrator.master.iterated import loop_groups
 from orchestrator.master.protocol import RunEndedError, StepDiscardedError, StepOutcome
 from orchestrator.master.wiring import Stage, gather
@@ -104,8 +105,6 @@ class FixedSteps:
         self.values, self.view = events.wiring.values, events.wiring.view
         self.passes = self.undone = 0
         self._column, self._late = 0, False
-        self._leads = any(stage.inside for stage in events.stages)
-        self._before, self._rates = self.values.copy(), np.zeros(len(self.values))
         by_name = {stage.name: stage for stage in events.stages}
         if isinstance(algorithm, Iterated):
             loops = loop_groups(events.wiring)
@@ -115,6 +114,7 @@ class FixedSteps:
         self._simultaneous = isinstance(algorithm, Jacobi)
         if self._simultaneous:  # those that cannot go back step last, to where the others have come
             self._groups.sort(key=lambda group: not group.can_go_back)
+        self._leads = InputLeads(events, self.gather, self._simultaneous)
 
     def gather(self, stage: Stage) -> None:
         """Fill the input slots of a stage for the present communication step.
@@ -160,8 +160,8 @@ class FixedSteps:
         """Take all slaves to ``end`` [s] or to the first event; return where they are, and whether there is one."""
         for group in self._groups:
             group.save(begin)
-        values = self._before = self.values.copy()
-        self._rates = self.events.rates() if self._leads else self._rates
+        values = self.values.copy()
+        self._leads.begin(values)
         try:
             for _ in range(MOST_HALVINGS):
                 try:
@@ -226,41 +226,16 @@ class FixedSteps:
     def _step(self, stage: EventStage, begin: float, end: float) -> StepOutcome:
         last: Array | None = None
         if stage.inside:
-            last = self._lead(stage, begin, end)
+            last = self._leads.lead(stage, begin, end)
         elif not self._simultaneous:
             self.gather(stage.stage)
         stage.send()
         outcome = stage.step(begin, end)
         stage.receive()
+        self._leads.note(stage)
         if last is not None:
             self.values[stage.inputs] = last
         return outcome
-
-    def _lead(self, stage: EventStage, begin: float, end: float) -> Array:
-        """Set inputs as they are at ``begin`` [s] and lead them on straight lines inside the step; return the ends.
-
-        Lines go to the values of those that have stepped already, else along derivatives where these are known.
-        """
-        now = self.values.copy()
-        newest = self._before if self._simultaneous else now
-        self.values[:] = newest
-        self.gather(stage.stage)
-        last = self.values[stage.inputs]
-        self.values[:] = self._before
-        self.gather(stage.stage)
-        first = self.values[stage.inputs]
-        self.values[:] = now
-        held = np.delete(np.arange(len(first)), stage.places)
-        first[held] = last[held]
-        self.values[stage.inputs] = first
-        for k in stage.places:
-            feed = stage.feeds[k]
-            if self.events.rated[feed.source] and feed.source >= 0 and newest[feed.source] == self._before[feed.source]:
-                last[k] += feed.factor * self._rates[feed.source] * (end - begin)
-        slopes = (last - first) / (end - begin)
-        lines = [(float(first[k]), float(slopes[k])) for k in stage.places]
-        stage.events.feed(stage.inside, lambda time: [value + slope * (time - begin) for value, slope in lines])
-        return last
 
     def _solve(self, group: _Group, begin: float, end: float) -> None:
         """Step a loop until what it exchanges settles, to where the first of its slaves stops."""

@@ -12,7 +12,7 @@ from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.checking.description_reading import read_description
-from orchestrator.checking.findings import Finding, FmuFindings, ordered
+from orchestrator.checking.findings import Finding, FmuFindings, order_findings
 from orchestrator.checking.formats.junit import as_junit
 from orchestrator.checking.formats.text import as_lines
 from orchestrator.checking.layered import _read_csv
@@ -134,16 +134,16 @@ def test_an_unpacked_fmu_is_checked_too(tmp_path: Path) -> None:
 
 def test_errors_come_first_and_repeats_go() -> None:
     warning, error = Finding("file.icon", "model.png", "w"), Finding("model.guid", "", "e")
-    assert ordered([warning, error, warning]) == (error, warning)
+    assert order_findings([warning, error, warning]) == (error, warning)
     with pytest.raises(KeyError, match="must be one of RULES"):
         Finding("no.such-rule", "", "")
 
 
 def test_equal_findings_are_one() -> None:
-    found = ordered(Finding("model.guid", f"m.xml:/a[{i}]", "the same") for i in range(3))
+    found = order_findings(Finding("model.guid", f"m.xml:/a[{i}]", "the same") for i in range(3))
     assert found == (Finding("model.guid", "m.xml:/a[0]", "the same (at 3 places)"),)
     of_probes = [Finding("run.crash", f"({interface}, inputs)", "the same") for interface in ("A", "B")]
-    assert ordered(of_probes) == tuple(of_probes)
+    assert order_findings(of_probes) == tuple(of_probes)
 
 
 def test_hostile_names_reach_neither_terminal_nor_junit() -> None:

@@ -29,7 +29,7 @@ def as_annotations(verdicts: Sequence[Verdict]) -> list[str]:
         if seen[level] <= MOST_ANNOTATIONS:
             f = issue.finding
             file, title = (_property(plain(text)) for text in (artifact(verdict.fmu), f.rule))
-            text = _escaped(plain(f"{f.path}: {f.message} -> {f.advice}"))
+            text = _escape(plain(f"{f.path}: {f.message} -> {f.advice}"))
             lines.append(f"::{level} file={file},title={title}::{text}")
     return lines
 
@@ -61,12 +61,12 @@ def _new_issues(verdicts: Sequence[Verdict]) -> list[tuple[Verdict, Issue]]:
     return sorted(issues, key=lambda pair: SEVERITIES.index(pair[1].severity))
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _property(text: str) -> str:
-    return _escaped(text).replace(":", "%3A").replace(",", "%2C")
+    return _escape(text).replace(":", "%3A").replace(",", "%2C")
 
 
 def _cell(text: str) -> str:

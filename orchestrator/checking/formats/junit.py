@@ -46,15 +46,15 @@ def _case(verdict: Verdict, outcome: RuleOutcome, issues: list[Issue]) -> etree.
         first = failing[0]
         kind, message = first.severity, _text(first.finding.message)
         failure = etree.SubElement(case, "failure", type=kind, message=message)
-        failure.text = _said(issues)
+        failure.text = _case_text(issues)
     elif issues:
-        etree.SubElement(case, "system-out").text = _said(issues)
+        etree.SubElement(case, "system-out").text = _case_text(issues)
     elif outcome.outcome == "not run":
         etree.SubElement(case, "skipped", message=_text(outcome.reason))
     return case
 
 
-def _said(issues: Sequence[Issue]) -> str:
+def _case_text(issues: Sequence[Issue]) -> str:
     lines = []
     for issue in issues:
         f = issue.finding

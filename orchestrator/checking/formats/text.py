@@ -47,11 +47,11 @@ def as_results(verdicts: Sequence[Verdict]) -> CheckFound:
     return CheckFound(
         ok=all(v.ok for v in verdicts),
         counts={severity: sum(v.count(severity) for v in verdicts) for severity in SEVERITIES},
-        fmus=[_checked(v) for v in verdicts],
+        fmus=[_checked_fmu(v) for v in verdicts],
     )
 
 
-def _checked(verdict: Verdict) -> CheckedFmu:
+def _checked_fmu(verdict: Verdict) -> CheckedFmu:
     report = verdict.report
     findings = [
         FindingFound(

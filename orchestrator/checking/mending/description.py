@@ -47,13 +47,13 @@ def _at(root: etree._Element, path: str) -> tuple[etree._Element, str] | None:
 
 def _remove(_: etree._Element, element: etree._Element, attribute: str) -> str:
     value = element.attrib.pop(attribute, None)
-    return "" if value is None else f'removed {attribute}="{value}" of {_named(element)}'
+    return "" if value is None else f'removed {attribute}="{value}" of {_name_of(element)}'
 
 
 def _remove_dependencies(_: etree._Element, element: etree._Element, __: str) -> str:
     """Without the list an unknown depends on everything, which is never wrong."""
     removed = [element.attrib.pop(name, None) for name in ("dependencies", "dependenciesKind")]
-    return f"removed the dependencies of {_named(element)}" if any(v is not None for v in removed) else ""
+    return f"removed the dependencies of {_name_of(element)}" if any(v is not None for v in removed) else ""
 
 
 def _discrete(_: etree._Element, element: etree._Element, __: str) -> str:
@@ -61,7 +61,7 @@ def _discrete(_: etree._Element, element: etree._Element, __: str) -> str:
     if variable is None:
         return ""
     variable.set("variability", "discrete")
-    return f'set variability="discrete" of {_named(variable)}'
+    return f'set variability="discrete" of {_name_of(variable)}'
 
 
 def _define_unit(root: etree._Element, element: etree._Element, attribute: str) -> str:
@@ -93,7 +93,7 @@ def _mend_date(root: etree._Element) -> str:
     return "" if mended == text else f"wrote {_DATE} {text} as {mended}{taken}"
 
 
-def _named(element: etree._Element) -> str:
+def _name_of(element: etree._Element) -> str:
     """What a person calls an element: a variable's name, or the tag."""
     for candidate in (element, element.getparent()):
         name = None if candidate is None else candidate.get("name")

@@ -39,11 +39,11 @@ def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], l
             raise UnmendableError(f"{path.name} must be mended, but has two different files {plain}")
     names = [finding.path for finding in findings if finding.rule == "archive.duplicate"]
     if names:
-        repairs.append(f"removed repeated entries: {_listed(names)}")
+        repairs.append(f"removed repeated entries: {_list_names(names)}")
     packed = [finding.path for finding in findings if finding.rule == "archive.compression"]
     if packed:
-        repairs.append(f"packed with deflate: {_listed(packed)}")
-    return _lifted(path, members, repairs), repairs
+        repairs.append(f"packed with deflate: {_list_names(packed)}")
+    return _lift(path, members, repairs), repairs
 
 
 def _entries(path: Path, limits: ArchiveLimits) -> Iterator[tuple[str, bytes]]:
@@ -67,7 +67,7 @@ def _plain_name(name: str) -> str:
     return posixpath.normpath(name.replace("\\", "/"))
 
 
-def _lifted(path: Path, members: dict[str, bytes], repairs: list[str]) -> dict[str, bytes]:
+def _lift(path: Path, members: dict[str, bytes], repairs: list[str]) -> dict[str, bytes]:
     """Take the files out of the one folder that they are all in."""
     if DESCRIPTION in members:
         return members
@@ -83,7 +83,7 @@ def _place(finding: Finding) -> str:
     return f"{finding.path}: " if finding.path else ""
 
 
-def _listed(names: Iterable[str]) -> str:
+def _list_names(names: Iterable[str]) -> str:
     distinct = list(dict.fromkeys(names))
     more = f" and {len(distinct) - 5} more" if len(distinct) > 5 else ""
     return ", ".join(distinct[:5]) + more

@@ -7,7 +7,7 @@ from lxml import etree
 from orchestrator.checking.description import DescribedVariable, Description
 from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Finding
-from orchestrator.checking.rules_structure import required_initial_unknowns
+from orchestrator.checking.rules_structure import initial_unknowns_of
 
 _LISTS = frozenset(f"structure.{name}" for name in ("index", "outputs", "initial-unknowns", "duplicate", "order"))
 _ORDER = ("Outputs", "Derivatives", "InitialUnknowns")  # of FMI 2.0's sections
@@ -28,7 +28,7 @@ def mend_structure(root: etree._Element, findings: Iterable[Finding]) -> list[st
     outputs = [v for v in d.variables if v.causality == "output"]
     repairs = _write(d, d.dialect.outputs, outputs, [])
     clocked = [v for v in d.variables if v.clocks]
-    return repairs + _write(d, d.dialect.initial_unknowns, required_initial_unknowns(d), clocked)
+    return repairs + _write(d, d.dialect.initial_unknowns, initial_unknowns_of(d), clocked)
 
 
 def _write(

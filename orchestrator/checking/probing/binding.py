@@ -138,9 +138,9 @@ class Library:
     def raw(self, number: int, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
         """Call a function of an instance; return its status and what its output arguments hold."""
         answer = self._ask(function, "call", number, function, [list(a) for a in arguments])
-        return self._checked(answer, function, arguments)
+        return self._check_answer(answer, function, arguments)
 
-    def _checked(self, answer: Any, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
+    def _check_answer(self, answer: Any, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
         """An answer that has the shape of one."""
         match answer:
             case [int() as status, list() as values, messages, int() as errors]:
@@ -164,7 +164,7 @@ class Library:
         if not isinstance(answers, list) or not 1 <= len(answers) <= len(requests):
             raise odd(doing)
         for answer, (function, arguments) in zip(answers, requests, strict=False):
-            done.append(self._checked(answer, function, arguments))
+            done.append(self._check_answer(answer, function, arguments))
             self.logged.append((self.messages, self.errors))
         return done
 

@@ -50,11 +50,11 @@ class Driver(FmuInstance):
         """Read variables of one base type; a null text is None."""
         if not variables:
             return []
-        function, arguments = self._getting(variables)
+        function, arguments = self._get_call(variables)
         (values,) = self.call(function, *arguments, when=when)
         return self._got(variables, values)
 
-    def _getting(self, variables: Sequence[ProbedVariable]) -> tuple[str, list[Any]]:
+    def _get_call(self, variables: Sequence[ProbedVariable]) -> tuple[str, list[Any]]:
         """Function and arguments that read variables of one base type."""
         base, size = variables[0].base, sum(v.size for v in variables)
         out = ("out binaries", size) if base == "Binary" else ("out", _CTYPES[self.job.version][base], size)
@@ -93,7 +93,7 @@ class Driver(FmuInstance):
             for base in dict.fromkeys(v.base for v in variables if not v.clocks)
         ]
         groups = [[(i, v) for i, v in group if not v.clocks] for group in groups]
-        answers = self.call_many([self._getting([v for _, v in group]) for group in groups], when)
+        answers = self.call_many([self._get_call([v for _, v in group]) for group in groups], when)
         for group, (answer,) in zip(groups, answers, strict=True):
             values = self._got([v for _, v in group], answer)
             for i, v in group:

@@ -132,7 +132,7 @@ class EventDriver(Driver):
                 chosen = [c.reference for c in ticking]
                 head = (("in", "uint32", chosen), ("size", len(chosen)))
                 self.call("SetClock", *head, ("in", "bool", [True] * len(chosen)), when=when)
-            active |= self._triggered(when)
+            active |= self._active_clocks(when)
             self._hold(active, when)
             outcomes.append(self.update(t, when))
             self._advance_clocks(ticking if position == 0 else [], t)
@@ -143,7 +143,7 @@ class EventDriver(Driver):
         else:
             text = f"the discrete states must settle, but want more than {MOST_ITERATIONS} updates {when}"
             raise StatusError("UpdateDiscreteStates", 0, text, "event.endless")
-        still = self._triggered(when)
+        still = self._active_clocks(when)
         if still:
             names = ", ".join(c.name for c in self.job.clocks if c.reference in still)
             text = f"a clock must be inactive after the update of the discrete states, but {names} is not"
@@ -151,7 +151,7 @@ class EventDriver(Driver):
         self.memory["next"] = outcomes[-1].next_time
         return outcomes
 
-    def _triggered(self, when: str) -> set[int]:
+    def _active_clocks(self, when: str) -> set[int]:
         """The output clocks that are active."""
         chosen = [c.reference for c in self.job.clocks if c.causality == "output"]
         if not chosen:

@@ -45,13 +45,13 @@ class Context:
         """Names of the recorded values."""
         return self.bench.job.labels()
 
-    def compare(self, expected: list[list[Any]], found: list[list[Any]]) -> Difference | None:
+    def compare(self, expected: list[list[Any]], values: list[list[Any]]) -> Difference | None:
         """Hold a run against another; None when they are equal bit for bit.
 
         Args:
             expected: the one run, [step][output].
         """
-        return compare(expected, found, self.names)
+        return compare(expected, values, self.names)
 
     def report_difference(self, rule: str, wanted: str, difference: Difference, allowed: float = _SMALL) -> None:
         """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only."""

@@ -50,7 +50,7 @@ def intermediate(context: Context) -> None:
         message = "intermediateUpdate must be called, as providesIntermediateUpdate says, but is not"
         context.report("intermediate.missing", message)
     elif "canReturnEarlyAfterIntermediateUpdate" in job.flags:
-        _asked_to_return(context)
+        _probe_early_return(context)
 
 
 def _judge(context: Context, rows: list[list[Any]], begin: float, end: float) -> None:
@@ -78,7 +78,7 @@ def _judge(context: Context, rows: list[list[Any]], begin: float, end: float) ->
             finished = max(finished, time)
 
 
-def _asked_to_return(context: Context) -> None:
+def _probe_early_return(context: Context) -> None:
     """An early return that is asked for in the first update must come."""
     bench, job = context.bench, context.bench.job
     with bench.instance(intermediate=True) as driver:
@@ -110,7 +110,7 @@ def clocks(context: Context) -> None:
             context.report("clock.interval-value", wrong)
     if job.interface == "ScheduledExecution":
         raise SkippedError("there is no event mode")
-    _triggered(context)
+    _probe_triggered_clocks(context)
     rows = []
     outputs = job.outputs()
     with bench.instance() as driver:
@@ -129,7 +129,7 @@ def clocks(context: Context) -> None:
         context.report_difference("clock.inactive-change", wanted, difference)
 
 
-def _triggered(context: Context) -> None:
+def _probe_triggered_clocks(context: Context) -> None:
     """Each triggered input clock can tick, and the run goes on."""
     bench, job = context.bench, context.bench.job
     for clock in (c for c in job.clocks if c.causality == "input" and c.kind == "triggered" and not c.clocks):
@@ -167,10 +167,10 @@ def structure(context: Context) -> None:
             except (StatusError, TerminatedError) as error:
                 context.report("configuration.status", str(error))
                 return
-    _reconfigured(context)
+    _probe_reconfiguration(context)
 
 
-def _reconfigured(context: Context) -> None:
+def _probe_reconfiguration(context: Context) -> None:
     """Tunable structural parameters can be set in mid-run, and the run goes on."""
     bench, job = context.bench, context.bench.job
     chosen = [v for v in job.variables if v.causality == "structuralParameter" and v.variability == "tunable"]

@@ -66,7 +66,7 @@ def _of_version_3(context: Context) -> None:
     output = next((v for v in job.variables if v.real and v.causality == "output" and not v.clocks), None)
     if output is not None:
         with bench.instance() as driver:
-            status, _ = driver.raw(f"Set{output.base}", *_one(output, 1.0))
+            status, _ = driver.raw(f"Set{output.base}", *_one_value(output, 1.0))
             if status in _NOT_REFUSED:
                 message = f"fmi3Set{output.base} must refuse to set the output `{output.name}`, but does not"
                 context.report("misuse.set-output", message)
@@ -77,6 +77,6 @@ def _of_version_3(context: Context) -> None:
                 context.report("misuse.event-mode", message)
 
 
-def _one(v: Any, value: float) -> list[tuple[Any, ...]]:
+def _one_value(v: Any, value: float) -> list[tuple[Any, ...]]:
     kind = "float" if v.base == "Float32" else "double"
     return [("in", "uint32", [v.reference]), ("size", 1), ("in", kind, [value] * v.size), ("size", v.size)]

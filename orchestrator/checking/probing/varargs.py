@@ -38,23 +38,23 @@ LOGGER = ctypes.CFUNCTYPE(
 """Type of the logger's callback: environment, instance, status, category, format's address, and the variable part."""
 
 
-def fill_in(address: int, rest: Sequence[int | float]) -> str:
+def fill_in(address: int, arguments: Sequence[int | float]) -> str:
     """Return the text of a message.
 
     Args:
         address: of the format; 0 for none.
     """
     template = _text(address)
-    words = iter([int(v) for v in rest[_PASSED_OVER : _PASSED_OVER + _MOST_CONVERSIONS]])
-    doubles = iter([float(v) for v in rest[_PASSED_OVER + _MOST_CONVERSIONS :]])
+    words = iter([int(v) for v in arguments[_PASSED_OVER : _PASSED_OVER + _MOST_CONVERSIONS]])
+    doubles = iter([float(v) for v in arguments[_PASSED_OVER + _MOST_CONVERSIONS :]])
     # The stack is shared: a double that found no register lies among the integers there.
     try:
-        return _CONVERSION.sub(lambda m: _converted(m, words, doubles), template).decode("utf-8", "replace").strip()
+        return _CONVERSION.sub(lambda m: _convert(m, words, doubles), template).decode("utf-8", "replace").strip()
     except (StopIteration, RuntimeError, ValueError, OverflowError):
         return template.decode("utf-8", "replace").strip()
 
 
-def _converted(match: re.Match[bytes], words: Iterator[int], doubles: Iterator[float]) -> bytes:
+def _convert(match: re.Match[bytes], words: Iterator[int], doubles: Iterator[float]) -> bytes:
     flags, width, precision, size, kind = match.groups()
     if kind == b"%":
         return b"%"
