@@ -90,7 +90,6 @@ class GradeSettings(Settings, frozen=True):
     likely_gain: Annotated[float, share("or of what is left without it")] = 0.2
     certain_size_t: Annotated[float, setting("sizes over their errors of a certain effect")] = 4.0
     likely_size_t: Annotated[float, setting("sizes over their errors of a likely one")] = 3.0
-    certain_gain: Annotated[float, share("of what is left without it that a certain effect takes")] = 0.2
     wave_share: Annotated[float, share("likely_share of waves, whose scanned cycles follow anything")] = 0.08
     follower_share: Annotated[
         float, share("likely_share of limits, of constants and of what is late: each follows what another law leaves")
@@ -104,7 +103,6 @@ class GradeSettings(Settings, frozen=True):
     sure_size_t: Annotated[float, setting("sizes over their errors that count as much as likely_t")] = 6.0
     most_left: Annotated[float, share("of the torque that may be left beside a certain name")] = 0.5
     timing_left: Annotated[float, share("of the torque that may be left beside the name of a delay")] = 0.2
-    limit_left: Annotated[float, share("of the misfit that a limit may leave: a loop that reacts looks like one")] = 0.2
     confirmed_share: Annotated[
         float, share("of the motion's misfit on test data that goes with a certain effect: chance takes less")
     ] = 0.1

@@ -128,11 +128,11 @@ def test_the_ablation_counts_the_names_whose_grade_would_rise_without_a_rule() -
 
     rows = [
         row("gravity_load@load", "sure size"),
-        row("gravity_load@load", "sure size", "explained"),
+        row("gravity_load@load", "sure size", "inertia seen"),
         row("backlash@shaft", "sure size"),
         row("backlash@shaft", "sure size", "size"),
         row("backlash@shaft", "same machine"),
     ]
     assert count_rule("sure size", rows) == RuleCount("sure size", records=2, wrong=1, right=1)
     assert count_rule("size", rows) == RuleCount("size", records=1, wrong=1, right=0)
-    assert count_rule("explained", rows) == RuleCount("explained", records=0, wrong=0, right=0)
+    assert count_rule("inertia seen", rows) == RuleCount("inertia seen", records=0, wrong=0, right=0)

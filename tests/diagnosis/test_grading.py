@@ -17,14 +17,13 @@ from orchestrator.shared.settings import described
 
 SETTINGS = DiagnosisSettings()
 EFFECT = EffectEvidence("friction@motor", "friction", 20.0, 0.9, 0.5, 30.0, (), False, True, 0.9)
-RECORD = RecordEvidence(0.01, 0.01, 1.0, 0.02, 0.05)
+RECORD = RecordEvidence(0.01, 1.0, 0.02, 0.05)
 
 BROKEN = {
     "surely better": ({"t": 4.0}, {}),
     "better": ({"t": 2.6, "size_t": 4.5}, {}),
     "large share": ({"share": 0.05, "gain": 0.3}, {}),
     "enough share": ({"share": 0.01, "gain": 0.05}, {}),
-    "large gain": ({"gain": 0.1}, {}),
     "sure size": ({"size_t": 3.5}, {}),
     "size": ({"size_t": 2.0}, {}),
     "explained": ({}, {"left": 0.7}),
@@ -35,7 +34,6 @@ BROKEN = {
     "confirmed": ({"motion_share": 0.02}, {}),
     "not refuted": ({"motion_share": -0.3}, {}),
     "timing follows": ({"kind": "timing"}, {"left": 0.3}),
-    "limit explains": ({"kind": "limit"}, {"left": 0.2, "left_of_base": 0.6}),
 }
 
 

@@ -35,7 +35,7 @@ def report_hidden_gap(workings: Workings, gap: HiddenGap, model: Model, settings
         )
         for name, (value, error) in gap.parameters.items()
     }  # fmt: skip
-    record = RecordEvidence(0.0, 0.0, 1.0, 0.0, np.inf)  # the model explains the record to its noise
+    record = RecordEvidence(0.0, 1.0, 0.0, np.inf)  # the model explains the record to its noise
     test = misfit_on_test_data(workings, model, settings)
     effects = (
         (_gap_effect(gap, test[0].signals[0].final, test[0].signals[0].parameters, settings),) if gap.alpha else ()

@@ -40,14 +40,12 @@ class RecordEvidence:
 
     Attributes:
         left: share of the torque that is left, of the body where it is largest.
-        left_of_base: share of the misfit of re-fitted parameters that is left at the driven body.
         inertia: that the record asks for by itself, in units of the nominal one; 1.0: the model has none.
         inertia_error: its standard error, in the same unit.
         inertia_spread: how far the model file lets it be off, as a share.
     """
 
     left: float
-    left_of_base: float
     inertia: float
     inertia_error: float
     inertia_spread: float
@@ -149,11 +147,6 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "it explains so little that it may only follow what another law leaves",
     ),
     GradeRule(
-        "large gain", Grade.LIKELY, lambda e, r, s: e.gain >= s.grades.certain_gain,
-        "share of what is left without it", "grades.certain_gain",
-        "the misfit that remains is as large as the misfit that it removes",
-    ),
-    GradeRule(
         "sure size", Grade.LIKELY, lambda e, r, s: e.size_t >= s.grades.certain_size_t, "size over its error",
         "grades.certain_size_t", "its size differs between blocks of the record",
     ),
@@ -197,12 +190,6 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "timing follows", Grade.POSSIBLE, lambda e, r, s: e.kind != "timing" or r.left < s.grades.timing_left,
         "share of the torque that is left", "grades.timing_left",
         "most of the misfit remains, and a delay then fits whatever is missing",
-    ),
-    GradeRule(
-        "limit explains", Grade.POSSIBLE,
-        lambda e, r, s: e.kind != "limit" or min(r.left_of_base, r.left / s.grades.likely_share) < s.grades.limit_left,
-        "share of the misfit that is left", "grades.limit_left",
-        "most of the misfit remains, and a control loop that reacts to a disturbance can look like a limit",
     ),
 )  # fmt: skip
 
@@ -262,11 +249,11 @@ def record_evidence(found: SearchResult) -> RecordEvidence:
         The evidence.
     """
     problem = found.problem
-    left, before = torque_shares(problem, found.final.point), torque_shares(problem, found.base.point)
+    left = torque_shares(problem, found.final.point)
     inertia, error, spread = recorded_inertia(problem, found.final)
     if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
         spread = np.inf
-    return RecordEvidence(float(left.max()), float(left[0] / max(before[0], 1e-300)), inertia, error, spread)
+    return RecordEvidence(float(left.max()), inertia, error, spread)
 
 
 def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
