@@ -16,6 +16,10 @@ from benchmarks.judging import Row
 from benchmarks.rows import read_rows
 from orchestrator.diagnosis.selection.grading import GRADE_RULES, GradeRule, highest_grade
 
+HEADING = """# Ablation of the diagnosis's rules
+
+`python -m benchmarks.ablation ROWS.jsonl ... --docs docs/ablation.md` writes this page from the rows of other benchmarks.
+The records are those of [measurements](measurements.md#diagnosis), simulated and measured."""
 LEAST = 2  # outcomes that a rule must change in RECORDS
 RECORDS = 730
 
@@ -72,7 +76,7 @@ def ablation_table(counts: Sequence[RuleCount], rules: Sequence[GradeRule], reco
     known = {rule.name: rule for rule in rules}
     lines = [
         f"Of {records} records: those in which a grade would rise without the rule, and how many wrong and right names",
-        "would rise.", "",
+        "these are. A rule lowers right names too: what a record does not settle is not certain, though it may be true.", "",
         "| rule | statistic | threshold | why | records | wrong names | right names |", 7 * "|---" + "|",
     ]  # fmt: skip
     for count in sorted(counts, key=lambda one: -one.records):
@@ -95,7 +99,7 @@ def main() -> None:
     idle = [count.name for count in counts if count.records * RECORDS < LEAST * len(rows)]
     print(f"\nfewer than {LEAST} in {RECORDS}: {', '.join(idle) or 'none'}")
     if args.docs:
-        args.docs.write_text(f"# Ablation of the diagnosis's rules\n\n{table}\n")
+        args.docs.write_text(f"{HEADING}\n\n{table}\n")
 
 
 if __name__ == "__main__":

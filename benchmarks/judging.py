@@ -98,7 +98,7 @@ def judge(outcome: Outcome, truth: Truth) -> Judgement:
         else:
             verdicts[label] = "wrong" if not truth.tested or _is_among(label, truth.tested) else "untested"
     values = tuple(
-        (name, one.value / truth.parameters[name] - 1.0, one.low <= truth.parameters[name] <= one.high)
+        (name, one.value / truth.parameters[name] - 1.0, bool(one.low <= truth.parameters[name] <= one.high))
         for name, one in outcome.parameters.items()
         if name in truth.parameters
     )
