@@ -18,8 +18,8 @@ from orchestrator.diagnosis.selection.grading import GRADE_RULES, GradeRule, hig
 
 HEADING = """# Ablation of the diagnosis's rules
 
-`python -m benchmarks.ablation ROWS.jsonl ... --docs docs/ablation.md` writes this page from the rows of other benchmarks.
-The records are those of [measurements](measurements.md#diagnosis), simulated and measured."""
+`python -m benchmarks.ablation ROWS.jsonl ... --docs docs/ablation.md` writes this page from the rows of other
+benchmarks. The records are those of [measurements](measurements.md#diagnosis), simulated and measured."""
 LEAST = 2  # outcomes that a rule must change in RECORDS
 RECORDS = 730
 
@@ -76,7 +76,8 @@ def ablation_table(counts: Sequence[RuleCount], rules: Sequence[GradeRule], reco
     known = {rule.name: rule for rule in rules}
     lines = [
         f"Of {records} records: those in which a grade would rise without the rule, and how many wrong and right names",
-        "these are. A rule lowers right names too: what a record does not settle is not certain, though it may be true.", "",
+        "these are. A rule lowers right names too: what a record does not settle is not certain, though it may be true.",
+        "",
         "| rule | statistic | threshold | why | records | wrong names | right names |", 7 * "|---" + "|",
     ]  # fmt: skip
     for count in sorted(counts, key=lambda one: -one.records):
