@@ -76,7 +76,7 @@ def ablation_table(counts: Sequence[RuleCount], rules: Sequence[GradeRule], reco
     known = {rule.name: rule for rule in rules}
     lines = [
         f"Of {records} records: those in which a grade would rise without the rule, and how many wrong and right names",
-        "these are. A rule lowers right names too: what a record does not settle is not certain, though it may be true.",
+        "these are. A rule lowers right names too: what a record leaves open is not certain, though it may be true.",
         "",
         "| rule | statistic | threshold | why | records | wrong names | right names |", 7 * "|---" + "|",
     ]  # fmt: skip

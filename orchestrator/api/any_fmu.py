@@ -195,7 +195,7 @@ def diagnose_fmu(
     """Return what records say of an FMU, and which effects are missing around it.
 
     Args:
-        fmu: any FMI 2.0 co-simulation FMU, or a scenario file of several; they run in a child process.
+        fmu: any co-simulation FMU of FMI 2.0 or 3.0, or a scenario file of several; they run in a child process.
         time_limit: seconds after which the search ends with what it has; None: the map's budget.
     """
     begun = time.monotonic()

@@ -75,7 +75,7 @@ def diagnose(
         record: a measured record, or its path; one encoder or two, at least 200 rows. Or several of one machine, which
             then share parameters and effects.
         model: what it is compared with (default: ``read_model()``), or the path of its TOML file, or the path of any
-            FMI 2.0 co-simulation FMU.
+            co-simulation FMU of FMI 2.0 or 3.0.
         map: with an FMU, the TOML file of columns, uncertain parameters and ports; it runs in a child process.
         validate: another record, or its path, on which the misfit is shown too.
         test: a record, or its path, that is test data as a whole; None: the last part of each record is.

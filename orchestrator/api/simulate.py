@@ -142,7 +142,7 @@ def simulate(
     """Run a scenario once. FMUs that are not ours run in a process of their own, behind walls.
 
     Args:
-        scenario: a TOML scenario file, an SSP file (``.ssp``) of FMI 2.0 co-simulation FMUs, or a ``Scenario``.
+        scenario: a TOML scenario file, an SSP file (``.ssp``) of co-simulation FMUs, or a ``Scenario``.
         stop: end [s] (default: the scenario's own).
         step: communication step of an SSP file [s] (default: the file's own).
         inputs: constant values of an SSP file's outer inputs, by name.

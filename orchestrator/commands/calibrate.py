@@ -12,7 +12,7 @@ from orchestrator.shared.output import stage_output
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument("record", type=Path, metavar="DATA.csv", help="measured record")
-    parser.add_argument("--fmu", type=Path, required=True, metavar="ANY.fmu", help="any FMI 2.0 co-simulation FMU")
+    parser.add_argument("--fmu", type=Path, required=True, metavar="ANY.fmu", help="any FMU for co-simulation")
     parser.add_argument("--map", type=Path, required=True, metavar="MAP.toml", help="columns and uncertain parameters")
     parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
 

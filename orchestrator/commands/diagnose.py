@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the model it is compared with")
     parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
     parser.add_argument(
-        "--fmu", type=Path, metavar="ANY.fmu", help="any FMI 2.0 co-simulation FMU instead of a model of ours"
+        "--fmu", type=Path, metavar="ANY.fmu", help="any co-simulation FMU of FMI 2.0 or 3.0 instead of a model of ours"
     )
     parser.add_argument(
         "--scenario", type=Path, metavar="LOOP.toml", help="several FMUs that a scenario connects, instead of one"

@@ -1,4 +1,4 @@
-"""``ssp export``: systems as SSP 1.0 files. ``ssp run``: any SSP of FMI 2.0 co-simulation FMUs under our master."""
+"""``ssp export``: systems as SSP 1.0 files. ``ssp run``: any SSP of co-simulation FMUs under our master."""
 
 import argparse
 from collections.abc import Mapping

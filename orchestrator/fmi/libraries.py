@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+_RELEASE: Any = getattr(_ctypes, "FreeLibrary" if sys.platform == "win32" else "dlclose")
+
 
 def load_library(path: Path, python: bool) -> Any:
     """Return a shared library.
@@ -25,11 +27,11 @@ def load_library(path: Path, python: bool) -> Any:
         return (ctypes.PyDLL if python else ctypes.CDLL)(str(path))
 
 
-def free_library(library: Any) -> None:
+def free_library(library: Any, release: Any = _RELEASE) -> None:
     """Release a library that nobody calls any more.
 
     Args:
         library: what ``load_library`` returned.
+        release: the system's function, bound early: an interpreter that ends takes modules apart.
     """
-    release = getattr(_ctypes, "FreeLibrary" if sys.platform == "win32" else "dlclose")
     release(library._handle)

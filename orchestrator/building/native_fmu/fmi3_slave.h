@@ -102,18 +102,24 @@ EXPORT Status FMI(fmi3Reset)(Component c)
 /* --- Values ------------------------------------------------------------------------------------------------------------ */
 
 #define VALUES_GIVEN ((n == 0 || r) && (total == 0 || v))
-#define COUNT(r) ((r) < VARIABLES ? counts[r] : (r) == TIME)
+
+/* Number of values at a reference, if it is of a variable of a type; else 0. */
+static inline size_t count_at(Reference r, ValueType type)
+{
+    return HAS(r, type) ? counts[r] : r == TIME && type == REAL_VALUE;
+}
 
 /* Tell whether the references are of variables of a type, and the values as many as theirs; say so if they are not. */
 static bool fit(Instance *s, const Reference r[], size_t n, size_t total, ValueType type)
 {
     size_t needed = 0;
     for (size_t k = 0; k < n; k++) {
-        if (!(HAS(r[k], type) || (r[k] == TIME && type == REAL_VALUE)) || COUNT(r[k]) == 0) {
+        const size_t count = count_at(r[k], type);
+        if (count == 0) {
             refuse_type(s, r[k]);
             return false;
         }
-        needed += COUNT(r[k]);
+        needed += count;
     }
     if (needed != total)
         say(s, ERROR, "nValues of %s must be %i, but is %i", s->function, (int64_t)needed, (int64_t)total);
@@ -130,31 +136,30 @@ static bool bring_up_to_date(Instance *s)
     return !fault.kind;
 }
 
-EXPORT Status FMI(fmi3GetFloat64)(Component c, const Reference r[], size_t n, double v[], size_t total)
+static Status get_reals(Instance *s, const Reference r[], size_t n, double v[], size_t total)
 {
     Fault fault;
-    ENTER(fmi3GetFloat64, VALUES_GIVEN)
-    if (!fit(s, r, n, total, REAL_VALUE) || !bring_up_to_date(s))
-        return s->worst;
     fault.kind = NO_FAULT;
+    if (!fit(s, r, n, total, REAL_VALUE))
+        return s->worst;
     for (size_t k = 0; k < n; k++) {
+        const size_t count = count_at(r[k], REAL_VALUE);
         if (r[k] != TIME && variables[r[k]].causality == LOCAL)
             show_states(s, &fault);
-        memcpy(v, r[k] == TIME ? &s->course.time : &s->slave.real[r[k]], COUNT(r[k]) * sizeof *v);
-        v += COUNT(r[k]);
+        memcpy(v, r[k] == TIME ? &s->course.time : &s->slave.real[r[k]], count * sizeof *v);
+        v += count;
     }
     if (fault.kind)
         say_fault(s, &fault);
     return s->worst;
 }
 
-EXPORT Status FMI(fmi3SetFloat64)(Component c, const Reference r[], size_t n, const double v[], size_t total)
+/* Set what is left from the variable at place `k` on; those before are scalars that have been set. */
+static Status set_reals(Instance *s, const Reference r[], size_t n, const double v[], size_t total, size_t k)
 {
-    ENTER(fmi3SetFloat64, VALUES_GIVEN)
     if (!fit(s, r, n, total, REAL_VALUE))
         return s->worst;
-    s->fresh = false;
-    for (size_t k = 0; k < n; k++) {
+    for (v += k; k < n; k++) {
         if (r[k] == TIME) {
             say(s, ERROR, "%s must not set the time", s->function);
             return s->worst;
@@ -165,6 +170,35 @@ EXPORT Status FMI(fmi3SetFloat64)(Component c, const Reference r[], size_t n, co
             set_real(s, r[k] + (Reference)m, *v++);
     }
     return s->worst;
+}
+
+/* Most variables are scalars: they are taken by themselves, what is left by the other half of each function. */
+#define IS_SCALAR(r) (HAS(r, REAL_VALUE) && counts[r] == 1)
+
+EXPORT Status FMI(fmi3GetFloat64)(Component c, const Reference r[], size_t n, double v[], size_t total)
+{
+    Fault fault;
+    size_t k = 0;
+    ENTER(fmi3GetFloat64, VALUES_GIVEN)
+    fault.kind = NO_FAULT;
+    recompute(s, &fault);
+    if (n == total)
+        for (; k < n && IS_SCALAR(r[k]) && variables[r[k]].causality != LOCAL; k++)
+            v[k] = s->slave.real[r[k]];
+    if (fault.kind)
+        say_fault(s, &fault);
+    return k == total || fault.kind ? s->worst : get_reals(s, r, n, v, total);
+}
+
+EXPORT Status FMI(fmi3SetFloat64)(Component c, const Reference r[], size_t n, const double v[], size_t total)
+{
+    size_t k = 0;
+    ENTER(fmi3SetFloat64, VALUES_GIVEN)
+    s->fresh = false;
+    if (n == total)
+        for (; k < n && IS_SCALAR(r[k]) && settable(s, r[k]); k++)
+            set_real(s, r[k], v[k]);
+    return k == total ? s->worst : set_reals(s, r, n, v, total, k);
 }
 
 /* Whole numbers: Int32 for those that count, Int64 for the items of an enumeration. */

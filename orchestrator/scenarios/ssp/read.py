@@ -1,4 +1,4 @@
-"""Scenarios from SSP files: any SSP 1.0 of FMI 2.0 co-simulation FMUs, with nested systems and parameter bindings."""
+"""Scenarios from SSP files: any SSP 1.0 of co-simulation FMUs, with nested systems and parameter bindings."""
 
 import os
 from collections.abc import Iterator, Mapping
