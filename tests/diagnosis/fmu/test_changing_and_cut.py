@@ -51,7 +51,7 @@ def test_a_parameter_that_is_read_once_is_not_looked_at_for_drift(tmp_path):
     found = oc.diagnose(*changing(tmp_path, fault="read_once", rate=0.5))
     found.close()
     assert not any(f.name == "parameter_drift" for f in found.effects)
-    assert any("does not change within a run" in note for note in found.notes)
+    assert any("does not act within a run" in note for note in found.notes)
 
 
 def test_what_made_up_for_coarse_steps_is_not_named_beside_a_gap(tmp_path):
