@@ -60,7 +60,8 @@ def test_a_full_disk_elsewhere_is_not_blamed_on_the_results(tmp_path):
 def test_what_a_killed_process_left_is_cleared_away(tmp_path):
     code = (
         "import os, signal, sys; from pathlib import Path; from orchestrator.shared.output import stage_output\n"
-        f"with stage_output(Path({str(tmp_path)!r})) as d: (d / 'a').write_text('a'); os.kill(os.getpid(), signal.SIGKILL)"
+        f"with stage_output(Path({str(tmp_path)!r})) as d:\n    (d / 'a').write_text('a')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False)
     assert len(list(tmp_path.iterdir())) == 1
