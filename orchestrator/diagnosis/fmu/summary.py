@@ -10,7 +10,7 @@ from orchestrator.diagnosis.report.summary import (
     percent,
     sizes_line,
     sureness,
-    tested,
+    test_words,
 )
 
 
@@ -27,7 +27,7 @@ def summarise_fmu(found: FmuDiagnosis) -> Iterator[str]:
     for effect in found.effects:
         yield sizes_line(effect)
         yield f"    {sureness(effect)}"
-        yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{tested(effect)}."
+        yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{test_words(effect)}."
     left = " and ".join(f"{left_percent(share)} of {name}" for name, share in found.left.items())
     strongest = [f"at {one.site} {one.words}" for one in found.remaining[:2]]
     follows = "; ".join(strongest) if strongest else "it follows no signal"

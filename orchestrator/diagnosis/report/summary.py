@@ -160,7 +160,7 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
         yield f"    {play}"
     yield f"    {sureness(effect)}"
     if math.isfinite(effect.evidence.share):
-        yield f"    It explains {percent(effect.evidence.share)} of the missing torque{tested(effect)}."
+        yield f"    It explains {percent(effect.evidence.share)} of the missing torque{test_words(effect)}."
     if effect.name in MOTION:
         yield f"    In the motion: {MOTION[effect.name]}"
 
@@ -193,7 +193,7 @@ def value_words(estimate: ValueEstimate) -> str:
     return f"{estimate.value:.5g}{unit} (95 %: {low:.5g} to {high:.5g})"
 
 
-def tested(effect: GradedEffect) -> str:
+def test_words(effect: GradedEffect) -> str:
     """Return what test data say of an effect, as the end of a sentence; nothing where it was not tested.
 
     Args:
