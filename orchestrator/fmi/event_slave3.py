@@ -13,7 +13,7 @@ from orchestrator.fmi.intermediate import IntermediateUpdates
 from orchestrator.fmi.messages import ERROR
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.shorter_steps import SMALLEST
-from orchestrator.fmi.slave3 import Fmu3Slave
+from orchestrator.fmi.slave3 import NEAR, TERMINATES, Fmu3Slave
 from orchestrator.fmi.timed_clocks import TimedClocks
 from orchestrator.master.protocol import (
     EventSlave,
@@ -99,8 +99,6 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
         while True:
             try:
                 return self._stepped(time, length)
-            except RunEndedError:
-                raise
             except StepDiscardedError:
                 if not self._halves or length < SMALLEST * step:
                     raise
@@ -109,6 +107,7 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
                 self._halved = (time if not count else first, count + 1)
 
     def _stepped(self, time: float, step: float) -> StepOutcome:
+        end = self._last.value = time + step
         status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
         self._reached = time
         failure = self._updates.take_failure()
@@ -118,17 +117,16 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
         if status:
             self._check(status, "fmi3DoStep")
         event, ends, early = self._flags
-        if ends:
-            self._refuse_end(True, time)
-        end = time + step
-        reached = self._last.value if early else end
-        near = 1e-9 * step
-        if not time - near <= reached <= end + near:
+        reached, near = self._last.value, 1e-9 * step
+        stops = early or ends
+        if not (time - near <= reached <= end + near if stops else math.isfinite(reached)):
             self._worst = ERROR
             text = f"must return within the step from {time:g} s to {end:g} s, but says {reached:g} s"
             raise SlaveError(f"{self.name}: fmi3DoStep {text}")
-        self._reached = min(max(reached, time), end)
-        return StepOutcome(self._reached, event)
+        if not stops and abs(reached - end) > NEAR * step:
+            self.came_elsewhere(1, time, reached - end)
+        self._reached = min(max(reached, time), end) if stops else end
+        return StepOutcome(self._reached, event, TERMINATES if ends else "")
 
     def shorten_steps(self) -> bool:
         """Do steps that the FMU discards in shorter ones, from the next run on."""
@@ -155,6 +153,9 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
             if not event and end - now > near:
                 before = now
                 now, event = (outcome := self.step(now, min(due, end) - now)).reached, outcome.event
+                if outcome.ends_run:
+                    text = f"{self.name}: fmi3DoStep from t = {before:g} s"
+                    raise RunEndedError(text, self.name, now, outcome.ends_run)
                 event = event or due <= now + near
                 standing = 0 if now - before > near else standing
             if event:
@@ -170,7 +171,7 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
         for _ in range(MOST_EVENTS):
             update = self.update_discrete_states()
             if update.ends_run:
-                raise RunEndedError(f"{self.name}: an event at t = {time:g} s", self.name, time, at_event=True)
+                raise RunEndedError(f"{self.name}: an event at t = {time:g} s", self.name, time)
             if not update.again:
                 self.leave_event_mode()
                 return

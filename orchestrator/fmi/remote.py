@@ -73,20 +73,20 @@ class _Host:
 
     def step(self, time: float, step: float) -> list[Any]:
         assert isinstance(self._slave, EventFmuSlave)
-        slave, found = self._slave, []
+        slave, found = self._slave, [StepOutcome(time, False)]
         said = self._judged(lambda: found.append(slave.step(time, step)))
-        return [said, found[0].reached if found else time, bool(found) and found[0].event]
+        return [said, found[-1].reached, found[-1].event, found[-1].ends_run]
 
     @staticmethod
     def _judged(advance: Callable[[], None]) -> list[Any]:
-        """Do a step; return how it went: a code, what was said, when, and whether it was at an event."""
+        """Do a step; return how it went: a code, what was said, when, and how the run is to end."""
         try:
             advance()
         except RunEndedError as error:
-            return [ENDED, str(error), error.time, error.at_event]
+            return [ENDED, str(error), error.time, error.how]
         except StepDiscardedError as error:
-            return [DISCARDED, str(error), error.time, False]
-        return [DONE, "", 0.0, False]
+            return [DISCARDED, str(error), error.time, ""]
+        return [DONE, "", 0.0, ""]
 
     def update_discrete_states(self) -> list[Any]:
         assert isinstance(self._slave, EventFmuSlave)
@@ -165,9 +165,9 @@ class RemoteSlave(Slave):
     def _judge(self, said: Any) -> None:
         """Raise for a step that was not done, by what the child says of it."""
         match said:
-            case [int() as status, str() as text, float() as reached, bool() as at_event]:
+            case [int() as status, str() as text, float() as reached, str() as how]:
                 if status == ENDED:
-                    raise RunEndedError(text, self.name, reached, at_event)
+                    raise RunEndedError(text, self.name, reached, how)
                 if status != DONE:
                     raise StepDiscardedError(text, self.name, reached)
             case _:
@@ -209,9 +209,9 @@ class EventRemoteSlave(RemoteSlave, EventSlave):
 
     def step(self, time: float, step: float) -> StepOutcome:
         match self._ask("step", time, step):
-            case [list() as said, float() as reached, bool() as event]:
+            case [list() as said, float() as reached, bool() as event, str() as ends_run]:
                 self._judge(said)
-                return StepOutcome(reached, event)
+                return StepOutcome(reached, event, ends_run)
         raise SlaveError(f"{self.name}: its process must say how a step went, but does not")
 
     def enter_event_mode(self) -> None:

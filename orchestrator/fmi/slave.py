@@ -6,6 +6,7 @@ once.
 """
 
 import ctypes
+import math
 import operator
 from abc import abstractmethod
 from collections import deque
@@ -126,13 +127,15 @@ class FmuSlave(Slave):
         if status == PENDING:
             raise SlaveError(f"{text}: it must do its steps while it is called, but goes on by itself")
         if status == DISCARD:
-            ends = what.endswith("DoStep") and self._ends_run()
-            raise (RunEndedError if ends else StepDiscardedError)(text, self.name, self._reached or 0.0)
+            how = self._ends_run() if what.endswith("DoStep") else ""
+            if how:
+                raise RunEndedError(text, self.name, self._reached or 0.0, how)
+            raise StepDiscardedError(text, self.name, self._reached or 0.0)
         raise SlaveError(text)
 
-    def _ends_run(self) -> bool:
-        """Whether the FMU wants the run to end, after a step that it discarded."""
-        return False
+    def _ends_run(self) -> str:
+        """Return how the FMU wants the run to end, after a step that it discarded; empty where it does not."""
+        return ""
 
     @abstractmethod
     def last_successful_time(self) -> float | None:
@@ -342,11 +345,12 @@ class FmuSlave(Slave):
         """
         self._inbox.warn(f"{function} at t = {time:g} s", count)
 
-    def failed(self, status: int, function: str, time: float) -> None:
+    def failed(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
         """Raise for a status that the compiled loop met.
 
         Args:
             time: when [s].
+            reached: where the FMU says that it came to in a step [s].
         """
         self._reached = time
         self._check(status, function)

@@ -60,10 +60,10 @@ class Fmu2Slave(FmuSlave):
         if not self._description.python:
             self._fmu.freeLibrary()
 
-    def _ends_run(self) -> bool:
+    def _ends_run(self) -> str:
         ends = ctypes.c_int(0)
         answered = self._library.fmi2GetBooleanStatus(self._component, _TERMINATED, ctypes.byref(ends)) == OK
-        return answered and bool(ends.value)
+        return "fmi2Discard, terminated" if answered and ends.value else ""
 
     def last_successful_time(self) -> float | None:
         time = ctypes.c_double(math.nan)

@@ -10,10 +10,16 @@ from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.extraction import extracted, library_of
 from orchestrator.fmi.farewell import ends_cleanly
 from orchestrator.fmi.libraries import free_library, load_library
-from orchestrator.fmi.messages import log_message_callback
+from orchestrator.fmi.messages import ERROR, log_message_callback
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.protocol import ENDED, RunEndedError
+from orchestrator.master.result import RunRemark
+
+TERMINATES = "fmi3DoStep, terminateSimulation"
+"""How a run is to end that a step ends, see ``RunEndedError``."""
+NEAR = 1e-6
+"""Share of a step within which the end of the step and the time that the FMU came to are one."""
 
 _ALWAYS = [
     "InstantiateCoSimulation",
@@ -35,6 +41,7 @@ class Fmu3Slave(FmuSlave):
     def __init__(self, name: str, path: Path, description: FmuDescription | None = None) -> None:
         super().__init__(name, path, description)
         self._rolls_back = False
+        self._astray = (math.nan, 0, 0.0)  # first [s], count, farthest [s]
         self._flags = (c_bool * 3)()  # event, end of the run, early return
         self._last = c_double()
         addresses = [ctypes.addressof(self._flags) + k for k in range(3)]
@@ -113,23 +120,43 @@ class Fmu3Slave(FmuSlave):
         self._reached = start
 
     def try_step(self, time: float, step: float) -> None:
+        end = self._last.value = time + step
         status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
         self._reached = time
         if status:
             self._check(status, "fmi3DoStep")
-        if any(self._flags):
-            self._refuse_end(self._flags[1], time)
-        self._reached = time + step
+        reached = self._last.value
+        if any(self._flags) or not math.isfinite(reached):
+            self._refuse_end(self._flags[1], time, reached)
+        if abs(reached - end) > NEAR * step:
+            self.came_elsewhere(1, time, reached - end)
+        self._reached = end
 
-    def _refuse_end(self, ends: bool, time: float) -> None:
-        """Raise for a step that did not end as asked, though all was well."""
-        if ends:
+    def _refuse_end(self, ends: bool, time: float, reached: float) -> None:
+        """Raise for a step from ``time`` to ``reached`` [s] that did not end as asked, though all was well."""
+        if ends and math.isfinite(reached):
             text = f"{self.name}: fmi3DoStep at t = {time:g} s asked for the end of the run{self._said()}"
-            raise RunEndedError(text, self.name, time)
-        text = "must do whole steps where no events are taken, but returned early or with an event"
-        reached = f" at {self._last.value:g} s" if math.isfinite(self._last.value) else ""
-        self._worst = max(self._worst, 3)
-        raise SlaveError(f"{self.name}: fmi3DoStep at t = {time:g} s {text}{reached}")
+            raise RunEndedError(text, self.name, reached, TERMINATES)
+        text = "must do a whole step, for no events are taken, but returned early, with an event or at no time"
+        self._worst = max(self._worst, ERROR)
+        raise SlaveError(f"{self.name}: fmi3DoStep at t = {time:g} s {text}: its lastSuccessfulTime is {reached:g} s")
+
+    def came_elsewhere(self, count: int, time: float, off: float) -> None:
+        """Note steps at whose end the FMU says to be at another time than asked, which is allowed.
+
+        Args:
+            count: number of such steps.
+            time: begin of the first of them [s].
+            off: difference of both times where it is largest [s].
+        """
+        first, before, farthest = self._astray
+        self._astray = (first if before else time, before + count, max(farthest, abs(off)))
+
+    def take_remarks(self) -> list[RunRemark]:
+        (first, count, farthest), self._astray = self._astray, (math.nan, 0, 0.0)
+        text = f"fmi3DoStep from t = {first:g} s came to another time than asked, such steps by up to {farthest:g} s"
+        strayed = [RunRemark(self.name, f"{text}: its outputs are those of its own time", count)] if count else []
+        return [*super().take_remarks(), *strayed]
 
     def get_state(self) -> Any:
         self._rolls_back = True
@@ -139,8 +166,8 @@ class Fmu3Slave(FmuSlave):
         super().reset()
         self._rolls_back = False
 
-    def failed(self, status: int, function: str, time: float) -> None:
+    def failed(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
         if status >= ENDED:
             self._reached = time
-            self._refuse_end(status == ENDED, time)
-        super().failed(status, function, time)
+            self._refuse_end(status == ENDED, time, reached)
+        super().failed(status, function, time, reached)

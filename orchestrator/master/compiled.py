@@ -60,6 +60,10 @@ class _Slave(ctypes.Structure):
         ("warnings", _Whole),
         ("first_call", _Whole),
         ("first_step", _Whole),
+        ("astray", _Whole),
+        ("first_astray", _Whole),
+        ("farthest", _Real),
+        ("reached", _Real),
     )
 
 
@@ -177,15 +181,18 @@ class CompiledWiring:
             start, step, simultaneous,
         )  # fmt: skip
         for slave in self._slaves:
-            slave.warnings = 0
+            slave.warnings = slave.astray = 0
+            slave.farthest = 0.0
         try:
             self._run(job, out, start, step)
         finally:
             for slave, native, stage in zip(self._slaves, self._natives, self._wiring.stages, strict=True):
+                called: Any = stage.slave
                 if slave.warnings:
-                    warned: Any = stage.slave
                     name = _called(native, slave.first_call)
-                    warned.warned(slave.warnings, name, start + slave.first_step * step)
+                    called.warned(slave.warnings, name, start + slave.first_step * step)
+                if slave.astray:
+                    called.came_elsewhere(slave.astray, start + slave.first_astray * step, slave.farthest)
 
     def _run(self, job: _Run, out: Array, start: float, step: float) -> None:
         failure = _Failure()
@@ -196,7 +203,8 @@ class CompiledWiring:
             if status:
                 failed: Any = self._wiring.stages[failure.slave].slave
                 name = _called(self._natives[failure.slave], failure.call)
-                failed.failed(status, name, start + failure.step * step)
+                reached = self._slaves[failure.slave].reached
+                failed.failed(status, name, start + failure.step * step, reached)
             taken = time.perf_counter() - clock
             chunk = (
                 min(2 * chunk, MOST_STEPS) if taken < 0.5 * CHUNK_TIME else max(1, round(chunk * CHUNK_TIME / taken))

@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 
 from orchestrator.errors import SlaveError
-from orchestrator.master.protocol import EventSlave, RunEndedError, Signals, StepOutcome, Variable
+from orchestrator.master.protocol import AT_EVENT, EventSlave, RunEndedError, Signals, StepOutcome, Variable
 from orchestrator.master.wiring import Stage, bind_receive, bind_send
 
 Gather = Callable[[Stage], None]
@@ -44,6 +44,7 @@ class EventStage:
         rated: outputs whose derivatives it knows.
         follows: outputs that depend on an input of ``names`` at once.
         next_event: [s], as the slave said last; infinity where it knows of none.
+        ends_run: what asks for the end of the run where the slave is; empty: nothing does.
     """
 
     def __init__(self, stage: Stage, values: Signals) -> None:
@@ -52,7 +53,7 @@ class EventStage:
         self.name, self.has_events = block.name, model.has_events
         self.can_go_back = model.can_save_state and model.can_vary_step
         self.outputs = slice(block.first_output, block.first_output + len(block.outputs))
-        self.next_event, self.steps = math.inf, 0
+        self.next_event, self.steps, self.ends_run = math.inf, 0, ""
         self.send, self.receive = stage.send, stage.receive
         self._take_inputs(block.inputs)
         self.rated: list[str] = []
@@ -107,10 +108,17 @@ class EventStage:
             end: [s].
         """
         self.steps += 1
+        self.ends_run = ""
         if not self.has_events:
-            self.stage.do_step(begin, end - begin)
+            try:
+                self.stage.do_step(begin, end - begin)
+            except RunEndedError as error:
+                if not error.is_at(end):
+                    raise
+                self.ends_run = error.how
             return StepOutcome(end, False)
         found = self.events.step(begin, end - begin)
+        self.ends_run = found.ends_run
         if not found.reached >= begin - slack(begin):
             raise SlaveError(f"{self.name}: a step from t = {begin:g} s must go on, but ended at {found.reached:g} s")
         return StepOutcome(end, found.event) if found.reached >= end - slack(end) else found
@@ -134,14 +142,21 @@ class EventStage:
         gather(self.stage)
         return not np.array_equal(self._values[self._discrete], self._sent, equal_nan=True)
 
-    def update(self, time: float) -> bool:
-        """End an instant. Return whether the slave needs another.
+    def update(self) -> bool:
+        """End an instant. Return whether the slave needs another."""
+        found = self.events.update_discrete_states()
+        self.next_event = math.inf if found.next_event is None else found.next_event
+        self.ends_run = AT_EVENT if found.ends_run else ""
+        return found.again
+
+    def raise_end(self, time: float) -> None:
+        """Raise where the slave wants the run to end.
 
         Args:
             time: [s].
+
+        Raises:
+            RunEndedError: it wants the run to end.
         """
-        found = self.events.update_discrete_states()
-        self.next_event = math.inf if found.next_event is None else found.next_event
-        if found.ends_run:
-            raise RunEndedError(f"{self.name}: an event at t = {time:g} s", self.name, time, at_event=True)
-        return found.again
+        if self.ends_run:
+            raise RunEndedError(f"{self.name}: t = {time:g} s, {self.ends_run}", self.name, time, self.ends_run)

@@ -145,12 +145,13 @@ class FixedSteps:
                 while end - time > slack(end):
                     due = self.events.next_time()
                     time, event = self._cross(time, due if due < end - slack(end) else end)
+                    self.events.raise_end(time)
                     if self._late and not event:
                         self.events.jump(time, self.gather)
                     self._late = False
                     self.events.catch_up(time, self.gather, event)
             except RunEndedError as error:
-                if error.at_event and end - error.time <= slack(end):
+                if error.is_at(end):
                     np.take(self.values, record, out=rows[n + 1], mode="clip")
                 raise
             time = end

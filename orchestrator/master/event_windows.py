@@ -102,6 +102,7 @@ class EventWindows:
                 assert window.rates is not None
                 self.accepted += 1
                 time, rates = window.end, window.rates
+                self.events.raise_end(time)
                 guess = window.parts[-1] if window.parts else guess
                 row = self._write(window.parts, rows, record, row)
             else:

@@ -88,7 +88,7 @@ class EventIteration:
         self._instants = self._ticks = self._standing = 0
         self._last = -math.inf
         for stage in self.stages:
-            stage.next_event, stage.steps = math.inf, 0
+            stage.next_event, stage.steps, stage.ends_run = math.inf, 0, ""
 
     def statistics(self) -> EventStatistics:
         """Return what happened."""
@@ -145,7 +145,9 @@ class EventIteration:
         stage.events.enter_event_mode()
         for _ in range(MOST_INSTANTS):
             self._instants += 1
-            if not stage.update(time):
+            again = stage.update()
+            stage.raise_end(time)
+            if not again:
                 stage.events.leave_event_mode()
                 return
         raise _chattering(time, [stage.name])
@@ -155,6 +157,18 @@ class EventIteration:
         self.enter()
         self._settle(time, gather)
         self.catch_up(time, gather)
+
+    def raise_end(self, time: float) -> None:
+        """Raise where a slave wants the run to end, after a step or an instant.
+
+        Args:
+            time: where the slaves are [s].
+
+        Raises:
+            RunEndedError: one wants the run to end.
+        """
+        for stage in self.stages:
+            stage.raise_end(time)
 
     def _is_due(self, time: float) -> bool:
         return self.next_time() <= time + slack(time)
@@ -183,10 +197,11 @@ class EventIteration:
         for _ in range(MOST_INSTANTS):
             self._exchange(time, gather, ticks)
             shown, ticks = values[self._sources], {}
-            asking = [stage.name for stage in self._taking if stage.update(time)]
+            asking = [stage.name for stage in self._taking if stage.update()]
             self._instants += 1
             for stage in self._taking:
                 stage.receive()
+            self.raise_end(time)
             if not asking and np.array_equal(values[self._sources], shown, equal_nan=True):
                 break
         else:

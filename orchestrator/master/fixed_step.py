@@ -3,10 +3,22 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.master.wiring import Wiring, gather
+from orchestrator.master.protocol import RunEndedError
+from orchestrator.master.wiring import Stage, Wiring, gather
 
 Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
+
+
+def do_step(stage: Stage, time: float, step: float) -> RunEndedError | None:
+    """Step an instance; return how it ended the run, where it did so at the end of the step."""
+    try:
+        stage.do_step(time, step)
+    except RunEndedError as error:
+        if error.is_at(time + step):
+            return error
+        raise
+    return None
 
 
 def run_sequential(
@@ -20,19 +32,24 @@ def run_sequential(
         step: communication step [s].
         rows: results, shape (steps + 1, recorded); row 0 is already there.
         record: recorded slots, shape (recorded,).
+
+    Raises:
+        RunEndedError: a slave wants the run to end; the row of its time is there.
     """
     values, view, stages = wiring.values, wiring.view, wiring.stages
     for n in range(steps):
-        time = start + n * step
+        time, ended = start + n * step, None
         for stage in stages:
             for target, source in stage.copies:
                 target[:] = source
             if stage.mixed:
                 gather(stage, view, table, n + 1)
             stage.send()
-            stage.do_step(time, step)
+            ended = do_step(stage, time, step) or ended
             stage.receive()
         np.take(values, record, out=rows[n + 1], mode="clip")
+        if ended is not None:
+            raise ended
 
 
 def run_simultaneous(
@@ -48,12 +65,14 @@ def run_simultaneous(
     """
     values, view, stages = wiring.values, wiring.view, wiring.stages
     for n in range(steps):
-        time = start + n * step
+        time, ended = start + n * step, None
         for stage in stages:
             gather(stage, view, table, n + 1)
         for stage in stages:
             stage.send()
-            stage.do_step(time, step)
+            ended = do_step(stage, time, step) or ended
         for stage in stages:
             stage.receive()
         np.take(values, record, out=rows[n + 1], mode="clip")
+        if ended is not None:
+            raise ended

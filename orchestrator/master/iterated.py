@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from orchestrator.errors import ScenarioError
 from orchestrator.master.algorithms import Iterated
 from orchestrator.master.fixed_point import fixed_point
+from orchestrator.master.fixed_step import do_step
 from orchestrator.master.layout import Layout
+from orchestrator.master.protocol import RunEndedError
 from orchestrator.master.wiring import Stage, View, Wiring, gather
 
 Array = NDArray[np.float64]
@@ -66,14 +68,19 @@ def run_iterated(
     groups = loop_groups(wiring)
     passes = 0
     for n in range(steps):
-        time = start + n * settings.step
+        time, ended = start + n * settings.step, None
         for stages, cut in groups:
+            found: RunEndedError | None
             if len(cut) == 0:
-                _pass(stages, wiring.view, table, n + 1, time, settings.step)
+                found = _pass(stages, wiring.view, table, n + 1, time, settings.step)
                 passes += 1
             else:
-                passes += _solve(stages, cut, wiring, table, n + 1, time, settings)
+                count, found = _solve(stages, cut, wiring, table, n + 1, time, settings)
+                passes += count
+            ended = found or ended
         np.take(wiring.values, record, out=rows[n + 1], mode="clip")
+        if ended is not None:
+            raise ended
     return passes
 
 
@@ -100,12 +107,17 @@ def loop_groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], Slots]]:
     return groups
 
 
-def _pass(stages: tuple[Stage, ...], view: View, table: Array, column: int, time: float, step: float) -> None:
+def _pass(
+    stages: tuple[Stage, ...], view: View, table: Array, column: int, time: float, step: float
+) -> RunEndedError | None:
+    """Step instances once; return how one ended the run at the end of the step."""
+    ended = None
     for stage in stages:
         gather(stage, view, table, column)
         stage.send()
-        stage.do_step(time, step)
+        ended = do_step(stage, time, step) or ended
         stage.receive()
+    return ended
 
 
 def _solve(
@@ -116,24 +128,26 @@ def _solve(
     column: int,
     time: float,
     settings: Iterated,
-) -> int:
+) -> tuple[int, RunEndedError | None]:
+    """Step a loop until it settles; return the number of passes, and how one ended the run in the last of them."""
     values = wiring.values
     saved: list[tuple[Stage, Any]] = [(stage, stage.slave.get_state()) for stage in stages]
-    first = True
+    first, ended = True, None
 
     def sweep(point: Array) -> Array:
-        nonlocal first
+        nonlocal first, ended
         if not first:
             for stage, state in saved:
                 stage.slave.set_state(state)
         first = False
         values[cut] = point
-        _pass(stages, wiring.view, table, column, time, settings.step)
+        ended = _pass(stages, wiring.view, table, column, time, settings.step)
         return values[cut]
 
     try:
         what = f"{', '.join(s.block.name for s in stages)} at t = {time:g} s"
-        return fixed_point(sweep, values[cut], settings.tolerance, settings.iterations, what)
+        count = fixed_point(sweep, values[cut], settings.tolerance, settings.iterations, what)
+        return count, ended
     finally:
         for stage, state in saved:
             stage.slave.free_state(state)

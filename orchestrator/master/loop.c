@@ -18,6 +18,9 @@ typedef int (*ReportingStep)(void *component, double time, double length, bool n
                              bool *early, double *reached);
 typedef void (*Function)(void);
 
+/* Share of a step within which its end and the time that a slave came to are one. */
+#define NEAR 1e-6
+
 enum { WARNING = 1, ENDED = 16, LEFT_EARLY = 17 };
 typedef enum { F8, F4, I1, U1, I2, U2, I4, U4, I8, U8, B1 } Number;
 
@@ -46,6 +49,10 @@ typedef struct {
     int64_t warnings; /* calls that returned a warning, and which was the first: call and step as in Failure */
     int64_t first_call;
     int64_t first_step;
+    int64_t astray; /* steps after which it says to be at another time than asked; the first; the largest difference [s] */
+    int64_t first_astray;
+    double farthest;
+    double reached; /* where it says to be [s] */
 } Slave;
 
 /* values[slot] = round_to(quantum, factor * values[source] + offset + table[row]); a source or row below 0 is none. */
@@ -183,15 +190,25 @@ static int get(const Slave *slave, const Transfer *t, double *values)
     return status;
 }
 
-static int step(const Slave *slave, double time, double length)
+static int step(Slave *slave, double time, double length, int64_t n)
 {
     bool event = false, end = false, early = false;
-    double reached = time;
     if (!slave->reports)
         return ((Step)slave->step)(slave->component, time, length, 1);
+    slave->reached = time + length;
     const int status =
-        ((ReportingStep)slave->step)(slave->component, time, length, true, &event, &end, &early, &reached);
-    return status > WARNING ? status : end ? ENDED : event || early ? LEFT_EARLY : status;
+        ((ReportingStep)slave->step)(slave->component, time, length, true, &event, &end, &early, &slave->reached);
+    const double off = fabs(slave->reached - (time + length));
+    if (status > WARNING)
+        return status;
+    if (end || event || early || !isfinite(off))
+        return end ? ENDED : LEFT_EARLY;
+    if (off > NEAR * length) {
+        if (!slave->astray++)
+            slave->first_astray = n;
+        slave->farthest = fmax(slave->farthest, off);
+    }
+    return status;
 }
 
 /* Send the inputs and step; `call` is what was called last. */
@@ -205,7 +222,13 @@ static int advance(Slave *slave, double *values, double time, double length, int
             return status;
         inputs += transfer->count;
     }
-    return noted(slave, step(slave, time, length), *call, n);
+    return noted(slave, step(slave, time, length, n), *call, n);
+}
+
+/* Tell whether a slave ended the run at the end of its step, which the others then do too. */
+static bool ends_there(const Slave *slave, int status, double end)
+{
+    return status == ENDED && slave->reached >= end - 1e-9 * fmax(1.0, fabs(end));
 }
 
 static int receive(Slave *slave, double *values, int64_t n, int64_t *call)
@@ -226,6 +249,7 @@ static int one_step(const Run *run, int64_t n, Failure *failure)
 {
     const double time = run->start + (double)n * run->length;
     int status = 0;
+    Failure ended = {.step = -1};
     if (run->simultaneous)
         for (int64_t k = 0; k < run->slave_count; k++)
             gather(run, run->slaves + k, n + 1);
@@ -235,6 +259,10 @@ static int one_step(const Run *run, int64_t n, Failure *failure)
         if (!run->simultaneous)
             gather(run, slave, n + 1);
         status = advance(slave, run->values, time, run->length, n, &failure->call);
+        if (ends_there(slave, status, time + run->length)) {
+            ended = *failure;
+            status = 0;
+        }
         if (status <= WARNING && !run->simultaneous)
             status = receive(slave, run->values, n, &failure->call);
         if (status > WARNING)
@@ -246,7 +274,10 @@ static int one_step(const Run *run, int64_t n, Failure *failure)
         if (status > WARNING)
             return status;
     }
-    return 0;
+    if (ended.step < 0)
+        return 0;
+    *failure = ended;
+    return ENDED;
 }
 
 /* Take steps `begin` to `end - 1`; return 0, or the status that was worse than a warning. */
@@ -257,10 +288,12 @@ int run_steps(const Run *run, int64_t begin, int64_t end, Failure *failure)
         int status;
         failure->step = n;
         status = one_step(run, n, failure);
-        if (status > WARNING)
+        if (status > WARNING && status != ENDED)
             return status;
         for (int64_t j = 0; j < run->records; j++)
             row[j] = run->values[run->recorded[j]];
+        if (status == ENDED)
+            return status;
     }
     return 0;
 }

@@ -17,6 +17,8 @@ Signals = NDArray[np.float64]
 
 READABLE = frozenset({"output", "local", "input", "parameter", "calculatedParameter", "independent"})
 NUMERIC = frozenset({"Real", "Integer", "Boolean", "Enumeration"})
+AT_EVENT = "at an event"
+"""How a run ended, see ``RunEndedError``."""
 
 
 class StepDiscardedError(SlaveError):
@@ -33,15 +35,27 @@ class StepDiscardedError(SlaveError):
 
 
 class RunEndedError(StepDiscardedError):
-    """A slave asked for the end of the run instead of a step, or at an event.
+    """A slave asked for the end of the run.
 
     Attributes:
-        at_event: it did so at an event, to which the run has come; else at a step that it has not done.
+        time: to which it has come [s], its values included: the begin of a step that it has not done.
+        how: what asked for the end, such as "at an event".
     """
 
-    def __init__(self, text: str, instance: str = "", time: float = math.nan, at_event: bool = False) -> None:
+    def __init__(self, text: str, instance: str = "", time: float = math.nan, how: str = AT_EVENT) -> None:
         super().__init__(text, instance, time)
-        self.at_event = at_event
+        self.how = how
+
+    def is_at(self, end: float) -> bool:
+        """Tell whether the run has come to the end of a step.
+
+        Args:
+            end: [s].
+
+        Returns:
+            False where it has ended before.
+        """
+        return self.time >= end - 1e-9 * max(1.0, abs(end))
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,10 +350,12 @@ class StepOutcome:
     Attributes:
         reached: [s]; before the end of the step where an event came first.
         event: an event is due at ``reached``: the slave must enter event mode.
+        ends_run: what asks for the end of the run at ``reached``; empty: nothing does.
     """
 
     reached: float
     event: bool
+    ends_run: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -383,7 +399,6 @@ class EventSlave(Slave, Protocol):
 
         Raises:
             StepDiscardedError: the step was not done; the slave is well.
-            RunEndedError: the slave wants the run to end.
         """
 
     def enter_event_mode(self) -> None:

@@ -145,8 +145,7 @@ class Session:
                 if not allow_early_end:
                     raise SlaveError(f"{error}: it wants the run to end, but the whole run is needed") from None
                 steps = math.floor((error.time - self.start) / self.algorithm.step + 1e-6)
-                how = "at an event" if error.at_event else "fmi2Discard, terminated"
-                text = f"ended the run at t = {self._times[steps]:g} s of {self.stop:g} s ({how})"
+                text = f"ended the run at t = {error.time:g} s of {self.stop:g} s ({error.how})"
                 calls = dict.fromkeys((block.name for block in self.layout.blocks), steps)
                 events = EventStatistics() if self._events is None else self._events.statistics()
                 return Statistics(steps, 0, calls, steps, events=events), [RunRemark(error.instance, text)]

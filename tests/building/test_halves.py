@@ -30,7 +30,7 @@ def halves(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @needs_compiler
 def test_contacts_between_both_halves(halves: dict[str, Path]) -> None:
-    """To a nanosecond, in half the calls that error control took per contact change alone without events."""
+    """To a nanosecond; without events, error control takes three times the calls and errs more (docs/master.md)."""
     run, error, late, contacts = compare(halves, 0.01, Adaptive(1e-3, 3e-8))
     assert contacts == len(run.statistics.events.times) == 22
     assert error < 1e-7

@@ -103,6 +103,31 @@ def test_a_time_outside_the_step_is_refused_and_the_instance_dead(tmp_path: Path
     slave.close()
 
 
+def test_a_time_other_than_asked_is_noted_where_the_step_does_not_return_early(tmp_path: Path) -> None:
+    slave = started(build_event3_fmu(tmp_path, "STRAYS_BY=-0.25"))
+    assert slave.step(0.0, 0.1) == StepOutcome(0.1, False)
+    assert slave.step(0.1, 0.1) == StepOutcome(0.2, False)
+    (remark,) = slave.take_remarks()
+    text = "fmi3DoStep from t = 0 s came to another time than asked, such steps by up to 0.025 s"
+    assert (remark.text, remark.count) == (f"{text}: its outputs are those of its own time", 2)
+    assert slave.take_remarks() == []
+    slave.close()
+
+
+def test_no_time_at_all_is_refused(tmp_path: Path) -> None:
+    slave = started(build_event3_fmu(tmp_path, "STRAYS_BY=NAN"))
+    with pytest.raises(SlaveError, match=r"must return within the step from 0 s to 0\.1 s, but says -?nan s"):
+        slave.step(0.0, 0.1)
+    slave.close()
+
+
+def test_a_step_may_ask_for_the_end_of_the_run(tmp_path: Path) -> None:
+    slave = started(build_event3_fmu(tmp_path, "ENDS_IN_STEP=0.25"))
+    assert slave.step(0.0, 0.2) == StepOutcome(0.2, False)
+    assert slave.step(0.2, 0.1) == StepOutcome(0.25, False, "fmi3DoStep, terminateSimulation")
+    slave.close()
+
+
 def test_a_discarded_step_leaves_the_slave_well_and_is_shortened_where_that_is_asked_for(tmp_path: Path) -> None:
     slave = started(build_event3_fmu(tmp_path, "DISCARDS_ABOVE=0.03"))
     with pytest.raises(StepDiscardedError):
@@ -121,7 +146,7 @@ def test_the_end_of_the_run_may_be_asked_for_at_an_event(tmp_path: Path) -> None
     slave = started(build_event3_fmu(tmp_path, "ENDS_AT_EVENT"))
     with pytest.raises(RunEndedError) as caught:
         slave.do_step(0.0, 1.0)
-    assert (caught.value.time, caught.value.at_event) == (0.6, True)
+    assert (caught.value.time, caught.value.how) == (0.6, "at an event")
     slave.close()
 
 
@@ -246,6 +271,42 @@ def test_events_and_clocks_are_taken_behind_the_walls(tmp_path: Path, algorithm:
     assert [result[f"a.{name}"][at] for name in ("n", "k", "cy")] == [1.0, 0.0, 0.0]
     assert (result["b.e"][-1], result["b.k"][-1]) == (2.0, 3.0)  # what a showed before its last event
     assert not result.run.remarks
+
+
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi", "iterated"])
+@pytest.mark.parametrize("macro", ["ENDS_AT_EVENT", "ENDS_IN_STEP=0.6"])
+@pytest.mark.parametrize("once", [False, True])
+def test_the_values_at_the_end_of_a_run_that_an_fmu_ends_are_there(
+    tmp_path: Path, algorithm: str, macro: str, once: bool
+) -> None:
+    """Also what the last event has changed."""
+    build_event3_fmu(tmp_path, macro, more='canBeInstantiatedOnlyOncePerProcess="true"' if once else "")
+    path = tmp_path / "run.toml"
+    path.write_text(
+        f'stop = 1.0\nrecord = ["a.x", "a.n", "b.n"]\n[master]\nstep = 0.1\nalgorithm = "{algorithm}"\n'
+        '[instances.a]\nfmu = "Events.fmu"\n[instances.b]\nfmu = "Events.fmu"\n'
+    )
+    result = simulate(path)
+    assert result.time[-1] == pytest.approx(0.6)
+    assert result["a.x"] == pytest.approx(result.time)
+    last = 2.0 if macro == "ENDS_AT_EVENT" else 1.0
+    assert (result["a.n"][-1], result["b.n"][-1], result["a.n"][-2]) == (last, last, 1.0)
+    how = "at an event" if macro == "ENDS_AT_EVENT" else "fmi3DoStep, terminateSimulation"
+    assert [remark.text for remark in result.run.remarks] == [f"ended the run at t = 0.6 s of 1 s ({how})"]
+
+
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi", "iterated"])
+def test_fmus_without_states_take_the_events_of_others_late(tmp_path: Path, algorithm: str) -> None:
+    build_event3_fmu(tmp_path, "RETURNS_EARLY", saves=False)
+    path = tmp_path / "run.toml"
+    path.write_text(
+        f'stop = 1.0\nrecord = ["a.x", "a.n", "b.x", "b.n"]\n[master]\nstep = 0.0625\nalgorithm = "{algorithm}"\n'
+        '[instances.a]\nfmu = "Events.fmu"\n[instances.b]\nfmu = "Events.fmu"\n'
+    )
+    result = simulate(path)
+    assert result["a.x"] == pytest.approx(result.time)
+    assert result["b.x"] == pytest.approx(result.time)
+    assert (result["a.n"][-1], result["b.n"][-1]) == (3.0, 3.0)
 
 
 def test_a_ball_bounces_at_its_instants_and_its_clock_ticks(tmp_path: Path) -> None:

@@ -113,12 +113,43 @@ def test_warnings_are_counted_and_the_first_is_shown(tmp_path: Path, step: float
     assert remark.text == "fmi3DoStep at t = 0.5 s returned Warning: near the limit"
 
 
-@BOTH_LOOPS
-def test_a_run_that_an_fmu_ends_keeps_what_it_has(tmp_path: Path, step: float) -> None:
-    result = simulate(scenario(tmp_path, "ENDS_AT=0.7", step=step))
-    assert result.time[-1] == pytest.approx(0.7)
+@pytest.mark.parametrize(
+    ("step", "algorithm"), [(0.01, "gauss_seidel"), (0.0004, "gauss_seidel"), (0.0004, "jacobi"), (0.01, "iterated")]
+)
+def test_a_run_that_an_fmu_ends_keeps_what_it_has(tmp_path: Path, step: float, algorithm: str) -> None:
+    """The step that asks for the end has been done: its row is there, of all instances."""
+    path = scenario(tmp_path, "ENDS_AT=0.7 - 1e-9", step=step, algorithm=algorithm)
+    path.write_text(
+        path.read_text().replace('record = ["a.', 'record = ["b.y[1]", "a.')
+        + '[instances.b]\nfmu = "Typed.fmu"\n[[connections]]\nfrom = "a.y[1]"\nto = "b.u[1]"\n'
+    )
+    result = simulate(path)
+    end = 0.7 + step
+    assert result.time[-1] == pytest.approx(end)
     assert np.allclose(result["a.y[1]"], 2.0 * result.time)
-    assert "a: ended the run at t = 0.7 s of 1 s" in str(result.run.remarks[0])
+    assert result["b.y[1]"][-1] == pytest.approx(end + end**2, abs=2.0 * step)
+    (remark,) = result.run.remarks
+    assert (remark.instance in "ab", remark.text) == (
+        True,
+        f"ended the run at t = {end:g} s of 1 s (fmi3DoStep, terminateSimulation)",
+    )
+
+
+@BOTH_LOOPS
+@pytest.mark.parametrize("share", [-0.25, 0.5])
+def test_a_time_other_than_asked_is_noted(tmp_path: Path, step: float, share: float) -> None:
+    """Which FMI 3.0 allows: a solver of steps of its own cannot always come to where it is asked to."""
+    result = simulate(scenario(tmp_path, f"STRAYS_BY={share}", step=step))
+    assert result["a.y[1]"][-1] == pytest.approx(2.0)
+    (remark,) = result.run.remarks
+    assert (remark.instance, remark.count) == ("a", round(1.0 / step))
+    text = f"fmi3DoStep from t = 0 s came to another time than asked, such steps by up to {abs(share) * step:g} s"
+    assert remark.text == f"{text}: its outputs are those of its own time"
+
+
+@BOTH_LOOPS
+def test_a_time_that_differs_by_rounding_is_no_other(tmp_path: Path, step: float) -> None:
+    assert simulate(scenario(tmp_path, "STRAYS_BY=1e-8", step=step)).run.remarks == ()
 
 
 @BOTH_LOOPS
@@ -128,7 +159,8 @@ def test_a_run_that_an_fmu_ends_keeps_what_it_has(tmp_path: Path, step: float) -
         (("FAILS_AT=0.3", "FAILS_WITH=fmi3Error"), "a: fmi3DoStep at t = 0.3.* returned Error: the solver failed"),
         (("FAILS_AT=0.3", "FAILS_WITH=fmi3Fatal"), "a: fmi3DoStep at t = 0.3.* returned Fatal: the solver failed"),
         (("FAILS_AT=0.3", "FAILS_WITH=7"), "a: fmi3DoStep at t = 0.3.* returned 7"),
-        (("RETURNS_EARLY",), "a: fmi3DoStep at t = 0 s must do whole steps"),
+        (("RETURNS_EARLY",), "a: fmi3DoStep at t = 0 s must do a whole step.* its lastSuccessfulTime is 0.0.* s"),
+        (("STRAYS_BY=NAN",), "a: fmi3DoStep at t = 0 s must do a whole step.* its lastSuccessfulTime is -?nan s"),
         (("FAILS_AT=0.3", "FAILS_WITH=fmi3Discard"), "steps from t = 0.3.* must be done, but even those of"),
     ],
 )

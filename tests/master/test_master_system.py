@@ -7,7 +7,7 @@ from orchestrator.errors import ConnectionMismatchError, ConvergenceError, Scena
 from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi, step_count
 from orchestrator.master.fixed_point import fixed_point
 from orchestrator.master.graph import components
-from orchestrator.master.protocol import Unit
+from orchestrator.master.protocol import RunEndedError, Unit
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Constant, Noise, Samples, Square, Step, Table
 from orchestrator.master.system import Connection, Quantity, SignalSource, System
@@ -299,6 +299,24 @@ def test_a_loop_through_a_state_takes_each_step_once() -> None:
         x += 0.1 * (0.5 * y + 1.0)
         expected.append(y)
     np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize(("wanted", "rows"), [(0.2, 3), (0.15, 2)])
+def test_a_loop_of_which_one_ends_the_run_settles_first(wanted: float, rows: int) -> None:
+    """At a communication point, whose row is there, or on the way to it."""
+
+    def ends(v, time: float, step: float) -> None:
+        gain(v)
+        if time + step >= wanted - 1e-9:
+            raise RunEndedError("a: the end", "a", min(time + step, wanted), "as it wants")
+
+    instances = (instance("a", GAIN, ends, gain, k=0.5, c=1.0), instance("b", GAIN, gain, gain, k=0.5, c=2.0))
+    system = System(instances, (Connection("a.y", "b.u"), Connection("b.y", "a.u")))
+    with Session(system, ("a.y", "b.y"), Iterated(0.1, tolerance=1e-12), 0.3) as session:
+        result = session.run(allow_early_end=True)
+    a, b = np.linalg.solve([[1.0, -0.5], [-0.5, 1.0]], [1.0, 2.0])
+    np.testing.assert_allclose(result.values, np.tile([[a], [b]], rows), rtol=1e-10)
+    assert [r.text for r in result.remarks] == [f"ended the run at t = {wanted:g} s of 0.3 s (as it wants)"]
 
 
 def test_loop_without_solution_is_an_error_with_advice() -> None:

@@ -116,6 +116,17 @@ FMI3_Export fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 
     *event = *end = false;
     *early = taken < step;
     *last = s->time;
+#ifdef ENDS_IN_STEP /* in the step in which this time comes, at which it stops */
+    if (time + step >= ENDS_IN_STEP - 1e-9) {
+        s->x += ENDS_IN_STEP - s->time;
+        s->time = *last = ENDS_IN_STEP;
+        *early = ENDS_IN_STEP < time + step - 1e-9;
+        *end = true;
+    }
+#endif
+#ifdef STRAYS_BY
+    *last = time + (1.0 + STRAYS_BY) * step;
+#endif
 #ifdef WRONG_LAST
     *early = true;
     *last = time + 2.0 * step;

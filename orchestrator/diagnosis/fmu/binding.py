@@ -13,6 +13,7 @@ from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import read_description
 from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.slave3 import Fmu3Slave
 from orchestrator.master.protocol import NativeTransfer, Value
 from orchestrator.master.result import RunRemark
 from orchestrator.master.system import split
@@ -179,14 +180,19 @@ class Box:
         passed = np.array([t.gain for t in batch.through], dtype=float)
         into = self._into[: values.shape[1]]
         warned = np.zeros((len(self._members), 3), dtype=np.int64)
+        astray = np.zeros((len(self._members), 3))
         status, call, k, n = run_loop(
             calls, counts, where, self._sent, self._read, into, self._outof, values, grid, self._wires, self._gains,
-            passing, passed, ports, sign, q, most, batch.lead, warned, out,
+            passing, passed, ports, sign, q, most, batch.lead, warned, astray, out,
         )  # fmt: skip
         members = list(self._members.values())
         for member, (count, first, at) in zip(members, warned.tolist(), strict=True):
             if count:
                 member.slave.warned(count, member.called(first), start + at * step)
+        for member, (number, begin, off) in zip(members, astray.tolist(), strict=True):
+            if number:
+                assert isinstance(member.slave, Fmu3Slave)
+                member.slave.came_elsewhere(int(number), start + begin * step, off)
         if call == AWAY:
             for member in members:
                 member.done()
@@ -194,7 +200,7 @@ class Box:
                 f"efforts at ports must stay within those of the drive, but run away at {start + k * step:g} s"
             )
         if status > 1:
-            members[n].slave.failed(int(status), members[n].called(call), start + k * step)
+            members[n].slave.failed(int(status), members[n].called(call), start + k * step, start + k * step)
         for member in members:
             member.done()
         return out

@@ -22,6 +22,8 @@ _resistance: Any = _laws.resistance
 _cuts: Any = _laws.cuts
 _across: Any = _laws.across
 
+NEAR = 1e-6
+"""Share of a step within which its end and the time that an FMU came to are one."""
 SET, STEP, GET, AWAY = 1, 2, 3, 4
 """The call that failed, as ``run_loop`` returns it; ``AWAY``: none did, but an effort ran away."""
 
@@ -97,20 +99,30 @@ def _transfer(calls, counts, where, n, place):  # type: ignore[no-untyped-def]
 
 
 @kept()
-def _advance(calls, reports, n, time, step):  # type: ignore[no-untyped-def]
+def _advance(calls, reports, n, time, step, k, astray):  # type: ignore[no-untyped-def]
     """Step a member; return the status."""
     if calls[n, 4] == 0:
         return call_step(calls[n, 2], calls[n, 0], time, step)
+    reached = reports[n, 8:].view(np.float64)
+    reached[0] = time + step
     status = call_reporting_step(calls[n, 2], calls[n, 0], time, step, reports[n].ctypes.data)
     if status > 1:
         return status
+    off = abs(reached[0] - (time + step))
     if reports[n, 1] != 0:
         return np.int32(ENDED)
-    return np.int32(LEFT_EARLY) if reports[n, 0] != 0 or reports[n, 2] != 0 else status
+    if reports[n, 0] != 0 or reports[n, 2] != 0 or not np.isfinite(off):
+        return np.int32(LEFT_EARLY)
+    if off > NEAR * step:
+        if astray[n, 0] == 0:
+            astray[n, 1] = k
+        astray[n, 0] += 1
+        astray[n, 2] = max(astray[n, 2], off)
+    return status
 
 
 @kept()
-def _step(calls, counts, where, reports, time, step, k, warned):  # type: ignore[no-untyped-def]
+def _step(calls, counts, where, reports, time, step, k, warned, astray):  # type: ignore[no-untyped-def]
     """Set, step and read all FMUs; return ``(status, call, member)``."""
     for n in range(len(calls)):
         if counts[n, 0] > 0:
@@ -118,7 +130,7 @@ def _step(calls, counts, where, reports, time, step, k, warned):  # type: ignore
             if _note(status, warned, n, SET, k) > 1:
                 return status, SET, n
     for n in range(len(calls)):
-        status = _advance(calls, reports, n, time, step)
+        status = _advance(calls, reports, n, time, step, k, astray)
         if _note(status, warned, n, STEP, k) > 1:
             return status, STEP, n
     for n in range(len(calls)):
@@ -132,7 +144,7 @@ def _step(calls, counts, where, reports, time, step, k, warned):  # type: ignore
 @kept()
 def run_loop(  # type: ignore[no-untyped-def]
     calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, sign, q, most,
-    lead, warned, out,
+    lead, warned, astray, out,
 ):  # fmt: skip
     """Run one record; return ``(status, call, step, member)``, status at most 1 when all went well.
 
@@ -151,6 +163,8 @@ def run_loop(  # type: ignore[no-untyped-def]
         q: (effects, 4) parameters.
         most: (effects,) effort at a port from which the run is given up: its loop is unstable.
         warned: (members, 3) zeros: number of calls that returned a warning, call and step of the first.
+        astray: (members, 3) zeros: number of steps that came to another time than asked, the first, the largest
+            difference [s].
         out: (rows, variables read), row 0 the initial values.
     """
     start, step, per_row = grid[0], grid[1], int(grid[2])
@@ -172,7 +186,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         for w in range(len(wires)):
             fed[w, 1] = fed[w, 0]
             fed[w, 0] = sent[into[wires[w, 0]]]
-        status, call, n = _step(calls, counts, where, reports, start + k * step, step, k, warned)
+        status, call, n = _step(calls, counts, where, reports, start + k * step, step, k, warned, astray)
         if status > 1:
             return status, call, k, n
         if (k + 1) % per_row == 0:
