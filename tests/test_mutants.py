@@ -1,17 +1,55 @@
 """A mutant is caught by a test that fails, not by a run that is killed."""
 
+import shutil
+
 import pytest
 
-from tools.mutants import outcome
+from tools import mutants
 
+COMPUTE = "import time\nwhile time.process_time() < 4.0: pass"
 TESTS = {
-    "survived": "def test_it(): pass",
-    "caught": "def test_it(): assert False",
-    "no end": "import os\ndef test_it(): os.kill(os.getpid(), 9)",
+    "passes": ("def test_it(): pass", "survived", ""),
+    "fails": ("def test_it(): assert False", "caught", "test_one.py::test_it"),
+    "cannot be collected": ("import nothing_of_this_name", "caught", "test_one.py"),
+    "is killed": ("import os\ndef test_it(): os.kill(os.getpid(), 9)", "no end", ""),
+    "computes without end": ("def test_it():\n    while True: pass", "no end", ""),
+    "waits without end": ("import time\ndef test_it(): time.sleep(1000)", "no end", ""),
+    "has a child that computes for longer": (
+        f"import subprocess, sys\ndef test_it(): subprocess.run([sys.executable, '-c', {COMPUTE!r}], check=True)",
+        "survived",
+        "",
+    ),
 }
 
 
-@pytest.mark.parametrize("expected", TESTS)
-def test_the_outcome_of_a_run(tmp_path, expected):
-    (tmp_path / "test_one.py").write_text(TESTS[expected])
-    assert outcome(tmp_path, ("test_one.py",)) == expected
+@pytest.fixture
+def root(tmp_path):
+    """A copy that has the tools alone."""
+    shutil.copytree(mutants.ROOT / "tools", tmp_path / "copy" / "tools")
+    return tmp_path / "copy"
+
+
+@pytest.mark.parametrize("what", TESTS)
+def test_the_outcome_of_a_run(root, monkeypatch, what):
+    text, *expected = TESTS[what]
+    monkeypatch.setattr(mutants, "TIME_LIMIT", 3.0)
+    if what.startswith("waits"):
+        monkeypatch.setattr(mutants, "CLOCK_LIMIT", 5.0)
+    (root / "test_one.py").write_text(text)
+    assert mutants.outcome(root, ("test_one.py",)) == tuple(expected)
+
+
+def test_tests_of_the_changed_function_come_first(root):
+    (root / "orchestrator").mkdir()
+    (root / "orchestrator" / "sums.py").write_text("def add(a, b):\n    return a + b\n")
+    (root / "test_one.py").write_text(
+        "from orchestrator.sums import add\ndef test_other(): pass\ndef test_sum(): assert add(1, 1) == 2\n"
+        "def test_last(): pass\n"
+    )
+    assert mutants.outcome(root, ("test_one.py",)) == ("survived", "")
+    (root / "orchestrator" / "sums.py").write_text("def add(a, b):\n    return a - b\n")
+    (root / "test_one.py").write_text((root / "test_one.py").read_text().replace("pass", "assert False"))
+    assert mutants.outcome(root, ("test_one.py",), place="orchestrator/sums.py:2") == (
+        "caught",
+        "test_one.py::test_sum",
+    )

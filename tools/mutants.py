@@ -1,11 +1,11 @@
 """Change one thing at a time in the rooms that matter most and see whether their tests notice.
 
-    python -m tools.mutants --count 120 --slice 1/8 --out mutants.json
+    python -m tools.mutants --count 60 --room records --out mutants.json
 
 Each mutant changes one operator, comparison, constant, branch or statement of one module in a copy of the project and
 runs the fast tests of its room there. A mutant that passes them all has survived; one whose run has to be ended counts
 as neither caught nor survived. Slices of one seed share one sample of mutants; results are merged into the file, so
-that the slices may run at different times.
+that the slices may run at different times. A mutant that was not caught is tried again by a later run.
 """
 
 import argparse
@@ -13,20 +13,26 @@ import ast
 import json
 import os
 import random
-import resource
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from tools import mutant_order
+from tools.mutant_order import LIMIT, NOTES, PLACE
+
 ROOT = Path(__file__).resolve().parents[1]
-TIME_LIMIT = 180  # s of processor time, of one test run: a mutant may loop for ever
+# s of one test run, for a mutant may loop for ever: processor time of the tests' process, and by the clock.
+TIME_LIMIT, CLOCK_LIMIT = 300.0, 3600.0
 
 COMPARED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
             ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is}  # fmt: skip
@@ -42,6 +48,8 @@ class Room:
     """Modules whose mutants are made, and the tests that should notice.
 
     Attributes:
+        modules: files, or folders with all that is in them.
+        tests: the same.
         compiled: numba compiles the modules. Its machine code of callers would outlive the change, so it is switched
             off; elsewhere it makes the tests quick.
     """
@@ -53,8 +61,10 @@ class Room:
 
 
 ROOMS = (
-    Room("calibration", ("orchestrator/paired/calibration.py",), ("tests/paired/test_calibration_map.py",)),
-    Room("metric", ("orchestrator/paired/metric.py",), ("tests/paired/test_metric.py",)),
+    Room("records", ("orchestrator/records",), ("tests/records",)),
+    Room("reporting", ("orchestrator/reporting",), ("tests/reporting",)),
+    Room("paired", ("orchestrator/paired",), ("tests/paired",)),
+    Room("checking", ("orchestrator/checking",), ("tests/checking",)),
     Room(
         "search",
         ("orchestrator/diagnosis/selection/search.py", "orchestrator/diagnosis/selection/screening.py"),
@@ -173,56 +183,80 @@ def _of(node: ast.AST) -> Iterator[tuple[str, Callable[[Any], object]]]:
 def all_mutants(root: Path) -> Iterator[tuple[Mutant, int, int]]:
     """Yield every mutant of every room with the place of its node and the number of its change."""
     for room in ROOMS:
-        for module in room.modules:
+        for module in _files(root, room.modules):
             text = (root / module).read_text(encoding="utf-8")
             lines = text.splitlines()
             for line, change, place, number in changes(ast.parse(text)):
                 yield Mutant(room.name, module, line, change, lines[line - 1].strip()), place, number
 
 
+def _files(root: Path, modules: tuple[str, ...]) -> Iterator[str]:
+    for module in modules:
+        place = root / module
+        for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
+            yield path.relative_to(root).as_posix()
+
+
 def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
-    """Return ``count`` mutants with their changed sources, shared out among the rooms evenly."""
+    """Return ``count`` mutants of every room with their changed sources."""
     found = list(all_mutants(root))
     generator = random.Random(seed)
     chosen: list[tuple[Mutant, int, int]] = []
-    for place, room in enumerate(ROOMS):
+    for room in ROOMS:
         own = [entry for entry in found if entry[0].room == room.name]
-        share = count // len(ROOMS) + (place < count % len(ROOMS))
-        chosen += generator.sample(own, min(share, len(own)))
+        chosen += generator.sample(own, min(count, len(own)))
     generator.shuffle(chosen)
     return [(m, changed((root / m.module).read_text(encoding="utf-8"), node, number)) for m, node, number in chosen]
 
 
-def outcome(root: Path, tests: tuple[str, ...], compiled: bool = False) -> str:
+def outcome(root: Path, tests: tuple[str, ...], compiled: bool = False, place: str = "") -> tuple[str, str]:
     """Run tests in a copy of the project.
+
+    The limit of processor time holds for the tests' process alone: a child that it ended would be a failed test.
 
     Args:
         root: of the copy.
-        tests: files, from there.
+        tests: files or folders, from there.
         compiled: as in :class:`Room`.
+        place: of the change, as ``module:line``; empty: there is none, and what the tests call is noted.
 
     Returns:
         ``"survived"``; ``"caught"`` where a test fails or a module cannot be imported; ``"no end"`` where the run was
-        ended by its limit of time or by another signal: nothing is known then.
+        ended by its limit of time or by another signal: nothing is known then. And the test that failed.
     """
     environment = os.environ | {
         "NUMBA_DISABLE_JIT": str(int(compiled)),
         "PYTHONPATH": str(root),
         "PYTHONDONTWRITEBYTECODE": "1",
+        LIMIT: str(TIME_LIMIT),
+        NOTES: str(root.parent / f"notes-{Path(tests[0]).stem}.json"),
     }
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
-    run = subprocess.run(
-        command, cwd=root, env=environment, capture_output=True, check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT)),
-    )  # fmt: skip
+    environment |= {PLACE: place} if place else {}
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-m", "not slow", "-p", "no:cacheprovider"]
+    with tempfile.TemporaryFile() as output:
+        run = subprocess.Popen(
+            [*command, "-p", mutant_order.__name__, *tests], cwd=root, env=environment, stdout=output, stderr=output,
+            start_new_session=True,
+        )  # fmt: skip
+        try:
+            code = run.wait(CLOCK_LIMIT)
+        except subprocess.TimeoutExpired:
+            code = -signal.SIGKILL
+        if code < 0:
+            with suppress(ProcessLookupError):
+                os.killpg(run.pid, signal.SIGKILL)
+            run.wait()
+        output.seek(0)
+        failed = re.search(rb"^(?:FAILED|ERROR) (\S+)", output.read(), re.MULTILINE)
     # pytest: 0 all passed, 1 tests failed, 2 stopped by an error while collecting.
-    return {0: "survived", 1: "caught", 2: "caught"}.get(run.returncode, "no end")
+    found = {0: "survived", 1: "caught", 2: "caught"}.get(code, "no end")
+    return found, failed[1].decode() if failed else ""
 
 
 def main() -> int:
     """Run a slice of the mutants and add what came out to the file."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=120)
+    parser.add_argument("--count", type=int, default=60, help="mutants of each room")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--slice", default="1/1", help="which part of the sample: 3/8 is the third of eight")
     parser.add_argument("--room", help="one room alone")
@@ -231,6 +265,7 @@ def main() -> int:
     options = parser.parse_args()
     part, parts = (int(word) for word in options.slice.split("/"))
     results = json.loads(options.out.read_text()) if options.out.exists() else []
+    results = [result for result in results if result["outcome"] == "caught"]
     known = {(r["module"], r["line"], r["change"], r["text"]) for r in results}
     rooms = {room.name: room for room in ROOMS}
     begun = time.monotonic()
@@ -238,7 +273,7 @@ def main() -> int:
         root = Path(folder) / "copy"
         shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".venv", ".git", "fmus"))
         for room in ROOMS:
-            if options.room in (None, room.name) and outcome(root, room.tests, room.compiled) != "survived":
+            if options.room in (None, room.name) and outcome(root, room.tests, room.compiled)[0] != "survived":
                 sys.exit(f"the tests of {room.name} fail without any change")
         for mutant, source in sample(root, options.count, options.seed)[part - 1 :: parts]:
             key = (mutant.module, mutant.line, mutant.change, mutant.text)
@@ -248,9 +283,10 @@ def main() -> int:
                 break
             original = (root / mutant.module).read_text(encoding="utf-8")
             (root / mutant.module).write_text(source, encoding="utf-8")
-            found = outcome(root, rooms[mutant.room].tests, rooms[mutant.room].compiled)
+            room, place = rooms[mutant.room], f"{mutant.module}:{mutant.line}"
+            found, by = outcome(root, room.tests, room.compiled, place)
             (root / mutant.module).write_text(original, encoding="utf-8")
-            results.append(asdict(mutant) | {"outcome": found})
+            results.append(asdict(mutant) | {"outcome": found, "by": by})
             options.out.write_text(json.dumps(results, indent=1))
             if found != "caught":
                 print(f"{found}: {mutant.module}:{mutant.line} {mutant.change}: {mutant.text}", flush=True)
