@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.copies import copy_project
 from tests.support.example_record import copy_examples
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -46,6 +47,70 @@ print(main(["units"]))
 """,
         ["0"],
     ),
+    "A check rule": (
+        """
+from pathlib import Path
+from orchestrator.checking.check import CheckOptions, check_fmu
+from tools import rules_page
+
+TEXT = '<fmiModelDescription fmiVersion="2.0" modelName="a" guid="b"{}><CoSimulation modelIdentifier="a"/>' + (
+    "<ModelVariables/><ModelStructure/></fmiModelDescription>"
+)
+for text in ("", ' description=" "', ' description="A motor."'):
+    Path("fmu").mkdir(exist_ok=True)
+    Path("fmu", "modelDescription.xml").write_text(TEXT.format(text))
+    report = check_fmu(Path("fmu"), CheckOptions(static=True))
+    print([(f.rule, f.severity) for f in report.findings if f.rule == "model.description"] == [
+        ("model.description", "info")
+    ])
+print(rules_page.page().count("`model.description`"))
+""",
+        ["True", "True", "False", "1"],
+    ),
+    "A master algorithm": (
+        """
+import math
+from pathlib import Path
+from orchestrator.master.algorithms import ALGORITHMS
+from orchestrator.master.session import Session
+from orchestrator.master.system import Connection, System
+from orchestrator.scenarios.scenario import load_scenario
+from tests.support.mock_slave import instance, model, variable
+
+text = Path("docs/examples/loop.toml").read_text()
+Path("alternating.toml").write_text(text.replace("gauss_seidel", "alternating"))
+print(load_scenario(Path("alternating.toml")).algorithm == ALGORITHMS["alternating"](1e-3))
+
+def oscillator(sign, start):
+    kind = model("integrator", variable("u", "input"), variable("y", "output", start=start))
+    return kind, lambda values, time, step: values.update(y=values["y"] + sign * step * values["u"])
+
+system = System(
+    (instance("a", *oscillator(1.0, 1.0)), instance("b", *oscillator(-1.0, 0.0))),
+    (Connection("b.y", "a.u"), Connection("a.y", "b.u")),
+)
+for name in ("gauss_seidel", "alternating"):
+    errors = []
+    for step in (0.1, 0.05):
+        with Session(system, ("a.y",), ALGORITHMS[name](step), 2.0) as session:
+            errors.append(abs(session.run()["a.y"][-1] - math.cos(2.0)))
+    print(round(math.log2(errors[0] / errors[1])))
+""",
+        ["True", "1", "2"],
+    ),
+    "A page": (
+        """
+from pathlib import Path
+from orchestrator.reporting import report_from_directory, write_report
+from orchestrator.shared.output import write_result
+
+write_result(Path.cwd(), "build", {}, None, {"fmus": {"Gear": "fmus/Gear.fmu"}, "remark": "no compiler"})
+report = report_from_directory(Path.cwd())
+print(report.sections[0].rows == (("Gear", "fmus/Gear.fmu"),), "no compiler" in write_report(Path.cwd()).read_text())
+print(report.summary)
+""",
+        ["True", "True", "1", "FMUs", "are", "up", "to", "date."],
+    ),
 }
 
 
@@ -79,8 +144,8 @@ def apply(edit, root):
 @pytest.mark.slow
 @pytest.mark.parametrize("title", PROGRAMS)
 def test_a_recipe_works_on_a_copy(tmp_path, title):
-    for package in ("orchestrator", "pyfmu_sources"):
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    copy_project(tmp_path)
+    shutil.copytree(ROOT / "tools", tmp_path / "tools", ignore=shutil.ignore_patterns("__pycache__"))
     copy_examples(tmp_path / "docs" / "examples")
     edits = recipe(title)
     assert edits

@@ -129,11 +129,16 @@ def _inside(body: list[ast.stmt]) -> Iterator[ast.AST]:
     waiting: list[ast.AST] = list(reversed(body))
     while waiting:
         node = waiting.pop()
-        if isinstance(node, (ast.FunctionDef, ast.Raise, ast.JoinedStr, ast.Assert)):
-            continue  # inner functions come by themselves; texts and checks of types are no behaviour
+        if isinstance(node, (ast.FunctionDef, ast.Raise, ast.JoinedStr, ast.Assert)) or _is_strict(node):
+            continue  # inner functions come by themselves; texts and checks of what holds anyway are no behaviour
         yield node
         skipped = {id(node.annotation)} if isinstance(node, ast.AnnAssign) else set()
         waiting += [child for child in reversed(list(ast.iter_child_nodes(node))) if id(child) not in skipped]
+
+
+def _is_strict(node: ast.AST) -> bool:
+    """Return whether a node is ``strict=True`` of ``zip``, which checks as ``assert`` does."""
+    return isinstance(node, ast.keyword) and node.arg == "strict"
 
 
 def _of(node: ast.AST) -> Iterator[tuple[str, Callable[[Any], object]]]:

@@ -2,8 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 from orchestrator.errors import ScenarioError
+from orchestrator.master.iterated import Iterated
+from orchestrator.master.wiring import Array, Slots, Wiring
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,21 +31,6 @@ class Jacobi:
 
 
 @dataclass(frozen=True, slots=True)
-class Iterated:
-    """Gauss-Seidel, each step repeated with rollback until the values that the instances of a loop exchange settle.
-
-    Attributes:
-        step: communication step [s].
-        tolerance: largest change of an exchanged value, relative to ``max(1, |value|)``.
-        iterations: most passes per step.
-    """
-
-    step: float
-    tolerance: float = 1e-10
-    iterations: int = 50
-
-
-@dataclass(frozen=True, slots=True)
 class Adaptive:
     """Error-controlled communication step with rollback, for continuous loops; see ``adaptive``.
 
@@ -61,9 +49,21 @@ class Adaptive:
     largest: float = 0.02
 
 
-Algorithm = GaussSeidel | Jacobi | Iterated | Adaptive
+class FixedStepLoop(Protocol):
+    """A further algorithm: a frozen dataclass with a fixed step, which runs the loop itself."""
 
-ALGORITHMS: dict[str, type[Algorithm]] = {
+    @property
+    def step(self) -> float:
+        """Communication step [s]."""
+
+    def run(self, wiring: Wiring, table: Array, start: float, steps: int, rows: Array, record: Slots) -> int:
+        """Run on the grid; see ``fixed_step.run_sequential`` for the arguments. Return the number of passes."""
+
+
+Algorithm = GaussSeidel | Jacobi | Adaptive | FixedStepLoop
+
+# Dataclasses; their fields behind `step` are the settings that a scenario may give.
+ALGORITHMS: dict[str, type[Any]] = {
     "gauss_seidel": GaussSeidel,
     "jacobi": Jacobi,
     "iterated": Iterated,

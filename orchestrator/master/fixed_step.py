@@ -1,13 +1,9 @@
 """Gauss-Seidel and Jacobi on the grid ``start + n * step``; time is never accumulated."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.master.protocol import RunEndedError
-from orchestrator.master.wiring import Stage, Wiring, gather
-
-Array = NDArray[np.float64]
-Slots = NDArray[np.int64]
+from orchestrator.master.wiring import Array, Slots, Stage, Wiring, gather
 
 
 def do_step(stage: Stage, time: float, step: float) -> RunEndedError | None:

@@ -1,21 +1,18 @@
 """Algebraic loops: values that depend on one another at the same instant, solved by repeating with rollback."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import ScenarioError
-from orchestrator.master.algorithms import Iterated
 from orchestrator.master.fixed_point import fixed_point
 from orchestrator.master.fixed_step import do_step
 from orchestrator.master.layout import Layout
 from orchestrator.master.protocol import RunEndedError
-from orchestrator.master.wiring import Stage, View, Wiring, gather
-
-Array = NDArray[np.float64]
-Slots = NDArray[np.int64]
+from orchestrator.master.wiring import Array, Slots, Stage, View, Wiring, gather
 
 
 def backward_slots(layout: Layout, names: Iterable[str]) -> Slots:
@@ -52,36 +49,49 @@ def initialise(wiring: Wiring, cut: Slots, table: Array, tolerance: float, itera
     return fixed_point(sweep, values[cut], tolerance, iterations, "initialisation")
 
 
-def run_iterated(
-    wiring: Wiring, table: Array, start: float, settings: Iterated, steps: int, rows: Array, record: Slots
-) -> int:
-    """Run on the grid; the instances of each algebraic loop are stepped until what they exchange settles.
+@dataclass(frozen=True, slots=True)
+class Iterated:
+    """Gauss-Seidel, each step repeated with rollback until the values that the instances of a loop exchange settle.
 
-    Returns the number of passes over loops. Arguments as for ``fixed_step.run_sequential``.
-
-    Args:
-        start: [s].
-        settings: step [s], tolerance and number of passes.
-        rows: (steps + 1, recorded) filled from row 1 on.
-        record: (recorded,) slots of the recorded signals.
+    Attributes:
+        step: communication step [s].
+        tolerance: largest change of an exchanged value, relative to ``max(1, |value|)``.
+        iterations: most passes per step.
     """
-    groups = loop_groups(wiring)
-    passes = 0
-    for n in range(steps):
-        time, ended = start + n * settings.step, None
-        for stages, cut in groups:
-            found: RunEndedError | None
-            if len(cut) == 0:
-                found = _pass(stages, wiring.view, table, n + 1, time, settings.step)
-                passes += 1
-            else:
-                count, found = _solve(stages, cut, wiring, table, n + 1, time, settings)
-                passes += count
-            ended = found or ended
-        np.take(wiring.values, record, out=rows[n + 1], mode="clip")
-        if ended is not None:
-            raise ended
-    return passes
+
+    step: float
+    tolerance: float = 1e-10
+    iterations: int = 50
+
+    def run(self, wiring: Wiring, table: Array, start: float, steps: int, rows: Array, record: Slots) -> int:
+        """Run on the grid; the instances of each algebraic loop are stepped until what they exchange settles.
+
+        Args:
+            table: signals, shape (signals, steps + 1).
+            start: [s].
+            rows: (steps + 1, recorded) filled from row 1 on.
+            record: (recorded,) slots of the recorded signals.
+
+        Returns:
+            The number of passes over loops.
+        """
+        groups = loop_groups(wiring)
+        passes = 0
+        for n in range(steps):
+            time, ended = start + n * self.step, None
+            for stages, cut in groups:
+                found: RunEndedError | None
+                if len(cut) == 0:
+                    found = _pass(stages, wiring.view, table, n + 1, time, self.step)
+                    passes += 1
+                else:
+                    count, found = _solve(stages, cut, wiring, table, n + 1, time, self)
+                    passes += count
+                ended = found or ended
+            np.take(wiring.values, record, out=rows[n + 1], mode="clip")
+            if ended is not None:
+                raise ended
+        return passes
 
 
 def loop_groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], Slots]]:

@@ -6,17 +6,16 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import FmuError, ScenarioError, SimulationError, SlaveError
 from orchestrator.master.adaptive import run_adaptive
-from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
+from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Jacobi, step_count
 from orchestrator.master.clocks import clock_problems
 from orchestrator.master.event_steps import FixedSteps
 from orchestrator.master.event_windows import EventWindows
 from orchestrator.master.events import EventIteration
 from orchestrator.master.fixed_step import run_sequential, run_simultaneous
-from orchestrator.master.iterated import backward_slots, initialise, run_iterated
+from orchestrator.master.iterated import Iterated, backward_slots, initialise
 from orchestrator.master.layout import Layout, lay_out
 from orchestrator.master.own_steps import own_step_remarks
 from orchestrator.master.problems import Problem, raise_problems
@@ -24,13 +23,10 @@ from orchestrator.master.protocol import RunEndedError, Slave, StepDiscardedErro
 from orchestrator.master.result import MACHINE_CODE, PYTHON, EventStatistics, Recording, RunRemark, Statistics
 from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, Quantity, System, split
-from orchestrator.master.wiring import Wiring, gather, wire
+from orchestrator.master.wiring import Array, Slots, Wiring, gather, wire
 
 if TYPE_CHECKING:
     from orchestrator.master.compiled import CompiledWiring
-
-Array = NDArray[np.float64]
-Slots = NDArray[np.int64]
 
 INITIAL_TOLERANCE = 1e-12
 INITIAL_PASSES = 100
@@ -239,6 +235,9 @@ class Session:
         finally:
             np.take(wiring.values, record, out=rows[0], mode="clip")
         if self._events is not None and not isinstance(algorithm, Adaptive):
+            if not isinstance(algorithm, (GaussSeidel, Jacobi, Iterated)):
+                kind = type(algorithm).__name__
+                raise ScenarioError(f"`events` must be false with `{kind}`, which has no event mode, but is true")
             run = FixedSteps(self._events, algorithm, table, self.start)
             run.run(steps, rows, record)
             return Statistics(steps, run.undone, self._calls(), run.passes, events=self._events.statistics())
@@ -248,14 +247,12 @@ class Session:
                 return Statistics(
                     steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), steps, loop
                 )
-            case Iterated():
-                sweeps = run_iterated(wiring, table, self.start, algorithm, steps, rows, record)
             case Adaptive() if self._events is not None:
                 return EventWindows(self._events, signals, self.start, self.stop, algorithm).run(rows, record)
             case Adaptive():
                 return run_adaptive(wiring, signals, self.start, self.stop, algorithm, rows, record)
             case _:
-                raise ScenarioError(f"`algorithm` must be a master algorithm, but is {algorithm!r}")
+                sweeps = algorithm.run(wiring, table, self.start, steps, rows, record)
         return Statistics(steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), sweeps)
 
     def _calls(self) -> dict[str, int]:

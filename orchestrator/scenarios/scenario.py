@@ -8,6 +8,7 @@ import math
 import os
 import tomllib
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from orchestrator.building.sources import catalogue
 from orchestrator.errors import FmuError, ScenarioError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master import signals
-from orchestrator.master.algorithms import ALGORITHMS, Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
+from orchestrator.master.algorithms import ALGORITHMS, Algorithm, step_count
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import Value, Variable
 from orchestrator.master.result import Recording
@@ -137,14 +138,6 @@ class _Top(_Strict, frozen=True, kw_only=True):
     sources: list[Any] = []
 
 
-_SETTINGS: dict[type[Algorithm], tuple[str, ...]] = {
-    GaussSeidel: ("compiled",),
-    Jacobi: ("compiled",),
-    Iterated: ("tolerance", "iterations"),
-    Adaptive: ("tolerance", "first", "smallest", "largest"),
-}
-
-
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be."""
     content = _content(path)
@@ -215,7 +208,7 @@ class _Reader:
             value = getattr(master, name)
             if value is None:
                 continue
-            if name not in _SETTINGS[kind]:
+            if name not in {field.name for field in fields(kind)}:
                 text = f"must be left out, but is given, and {master.algorithm!r} does not use it"
                 self.problems.append(Problem(f"$.master.{name}", text))
             elif not isinstance(value, bool) and not (math.isfinite(value) and value > 0):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.half_drivetrains import solve
-from orchestrator.errors import ChatteringError, ConvergenceError, SlaveError
+from orchestrator.errors import ChatteringError, ConvergenceError, ScenarioError, SlaveError
 from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi
 from orchestrator.master.protocol import EventUpdate, PeriodicClock, StepDiscardedError, StepOutcome
 from orchestrator.master.session import Session
@@ -529,6 +529,17 @@ def test_what_ends_a_contact_under_iterated_is_met_by_both() -> None:
     assert steps[-1][1] == pytest.approx(0.6)
     assert any(abs(end - result.statistics.events.times[0]) < 1e-12 for _, end in steps)
     np.testing.assert_allclose(result["follow.x"], result.time * 2.0 / 3.0, atol=1e-9)
+
+
+def test_an_algorithm_without_event_mode_is_refused() -> None:
+    class Loop:
+        step = 0.1
+
+    with (
+        Session(System((event_instance("ball", BALL, fall, bounce),)), ["ball.h"], Loop(), 0.5) as session,
+        pytest.raises(ScenarioError, match="`events` must be false with `Loop`"),
+    ):
+        session.run()
 
 
 def test_calls_of_one_event_keep_to_the_contract() -> None:
