@@ -20,10 +20,10 @@ from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.model.units import in_metres, unit_in
 from orchestrator.diagnosis.report.drive_gain import find_drive_gain
 from orchestrator.diagnosis.report.estimates import interval_width, parameter_estimates
-from orchestrator.diagnosis.report.graded_effect import motion_shares, report_effect, share_values
+from orchestrator.diagnosis.report.graded_effect import add_test_evidence, report_effect, share_values
 from orchestrator.diagnosis.report.hidden_gap import report_hidden_gap
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
-from orchestrator.diagnosis.report.test_report import misfit_on_test_data, misses_of
+from orchestrator.diagnosis.report.test_report import misfit_on_test_data, misses_of, torque_comparison
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
 from orchestrator.diagnosis.selection.grading import (
     EffectEvidence,
@@ -105,13 +105,13 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     final = workings.balances[0].physical_values(found.problem.record_points(found.final.point)[0])
     workings = replace(workings, search=found, final=final)
     test = misfit_on_test_data(workings, model, settings)
-    shares = motion_shares(found, test, misses_of(workings, model, settings))
-    tested = [replace(one, motion_share=shares.get(one.label, np.nan)) for one in evidence]
+    compared = torque_comparison(workings, test, model, settings)
+    labels = found.final.labels
     graded = tuple(
-        _graded(found if one.label in shares else searched, one, record, model, settings, one.label in shares)
-        for one in tested
+        _graded(found if one.label in labels else searched, one, record, model, settings, one.label in labels)
+        for one in add_test_evidence(evidence, found, test, misses_of(workings, model, settings), compared)
     )
-    graded = share_values(graded, found.final.labels, model.plant)
+    graded = share_values(graded, labels, model.plant)
     effects = tuple(sorted((one for one in graded if not one.of_log), key=lambda one: -one.grade))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}

@@ -23,7 +23,7 @@ from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.model.interface import Values
 from orchestrator.diagnosis.report.estimates import parameter_estimates
-from orchestrator.diagnosis.report.graded_effect import motion_shares, report_effect
+from orchestrator.diagnosis.report.graded_effect import add_test_evidence, report_effect
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.result import GradedEffect
 from orchestrator.diagnosis.selection.grading import (
@@ -123,11 +123,10 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     final = workings.residuals[0].box_model(found.problem.record_points(found.final.point)[0])
     workings = replace(workings, search=found, final=final)
     test = misfit_on_test_data(workings)
-    shares = motion_shares(found, test, misses_of(workings))
-    tested = [replace(one, motion_share=shares.get(one.label, np.nan)) for one in evidence]
+    labels = found.final.labels
     graded = tuple(
-        _graded(workings, found if one.label in shares else searched, one, record, settings, one.label in shares)
-        for one in tested
+        _graded(workings, found if one.label in labels else searched, one, record, settings, one.label in labels)
+        for one in add_test_evidence(evidence, found, test, misses_of(workings))
     )
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection)

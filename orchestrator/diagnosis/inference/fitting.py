@@ -28,7 +28,6 @@ class FittedModel:
         covariance: (coordinates, coordinates) of white residuals.
         held_out: (rows,) residuals of each block, predicted from the others.
         blocks: (rows,) block of each residual.
-        block_errors: (blocks,) squared error of each block, predicted from the others.
         block_shifts: (blocks, coordinates) how the values move when a block is left out.
     """
 
@@ -40,7 +39,6 @@ class FittedModel:
     covariance: Array
     held_out: Array
     blocks: NDArray[np.int64]
-    block_errors: Array
     block_shifts: Array
 
     @property
@@ -51,14 +49,18 @@ class FittedModel:
     @property
     def score(self) -> float:
         """Return the squared error over all blocks, each predicted from the others."""
-        return float(self.block_errors.sum())
+        return float(self.held_out @ self.held_out)
 
     @property
     def jackknife(self) -> Array:
         """Return the covariance (coordinates, coordinates) of the values by what blocks differ by."""
-        count = len(self.block_errors)
-        off = self.block_shifts - self.block_shifts.mean(axis=0)
-        return np.asarray((count - 1) / count * off.T @ off)
+        return jackknife_covariance(self.block_shifts)
+
+
+def jackknife_covariance(shifts: Array) -> Array:
+    """Return the covariance (values, values) by how values move (blocks, values) when each block is left out."""
+    off = shifts - shifts.mean(axis=0)
+    return np.asarray((len(shifts) - 1) / len(shifts) * off.T @ off)
 
 
 def fit_model(problem: FitProblem, point: ModelPoint, iterations: int = 0) -> FittedModel:
@@ -111,29 +113,44 @@ def _scored(
     cost: float,
 ) -> FittedModel:  # fmt: skip
     prior, slopes = problem.prior(point, coordinates)
-    count, width = problem.block_count, len(coordinates)
-    normals, gradients, squares = np.empty((count, width, width)), np.empty((count, width)), np.empty(count)
-    for block in range(count):
-        rows = problem.blocks == block
-        part = jacobian[rows]
-        normals[block], gradients[block] = part.T @ part, part.T @ residual[rows]
-        squares[block] = residual[rows] @ residual[rows]
-    normal = normals.sum(axis=0) + np.diag(slopes**2)
-    gradient = gradients.sum(axis=0) + slopes * prior
+    normal = jacobian.T @ jacobian + np.diag(slopes**2)
+    gradient = jacobian.T @ residual + slopes * prior
     # What a record begins with belongs to its first block alone, and stays.
     moving = [n for n, one in enumerate(coordinates) if not (isinstance(one, int) and problem.parameters[one].local)]
-    errors, shifts, held_out = np.empty(count), np.zeros((count, width)), np.empty_like(residual)
-    for block in range(count):
-        inner = (normal - normals[block])[np.ix_(moving, moving)]
-        ridge = 1e-10 * np.diag(np.diag(inner) + 1e-30)
-        shifts[block, moving] = -np.linalg.lstsq(inner + ridge, (gradient - gradients[block])[moving], rcond=1e-12)[0]
-        shift, rows = shifts[block], problem.blocks == block
-        held_out[rows] = residual[rows] + jacobian[rows] @ shift
-        errors[block] = squares[block] + 2.0 * shift @ gradients[block] + shift @ normals[block] @ shift
+    shifts = np.zeros((problem.block_count, len(coordinates)))
+    held_out, shifts[:, moving] = leave_blocks_out(
+        residual, jacobian[:, moving], normal[np.ix_(moving, moving)], gradient[moving], problem.blocks
+    )
+    covariance = np.asarray(np.linalg.pinv(normal, hermitian=True))
     return FittedModel(
-        point, tuple(coordinates), residual, jacobian, cost, np.linalg.pinv(normal, hermitian=True),
-        held_out, problem.blocks, np.maximum(errors, 1e-12 * squares.sum()), shifts,
-    )  # fmt: skip
+        point, tuple(coordinates), residual, jacobian, cost, covariance, held_out, problem.blocks, shifts
+    )
+
+
+def leave_blocks_out(
+    residual: Array, jacobian: Array, normal: Array, gradient: Array, blocks: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Return the residuals (rows,) of each block at the values that the others ask for, and how these move.
+
+    Args:
+        residual: (rows,) at the fit.
+        jacobian: (rows, values) there.
+        normal: (values, values) ``J'J`` and the prior's share.
+        gradient: (values,) ``J'r`` and the prior's share.
+        blocks: (rows,) block of each residual.
+
+    Returns:
+        The residuals, and the shifts (blocks, values).
+    """
+    shifts, held_out = np.zeros((int(blocks.max()) + 1, len(normal))), residual.copy()
+    for block in range(len(shifts)):
+        rows = blocks == block
+        part = jacobian[rows]
+        inner = normal - part.T @ part
+        inner += 1e-10 * np.diag(np.diag(inner) + 1e-30)
+        shifts[block] = -np.linalg.lstsq(inner, gradient - part.T @ residual[rows], rcond=1e-12)[0]
+        held_out[rows] += part @ shifts[block]
+    return held_out, shifts
 
 
 def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
@@ -141,8 +158,7 @@ def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
     places = [
         n for n, one in enumerate(fitted.coordinates) if isinstance(one, int) and not problem.parameters[one].local
     ]
-    count = len(fitted.block_errors)
-    variance = (count - 1) / count * np.sum((fitted.block_shifts - fitted.block_shifts.mean(axis=0)) ** 2, axis=0)
+    variance = np.diag(fitted.jackknife)
     normal = fitted.jacobian.T @ fitted.jacobian
     white = np.diag(np.linalg.pinv(normal + 1e-9 * np.eye(len(normal)), hermitian=True))
     seen = [n for n in places if white[n] < problem.parameters[fitted.coordinates[n]].spread ** 2]  # type: ignore[index]
@@ -168,16 +184,31 @@ class ScoreComparison:
 
 
 def compare(before: FittedModel, after: FittedModel) -> ScoreComparison:
-    """Compare two models of one problem, block by block."""
-    a, b = before.block_errors, after.block_errors
+    """Compare two models of one problem on blocks left out."""
+    return compare_residuals(before.held_out, after.held_out, after.blocks)
+
+
+def compare_residuals(before: Array, after: Array, blocks: NDArray[np.int64]) -> ScoreComparison:
+    """Compare whitened residuals (rows,) of two models on data to which neither was fitted, block by block.
+
+    Args:
+        blocks: (rows,) block of each.
+    """
+    a, b = block_errors(before, blocks), block_errors(after, blocks)
     count = len(a)
     logs = np.log(a / b)
     even = logs.mean() / (logs.std(ddof=1) / np.sqrt(count) + 1e-9)
     ratio = a.sum() / b.sum()
     # r1^2 - r2^2 = d^2 + 2 d r2 with d = r1 - r2: the effect makes d what it is in a block, only r2 is left to chance.
-    chance = np.bincount(after.blocks, 2.0 * (before.held_out - after.held_out) * after.held_out, count)
+    chance = np.bincount(blocks, 2.0 * (before - after) * after, count)
     # What one block alone says is no law: the block that gains most does not count.
     others = np.arange(count) != int(np.argmax(np.abs(a - b)))
     fixed = float(np.sum((a - b)[others])) / (float(np.linalg.norm(chance[others])) + 1e-9 * float(b.sum()))
     t = max(even, fixed) if ratio > 1.0 else min(even, fixed)
     return ScoreComparison(float(1.0 - b.sum() / a.sum()), float(t))
+
+
+def block_errors(residual: Array, blocks: NDArray[np.int64]) -> Array:
+    """Return the squared error (blocks,) of residuals (rows,); of none is it zero."""
+    errors = np.bincount(blocks, residual**2)
+    return np.asarray(np.maximum(errors, 1e-12 * float(errors.sum()) + 1e-300))

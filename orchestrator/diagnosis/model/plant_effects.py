@@ -52,7 +52,7 @@ def _candidate(plant: Plant, row: Effect, scales: SignalScales, channels: Sequen
     fitted = tuple(n for n, name in enumerate(names) if name in steps)
     at = {name: n for n, name in enumerate(names)}
     sizes = amplitudes or (row.size,)
-    timing = tuple(other.label for other in plant.bank if other.kind == "timing" and other.label != row.label)
+    late_drive = tuple(other.label for other in plant.bank if _delays_drive(other) and other is not row)
     simpler = f"{row.contains}@{row.site}" if row.contains else ""
     grown = tuple(other.label for other in plant.bank if other.contains == row.name and other.site == row.site)
     return CandidateEffect(
@@ -63,9 +63,14 @@ def _candidate(plant: Plant, row: Effect, scales: SignalScales, channels: Sequen
         upper=tuple(high for _, high in bounds),
         positive=() if row.signed or row.phase else tuple(at[name] for name in amplitudes),
         prior={at[name]: prior for name, prior in priors.items()}, wave=wave, contains=(simpler,) if simpler else (),
-        excludes=(timing if row.kind == "timing" and not row.both_encoders else ()) + grown,
+        excludes=(late_drive if _delays_drive(row) else ()) + grown,
         takes_drive=row.takes_drive, of_log=row.measurement,
     )  # fmt: skip
+
+
+def _delays_drive(row: Effect) -> bool:
+    """Tell whether an effect makes the drive's torque late: of these a record shows one at most."""
+    return row.kind == "timing" and not row.both_encoders
 
 
 def _coordinates(row: Effect) -> tuple[str, ...]:

@@ -67,7 +67,7 @@ def block_values(
     Returns:
         Short name -> (blocks,).
     """
-    effect, count = problem.effects[label], len(fitted.block_errors)
+    effect, count = problem.effects[label], len(fitted.block_shifts)
     places = [(n, one[1]) for n, one in enumerate(fitted.coordinates) if not isinstance(one, int) and one[0] == label]
     rows = []
     for shift in fitted.block_shifts:

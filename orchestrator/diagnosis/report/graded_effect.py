@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.inference.fitting import ScoreComparison, fit_model
 from orchestrator.diagnosis.model.interface import ModelPoint, Values
 from orchestrator.diagnosis.report.estimates import block_values, effect_estimates
 from orchestrator.diagnosis.result import GradedEffect, TestMisfit
@@ -68,23 +68,29 @@ def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: 
     return tuple(map(shared, effects))
 
 
-def motion_shares(
-    found: SearchResult, test: Sequence[TestMisfit], missed: Callable[[ModelPoint], float]
-) -> dict[str, float]:
-    """Return the share of the misfit on test data that comes back when one effect is left out and the rest re-fitted.
+def add_test_evidence(
+    evidence: Sequence[EffectEvidence], found: SearchResult, test: Sequence[TestMisfit],
+    missed: Callable[[ModelPoint], float],
+    compared: Callable[[ModelPoint], ScoreComparison | None] = lambda point: None,
+) -> list[EffectEvidence]:  # fmt: skip
+    """Return the evidence with what test data say of each effect of the final model: how the rest, re-fitted, does.
 
     Args:
+        evidence: of effects; those that the final model lacks stay as they are.
         found: by the search.
         test: misfits of the final model.
         missed: a model -> what its runs miss of the test data, in squares and in units of the noise.
-
-    Returns:
-        Label of each effect -> one minus final over without; nan where runs of the final model go astray.
+        compared: a model -> how much less the final one leaves of the torque of test data.
     """
-    final, shares = sum((one.final / one.noise) ** 2 for record in test for one in record.signals), {}
-    for label in found.final.labels:
-        left_out = missed(fit_model(found.problem, found.final.point.without_effects([label]), 3).point)
-        astray = not math.isfinite(left_out)  # which the final model is not: the effect explains all of it
-        share = 1.0 if astray else 1.0 - final / max(left_out, 1e-300)
-        shares[label] = share if math.isfinite(final) else math.nan
-    return shares
+    final = sum((one.final / one.noise) ** 2 for record in test for one in record.signals)
+
+    def tested(one: EffectEvidence) -> EffectEvidence:
+        if one.label not in found.final.labels:
+            return one
+        without = fit_model(found.problem, found.final.point.without_effects([one.label]), 3).point
+        misses = missed(without)
+        astray = not math.isfinite(misses)  # which the final model is not: the effect explains all of it
+        share = 1.0 if astray else 1.0 - final / max(misses, 1e-300)
+        return replace(one, motion_share=share if math.isfinite(final) else math.nan, test_torque=compared(without))
+
+    return list(map(tested, evidence))

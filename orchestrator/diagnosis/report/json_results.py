@@ -111,8 +111,11 @@ def effect_found(effect: GradedEffect) -> EffectFound:
     evidence = effect.evidence
     return EffectFound(
         effect.name, effect.site, effect.grade.word, _values(effect.parameters),
-        ExplainedFound(_finite(evidence.share), _finite(effect.evidence.motion_share)), _finite(evidence.gain),
-        _finite(evidence.t), evidence.family, effect.lowered_by,
+        ExplainedFound(
+            _finite(evidence.share), _finite(evidence.motion_share),
+            None if evidence.test_torque is None else _finite(evidence.test_torque.gain),
+        ),
+        _finite(evidence.gain), _finite(evidence.t), evidence.family, effect.lowered_by,
         {name: tuple(map(_finite, values)) for name, values in effect.block_values.items()}, effect.in_model,
     )  # fmt: skip
 

@@ -202,9 +202,13 @@ def test_words(effect: GradedEffect) -> str:
     Returns:
         The words.
     """
-    share = effect.evidence.motion_share
+    share, torque = effect.evidence.motion_share, effect.evidence.test_torque
     if not math.isfinite(share):
         return ""
+    foretold = torque is not None and torque.gain > share and torque.gain > 0.0
+    if foretold:
+        assert torque is not None
+        return f"; on test data it takes {percent(torque.gain)} of the torque that is left without it"
     if share < 0.0:
         return "; without it the test data are predicted better"
     if share == 1.0:

@@ -1,12 +1,14 @@
 """How the models do on test data: the motion of free runs, and the torque that they leave."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
+from orchestrator.diagnosis.inference.fitting import ScoreComparison, compare_residuals
+from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.model.units import in_metres
@@ -90,3 +92,37 @@ def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> 
         return sum(float(np.sum(one**2)) for one in misfits)
 
     return missed
+
+
+def torque_comparison(
+    workings: Workings, test: Sequence[TestMisfit], model: Model, settings: DiagnosisSettings
+) -> Callable[[ModelPoint], ScoreComparison | None]:
+    """Return what compares models with the final one by the whitened torque that they leave of test data.
+
+    Args:
+        test: misfits; what lies still is left out.
+
+    Returns:
+        A model's values -> how much less the final one leaves; None: the test part is too short to tell.
+    """
+    parts = [
+        record.part(first, record.size)
+        for (record, first), misfit in zip(open_test_data(workings.test_data), test, strict=True)
+        if record.size - first >= LEAST_TORQUE_ROWS and not misfit.still
+    ]
+    if not parts:
+        return lambda point: None
+    found = workings.search
+    problem = fit_problem([balance_of(part, model, settings) for part in parts], settings.fit)
+
+    def seen(point: ModelPoint) -> ModelPoint:
+        count = len(problem.shared)
+        return ModelPoint((*point.parameters[:count], *problem.start.parameters[count:]), point.effects)
+
+    problem = problem.reweighted(seen(found.final.point))
+    (final,) = problem.whitened([seen(found.final.point)])
+
+    def compared(point: ModelPoint) -> ScoreComparison:
+        return compare_residuals(problem.whitened([seen(point)])[0], final, problem.blocks)
+
+    return compared

@@ -9,7 +9,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.inference.fitting import FittedModel, compare, fit_model
+from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, compare, fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint
@@ -78,6 +78,7 @@ class EffectEvidence:
         foreign_family: one of them is of another kind.
         possible: a machine can have such values.
         motion_share: share of the misfit of free runs on test data that comes back without it; nan: not run.
+        test_torque: the same of what the torque balance leaves of test data, block by block; None: not worked out.
     """
 
     label: str
@@ -90,6 +91,7 @@ class EffectEvidence:
     foreign_family: bool
     possible: bool
     motion_share: float = np.nan
+    test_torque: ScoreComparison | None = None
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,12 @@ def _explains_enough(effect: EffectEvidence, s: GradeSettings) -> bool:
 def _explains_much(effect: EffectEvidence, s: GradeSettings) -> bool:
     alone = effect.kind not in FOLLOWING and effect.share > 0.0 and effect.gain > s.most_gain
     return effect.share >= s.certain_share or alone
+
+
+def _foretells_torque(effect: EffectEvidence, s: DiagnosisSettings) -> bool:
+    """Tell whether the torque of test data asks for an effect: it does not drift, as free runs do."""
+    test = effect.test_torque
+    return test is not None and test.t >= s.selection.least_t and test.gain >= s.grades.confirmed_share
 
 
 GRADE_RULES: tuple[GradeRule, ...] = (
@@ -177,12 +185,14 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "no machine has such values, or the record does not determine them",
     ),
     GradeRule(
-        "confirmed", Grade.LIKELY, lambda e, r, s: e.motion_share >= s.grades.confirmed_share,
-        "share of the motion's misfit on test data", "grades.confirmed_share",
+        "confirmed", Grade.LIKELY,
+        lambda e, r, s: e.motion_share >= s.grades.confirmed_share or _foretells_torque(e, s),
+        "share of the motion's misfit, or of the torque's, on test data", "grades.confirmed_share",
         "test data do not confirm it: what stands for another law fits a record and predicts nothing",
     ),
     GradeRule(
-        "not refuted", Grade.POSSIBLE, lambda e, r, s: not e.motion_share < -s.grades.refuted_share,
+        "not refuted", Grade.POSSIBLE,
+        lambda e, r, s: not e.motion_share < -s.grades.refuted_share or _foretells_torque(e, s),
         "share of the motion's misfit on test data", "grades.refuted_share",
         "test data are predicted better without it",
     ),
@@ -374,8 +384,6 @@ def recorded_inertia(problem: FitProblem, fitted: FittedModel) -> tuple[float, f
             continue
         weights[n] = share
         total += share * free.point.parameters[n] / problem.shared[n].nominal
-    off = free.block_shifts @ weights
-    count = len(off)
-    variance = (count - 1) / count * float(np.sum((off - off.mean()) ** 2))
+    variance = max(float(weights @ covariance @ weights) for covariance in (free.jackknife, free.covariance))
     spread = max((entry.spread for entry in problem.shared if entry.name in shares), default=0.0)
-    return total, float(np.sqrt(max(variance, float(weights @ free.covariance @ weights)))), spread
+    return total, float(np.sqrt(variance)), spread

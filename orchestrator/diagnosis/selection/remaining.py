@@ -12,7 +12,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.inference.fitting import ScoreComparison
+from orchestrator.diagnosis.inference.fitting import (
+    ScoreComparison,
+    compare_residuals,
+    jackknife_covariance,
+    leave_blocks_out,
+)
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import LawArgument
 from orchestrator.diagnosis.selection.search import SearchResult
@@ -129,21 +134,20 @@ def _fit_curve(found: SearchResult, argument: LawArgument) -> Dependence | None:
     gradient = whole.T @ final.residual + np.concatenate([slopes * prior, np.zeros(knots.size)])
     inverse = np.linalg.pinv(normal + penalty, hermitian=True)
     step = -inverse @ gradient
-    errors, shifts = _block_errors(problem, final.residual, whole, normal + penalty, gradient)
-    base, _ = _block_errors(
-        problem, final.residual, whole[:, : len(own)], (normal + penalty)[: len(own), : len(own)], gradient[: len(own)]
+    after, shifts = leave_blocks_out(final.residual, whole, normal + penalty, gradient, problem.blocks)
+    count = len(own)
+    before, _ = leave_blocks_out(
+        final.residual, whole[:, :count], (normal + penalty)[:count, :count], gradient[:count], problem.blocks
     )
-    values = step[len(own) :]
-    count = len(errors)
-    spread = (count - 1) / count * np.sum((shifts - shifts.mean(axis=0)) ** 2, axis=0)[len(own) :]
-    deviations = np.sqrt(np.maximum(np.diag(inverse)[len(own) :], spread))
+    values = step[count:]
+    deviations = np.sqrt(np.maximum(np.diag(inverse), np.diag(jackknife_covariance(shifts)))[count:])
     changes = {problem.parameters[n].name: float(step[place]) for place, n in enumerate(own)}
     left = final.residual + whole @ step
     share = 1.0 - float(left @ left) / float(final.residual @ final.residual)
     return Dependence(
         argument.name, argument.site, argument.unit, argument.torque_unit, tuple(knots.tolist()),
-        tuple(values.tolist()), tuple(deviations.tolist()), _compared(base, errors), max(share, 0.0),
-        formula_of(knots, values, deviations), changes, argument.code,
+        tuple(values.tolist()), tuple(deviations.tolist()), compare_residuals(before, after, problem.blocks),
+        max(share, 0.0), formula_of(knots, values, deviations), changes, argument.code,
     )  # fmt: skip
 
 
@@ -157,28 +161,6 @@ def _whitened_hats(problem: FitProblem, argument: LawArgument, knots: Array) -> 
         ]
         columns.append(np.concatenate(parts))
     return np.column_stack(columns)
-
-
-def _block_errors(
-    problem: FitProblem, residual: Array, columns: Array, normal: Array, gradient: Array
-) -> tuple[Array, Array]:
-    """Return (blocks,) squared errors of blocks left out after one linear step, and how the values move."""
-    errors, shifts = [], []
-    for block in range(problem.block_count):
-        rows = problem.blocks == block
-        part = columns[rows]
-        ridge = 1e-10 * np.diag(np.diag(normal))
-        step = -np.linalg.solve(normal - part.T @ part + ridge, gradient - part.T @ residual[rows])
-        left = residual[rows] + part @ step
-        errors.append(float(left @ left))
-        shifts.append(step)
-    return np.maximum(errors, 1e-300), np.array(shifts)
-
-
-def _compared(before: Array, after: Array) -> ScoreComparison:
-    logs = np.log(before / after)
-    t = float(logs.mean() / (logs.std(ddof=1) / np.sqrt(len(logs)) + 1e-9))
-    return ScoreComparison(float(1.0 - after.sum() / before.sum()), t)
 
 
 def simple_terms(s: Array) -> dict[str, Array]:

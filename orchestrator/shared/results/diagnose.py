@@ -27,10 +27,11 @@ class ParameterFound(msgspec.Struct, frozen=True):
 
 
 class ExplainedFound(msgspec.Struct, frozen=True):
-    """Shares that an effect explains: of the missing torque, and of the motion's misfit on test data."""
+    """Shares that an effect explains: of the missing torque, of the motion's misfit and of the torque on test data."""
 
     torque: float | None = None
     motion: float | None = None
+    test_torque: float | None = None
 
 
 class EffectFound(msgspec.Struct, frozen=True):
