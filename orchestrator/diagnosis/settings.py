@@ -68,8 +68,6 @@ class SelectionSettings(Settings, frozen=True):
 
     least_t: Annotated[float, setting("paired standard errors by which a gain must differ from zero")] = 2.5
     least_gain: Annotated[float, share("of the squared error that an effect must take")] = 0.01
-    family_t: Annotated[float, setting("paired errors below which two effects are not told apart")] = 2.0
-    family_gain: Annotated[float, share("of the best effect's gain that one of its family has at least")] = 0.5
     refined: Annotated[int, setting("effects that are fitted in full after screening", ge=1)] = 6
     look_ahead: Annotated[int, setting("first effects that are tried with a second: two may hide each other", ge=0)] = 3
     certain_alone: Annotated[float, share("gain from which no second effect is looked for at once")] = 0.9

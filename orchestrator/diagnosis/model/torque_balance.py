@@ -149,9 +149,11 @@ class TorqueBalance(ResidualModel):
         """
         p = self.nominal.copy()
         p[self._places] = point.parameters[: len(self._places)]
-        for label, values in point.effects.items():
-            for name, value in effect_parameters(self.plant, self.effects[label], values).items():
-                p[self.plant.index(name)] = value
+        given: dict[str, float] = {}
+        for label, values in point.effects.items():  # the first effect that has a parameter sets it
+            given = {**effect_parameters(self.plant, self.effects[label], values), **given}
+        for name, value in given.items():
+            p[self.plant.index(name)] = value
         return p
 
     def physical_values(self, point: ModelPoint) -> Array:

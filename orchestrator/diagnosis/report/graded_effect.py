@@ -45,7 +45,7 @@ def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: 
 
     Args:
         effects: as each was fitted.
-        labels: of those that the model has; the last one that has a parameter sets it.
+        labels: of those that the model has; the first one that has a parameter sets it.
         plant: the plant.
 
     Returns:
@@ -53,7 +53,7 @@ def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: 
     """
     rows = {row.label: row.parameters for row in plant.bank}
     fitted = {one.label: one for one in effects}
-    setter = {full: (fitted[label], short) for label in labels for short, full in rows[label].items()}
+    setter = {full: (fitted[label], short) for label in reversed(labels) for short, full in rows[label].items()}
 
     def shared(effect: GradedEffect) -> GradedEffect:
         if not effect.in_model:

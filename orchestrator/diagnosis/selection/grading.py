@@ -9,7 +9,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, compare, fit_model
+from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint
@@ -276,20 +276,22 @@ def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
     Returns:
         The evidence, without what test data say.
     """
-    problem, final = found.problem, found.final
+    problem, final, review = found.problem, found.final, found.reviews[label]
     effect = problem.effects[label]
-    base = missing_torque(problem, found.base.point)
-    without = fit_model(problem, final.point.without_effects([label]), 3)
-    leaving = compare(without, final)
-    share = (missing_torque(problem, without.point) - missing_torque(problem, final.point)) / base
-    step = next(step for step in found.steps if step.taken == label)
-    entry = step.entry
+    step = next((step for step in found.steps if step.taken == label), review)
+    leaving, entry = review.entry, step.entry
+    assert leaving is not None
     assert entry is not None
-    at_entry = (missing_torque(problem, step.before.point) - missing_torque(problem, entry.fitted.point)) / base
-    kinds = {problem.effects[other].kind for other in step.family}
+    base = missing_torque(problem, found.base.point)
+    shares = [
+        (missing_torque(problem, before.point) - missing_torque(problem, after.point)) / base
+        for before, after in ((review.before, final), (step.before, entry.fitted))
+    ]
+    kinds = {problem.effects[other].kind for other in review.family}
     return EffectEvidence(
-        label, effect.kind, max(leaving.t, entry.comparison.t), max(leaving.gain, entry.comparison.gain),
-        float(max(share, at_entry)), size_over_error(problem, final, label), step.family, bool(kinds - {effect.kind}),
+        label, effect.kind, max(leaving.comparison.t, entry.comparison.t),
+        max(leaving.comparison.gain, entry.comparison.gain), float(max(shares)),
+        size_over_error(problem, final, label), review.family, bool(kinds - {effect.kind}),
         problem.is_possible(label, final.point.effects[label]),
     )  # fmt: skip
 

@@ -5,7 +5,7 @@ than the settings ask for. Effects that are not told apart from it, block by blo
 the one with the fewest values enters. Then each earlier effect that no longer pays is taken out.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -62,6 +62,7 @@ class SearchResult:
         base: the model with re-fitted parameters alone, as the problem of its own time had it.
         final: the final model.
         steps: of the search.
+        reviews: label -> the step that it makes in the final model, with the family that it has there.
         refused: labels that entered once and did not pay in the end.
         complete: False when time ran out.
     """
@@ -70,6 +71,7 @@ class SearchResult:
     base: FittedModel
     final: FittedModel
     steps: tuple[SearchStep, ...] = ()
+    reviews: Mapping[str, SearchStep] = field(default_factory=dict)
     refused: frozenset[str] = field(default_factory=frozenset)
     complete: bool = True
 
@@ -175,7 +177,8 @@ class _Search:
             if len(found.final.labels) >= most:
                 break
             if self.out_of_time():
-                return replace(found, complete=False)
+                found = replace(found, complete=False)
+                break
             problem, step = self._step(found, number == 0)
             found = replace(found, steps=(*found.steps, step))
             if step.entry is None:
@@ -184,28 +187,23 @@ class _Search:
             gone = set(step.entry.fitted.labels) - set(pruned.labels)
             problem, final = settle_anew(problem, pruned)
             found = replace(found, problem=problem, final=final, refused=found.refused | gone)
-        return self._simplified(found)
+        return self._reviewed(found)
 
-    def _simplified(self, found: SearchResult) -> SearchResult:
-        """Return the result with simpler effects in place of those that stand for them and gain nothing over them.
+    def _reviewed(self, found: SearchResult) -> SearchResult:
+        """Return the result with the family of each effect as the final model has it, and its simplest one in place.
 
-        What one effect needs more values for while a second is missing, a simpler one may do beside that.
+        While others were missing, an effect may have stood for part of them, or have looked different from its like.
         """
         for label in found.final.labels:
-            for simpler in found.problem.effects[label].contains:
-                problem, model = found.problem, found.final
-                without = fit_model(problem, model.point.without_effects([label]), 3)
-                screened = Screening(problem, without, self.settings).screen([problem.effects[simpler]])
-                if not screened:
-                    continue
-                fitted = fit_model(problem, screened_point(without, screened[0]))
-                if self._gains(compare(fitted, model)):
-                    continue
-                pair = ((simpler, fitted), (label, model))
-                tried = tuple(TriedEffect(name, compare(without, one), one) for name, one in pair)
-                steps = (*found.steps, SearchStep(without, tried, simpler, (label,)))
-                found = replace(found, final=fitted, steps=steps)
-                break
+            problem, model = found.problem, found.final
+            without = fit_model(problem, model.point.without_effects([label]), 3)
+            reviewed = TriedEffect(label, compare(without, model), model)
+            tried = self._tried(problem, without, frozenset((label,)), self.settings.refined)
+            step = self._simplest(problem, without, reviewed, (reviewed, *tried))
+            found = replace(found, reviews={**found.reviews, step.taken: step})
+            if step.taken != label:
+                assert step.entry is not None
+                found = replace(found, final=step.entry.fitted, steps=(*found.steps, step))
         return found
 
     def _step(self, found: SearchResult, first: bool) -> tuple[FitProblem, SearchStep]:
@@ -290,7 +288,13 @@ class _Search:
         best = fair[0]
         if first and len(fair) > 1 and best.comparison.gain < self.settings.certain_alone:
             best = self._best_with_second(problem, fair[: self.settings.look_ahead], refused) or best
-        family = [one for one in fair if one is best or self._is_alike(best, one)]
+        return self._simplest(problem, model, best, tried)
+
+    def _simplest(
+        self, problem: FitProblem, model: FittedModel, best: TriedEffect, tried: Sequence[TriedEffect]
+    ) -> SearchStep:
+        """Return the step with the simplest of the effects over which the best one gains nothing."""
+        family = [one for one in tried if one is best or self._is_alike(problem, model, best, one)]
         chosen = min(family, key=lambda one: (problem.effects[one.label].law_values, -one.comparison.gain))
         return SearchStep(model, tuple(tried), chosen.label, tuple(one.label for one in family if one is not chosen))
 
@@ -333,9 +337,8 @@ class _Search:
             scores.append(min([one.fitted.score, *pays]))
         return fair[int(np.argmin(scores))]
 
-    def _is_alike(self, best: TriedEffect, other: TriedEffect) -> bool:
-        near = compare(other.fitted, best.fitted).t < self.settings.family_t
-        return near and other.comparison.gain > self.settings.family_gain * best.comparison.gain
+    def _is_alike(self, problem: FitProblem, model: FittedModel, best: TriedEffect, other: TriedEffect) -> bool:
+        return self._pays(problem, model, other) and not self._gains(compare(other.fitted, best.fitted))
 
     def _pruned(self, problem: FitProblem, model: FittedModel) -> FittedModel:
         """Return the model without earlier effects that no longer pay, or that the last one stands for."""
