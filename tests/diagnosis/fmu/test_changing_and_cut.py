@@ -76,7 +76,6 @@ def test_a_gap_between_two_fmus_is_named_and_delivered(tmp_path):
     assert results["delivery"][0]["difference_over_noise"] < 0.1
 
 
-@pytest.mark.xfail(reason="it is taken for a gain of the torque, see the limits in docs/any-fmu.md")
 def test_a_compliance_between_two_fmus_is_named(tmp_path):
     loop, map_path = write_scenario(tmp_path)
     found = oc.diagnose(coupled_record(tmp_path / "r.csv", np.random.default_rng(3), 600, soft=0.0015), loop, map_path)
