@@ -111,7 +111,7 @@ def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, by
         constants=translated.constants,
         prototypes=translated.prototypes,
         definitions=translated.definitions,
-        tables=translated.tables + (f"\n\n{count_table(cls)}" if fmi == 3 else ""),
+        tables=translated.tables + (f"\n\n{count_tables(cls)}" if fmi == 3 else ""),
     )
     needed = [name for name in (*HEADERS, *_OF_VERSION[fmi]) if _is_needed(name, cls, translated.types)]
     headers = {name: (RUNTIME / name).read_bytes() for name in needed}
@@ -124,16 +124,26 @@ def _is_needed(header: str, cls: Any, types: str) -> bool:
     return header != "pairs.h" or '"pairs.h"' in types
 
 
-def count_table(cls: Any) -> str:
-    """Return the C table of how many values there are at each value reference, and where event indicators stand."""
-    counts = [0] * len(cls.table)
+def count_tables(cls: Any) -> str:
+    """Return the C tables that ``fmi3_slave.h`` asks for, and where event indicators stand."""
+    counts, scalars = [0] * len(cls.table), [0] * len(cls.table)
     indicators = ""
     for array in arrays(cls.table):
         counts[array.first] = len(array.variables)
         if array.name == INDICATOR:
             indicators = f"\n#define FIRST_INDICATOR {array.first}"
-    numbers = textwrap.fill(", ".join(map(str, counts)), 110, initial_indent="    ", subsequent_indent="    ")
-    return f"static const unsigned short counts[] = {{\n{numbers}}};{indicators}"
+        first = array.variables[0]
+        if len(array.variables) == 1 and first.type == "Real":
+            scalars[array.first] = _SCALARS.get(first.causality, 0)
+    return _numbers("unsigned short counts", counts) + "\n" + _numbers("unsigned char scalars", scalars) + indicators
+
+
+_SCALARS = {"output": 1, "input": 1 | 2, "parameter": 1 | 4}
+
+
+def _numbers(declared: str, values: list[int]) -> str:
+    lines = textwrap.fill(", ".join(map(str, values)), 110, initial_indent="    ", subsequent_indent="    ")
+    return f"static const {declared}[] = {{\n{lines}}};"
 
 
 def indicator_count(source: bytes) -> int:

@@ -18,7 +18,7 @@ from orchestrator.building.fmi3_description import fmi3_description
 from orchestrator.building.fmi3_files import terminals_and_icons
 from orchestrator.building.launcher import NATIVE, Toolchain, compile_host, find_toolchain
 from orchestrator.building.native_description import native_description
-from orchestrator.building.native_sources import OF_FMI3, RUNTIME, count_table, indicator_total, slave_class
+from orchestrator.building.native_sources import OF_FMI3, RUNTIME, count_tables, indicator_total, slave_class
 from orchestrator.building.reference_files import reference_files
 from orchestrator.building.sources import DATA_FILES, Recipe, catalogue, closure, digest, fingerprint, recipe_of
 from orchestrator.building.stamping import content_guid, final_text, stamp
@@ -149,5 +149,5 @@ def _source(cls: Any, package: str, token: str) -> bytes:
         feedthrough=int(cls.feedthrough),
         token=token,
         settings="\n".join(settings),
-        tables=f"{variable_table(cls)}\n\n{count_table(cls)}",
+        tables=f"{variable_table(cls)}\n\n{count_tables(cls)}",
     ).encode()

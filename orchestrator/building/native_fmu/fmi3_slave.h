@@ -1,8 +1,11 @@
 /* FMI 3.0 around a slave: its calls, in terms of slave_core.h. The file that includes it defines `counts` too: how many
- * values there are at each value reference, 0 for the elements of an array behind its first. */
+ * values there are at each value reference, 0 for the elements of an array behind its first; and `scalars`: for each that
+ * is a single Float64 READABLE unless it is a local variable, and IS_INPUT or IS_PARAMETER. */
 
 #include "fmi3_types.h"
 #include "slave_core.h"
+
+enum { READABLE = 1, IS_INPUT = 2, IS_PARAMETER = 4 };
 
 #define TIME VARIABLES /* value reference of the independent variable */
 
@@ -172,8 +175,14 @@ static Status set_reals(Instance *s, const Reference r[], size_t n, const double
     return s->worst;
 }
 
-/* Most variables are scalars: they are taken by themselves, what is left by the other half of each function. */
-#define IS_SCALAR(r) (HAS(r, REAL_VALUE) && counts[r] == 1)
+/* Most variables are scalars that `scalars` knows: they are taken by themselves, what is left by the other half of each
+ * function. */
+#define IS_SCALAR(r, kinds) ((r) < VARIABLES && (scalars[r] & (kinds)))
+
+static inline bool within_limits(Reference r, double value)
+{
+    return variables[r].low <= value && value <= variables[r].high;
+}
 
 EXPORT Status FMI(fmi3GetFloat64)(Component c, const Reference r[], size_t n, double v[], size_t total)
 {
@@ -183,7 +192,7 @@ EXPORT Status FMI(fmi3GetFloat64)(Component c, const Reference r[], size_t n, do
     fault.kind = NO_FAULT;
     recompute(s, &fault);
     if (n == total)
-        for (; k < n && IS_SCALAR(r[k]) && variables[r[k]].causality != LOCAL; k++)
+        for (; k < n && IS_SCALAR(r[k], READABLE); k++)
             v[k] = s->slave.real[r[k]];
     if (fault.kind)
         say_fault(s, &fault);
@@ -194,10 +203,11 @@ EXPORT Status FMI(fmi3SetFloat64)(Component c, const Reference r[], size_t n, co
 {
     size_t k = 0;
     ENTER(fmi3SetFloat64, VALUES_GIVEN)
+    const int kinds = s->course.phase < STEPPING ? IS_INPUT | IS_PARAMETER : s->course.phase == STEPPING ? IS_INPUT : 0;
     s->fresh = false;
     if (n == total)
-        for (; k < n && IS_SCALAR(r[k]) && settable(s, r[k]); k++)
-            set_real(s, r[k], v[k]);
+        for (; k < n && IS_SCALAR(r[k], kinds) && within_limits(r[k], v[k]); k++)
+            s->slave.real[r[k]] = v[k];
     return k == total ? s->worst : set_reals(s, r, n, v, total, k);
 }
 
