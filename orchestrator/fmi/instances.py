@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.errors import FmuError
 from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.fmi.slave2 import Fmu2Slave
 from orchestrator.fmi.slave3 import Fmu3Slave
-from orchestrator.master.system import Instance, Start
+from orchestrator.master.protocol import Value
+from orchestrator.master.system import Instance, Quantity, Start
+from orchestrator.master.values import typed_value
 
 
 def make_slave(name: str, path: Path, description: FmuDescription | None = None) -> FmuSlave:
@@ -34,5 +37,39 @@ def fmu_instance(
     name: str, path: Path, start: Start | None = None, solver_tolerance: float | None = None, events: bool = False
 ) -> Instance:
     """Return an instance of the FMU at ``path``, with parameters and start values by variable name."""
+    description, rest = read_configured(path, start or {}, events)
+    return Instance(name, description.model, FmuFactory(path, description), rest, solver_tolerance)
+
+
+def read_configured(path: Path, start: Start, events: bool) -> tuple[FmuDescription, Start]:
+    """Return the description of an FMU with values of its structural parameters, and the other start values."""
     description = read_description(path, events)
-    return Instance(name, description.model, FmuFactory(path, description), start or {}, solver_tolerance)
+    given: dict[str, Value] = {}
+    for name in description.structural.intersection(start):
+        raw = start[name]
+        value, text = (
+            (None, "must be without a unit, but has one")
+            if isinstance(raw, Quantity)
+            else typed_value(description.model.variables[name], raw)
+        )
+        if value is None:
+            raise FmuError(f"its structural parameter {name} {text}")
+        given[name] = value
+    if not given:
+        return description, start
+    description = read_description(path, events, given)
+    rest = {name: value for name, value in start.items() if name not in given}
+    _require_whole_arrays(description, rest)
+    return description, rest
+
+
+def _require_whole_arrays(description: FmuDescription, start: Start) -> None:
+    """Refuse values for some elements of a parameter of another size than that of its start values."""
+    parameters = {n for n in description.resized if description.model.variables[n].causality == "parameter"}
+    begun = {description.access[name].reference for name in parameters.intersection(start)}
+    for name in sorted(parameters.difference(start)):
+        if description.access[name].reference in begun:
+            text = (
+                "must have a value, for its array has another size than its start values and has others, but has none"
+            )
+            raise FmuError(f"its parameter {name} {text}")

@@ -13,7 +13,7 @@ from orchestrator.errors import FmuError
 from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, UnusableError, clock_names, read_clocks
-from orchestrator.master.protocol import ModelInterface, Unit, Variable
+from orchestrator.master.protocol import ModelInterface, Unit, Value, Variable
 
 MAXIMUM_XML = 64 * 2**20
 """Bytes of XML beyond which a model description is refused: ten times the largest seen in the wild."""
@@ -35,6 +35,9 @@ class FmuDescription:
         once: only one instance per process is allowed.
         access: where the value of each variable is, by its name.
         events: what event mode needs to know.
+        structural: names of the structural parameters.
+        configured: values that these are given before an instance is initialised, where they are not the FMU's own.
+        resized: names of the elements of arrays that have no start value, for that is for another size.
         left_out: what of the FMU is not there for the master, in words; empty for nothing.
     """
 
@@ -46,12 +49,21 @@ class FmuDescription:
     once: bool
     access: Mapping[str, Access]
     events: EventFeatures = field(default_factory=EventFeatures)
+    structural: frozenset[str] = frozenset()
+    configured: Mapping[str, Value] = field(default_factory=dict)
+    resized: frozenset[str] = frozenset()
     left_out: str = ""
 
 
-def read_description(path: Path, events: bool = True) -> FmuDescription:
-    """Read the model description of the FMU at ``path``, a file or the folder of an unpacked one."""
-    description = _read_unpacked(path) if path.is_dir() else _read_archive(path)
+def read_description(path: Path, events: bool = True, configured: Mapping[str, Value] | None = None) -> FmuDescription:
+    """Read the model description of the FMU at ``path``, a file or the folder of an unpacked one.
+
+    Args:
+        events: event mode is used where the FMU has it.
+        configured: values of structural parameters, which are set in configuration mode.
+    """
+    content, python = _read_unpacked(path) if path.is_dir() else _read_archive(path)
+    description = parse_description(content, str(path), python, configured)
     if events or not description.model.has_events:
         return description
     if clocks := [*description.model.clocks, *description.events.timed]:
@@ -62,7 +74,8 @@ def read_description(path: Path, events: bool = True) -> FmuDescription:
     return replace(description, model=model, events=EventFeatures())
 
 
-def _read_archive(path: Path) -> FmuDescription:
+def _read_archive(path: Path) -> tuple[bytes, bool]:
+    """Return the model description's content, and whether the FMU runs Python."""
     try:
         with zipfile.ZipFile(path) as archive:
             info = archive.getinfo("modelDescription.xml")
@@ -78,7 +91,7 @@ def _read_archive(path: Path) -> FmuDescription:
         raise FmuError(f"`fmu` must be a readable zip archive, but {path} is not: {error}") from None
     except Exception as error:  # zlib.error and what else a damaged archive makes zipfile raise
         raise FmuError(f"`fmu` must be an intact zip archive, but {path} is not: {error}") from None
-    return parse_description(content, str(path), python=_runs_python(names))
+    return content, _runs_python(names)
 
 
 def _runs_python(names: Iterable[str]) -> bool:
@@ -86,7 +99,7 @@ def _runs_python(names: Iterable[str]) -> bool:
     return any(re.fullmatch(r"resources/(slavemodule\.txt|[^/]*/fmi3_bridge\.py)", name) for name in names)
 
 
-def _read_unpacked(folder: Path) -> FmuDescription:
+def _read_unpacked(folder: Path) -> tuple[bytes, bool]:
     file = folder / "modelDescription.xml"
     try:
         if file.stat().st_size > MAXIMUM_XML:
@@ -96,12 +109,13 @@ def _read_unpacked(folder: Path) -> FmuDescription:
         raise FmuError(f"`fmu` must hold a modelDescription.xml, but {folder} does not: {error.strerror}") from None
     resources = folder / "resources"
     files = [*resources.glob("slavemodule.txt"), *resources.glob("*/fmi3_bridge.py")]
-    python = _runs_python(file.relative_to(folder).as_posix() for file in files)
-    return parse_description(content, str(folder), python)
+    return content, _runs_python(file.relative_to(folder).as_posix() for file in files)
 
 
-def parse_description(content: bytes, origin: str, python: bool = False) -> FmuDescription:
-    """Parse a model description."""
+def parse_description(
+    content: bytes, origin: str, python: bool = False, configured: Mapping[str, Value] | None = None
+) -> FmuDescription:
+    """Parse a model description; see ``read_description``."""
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
         root = etree.fromstring(content, parser)
@@ -116,7 +130,9 @@ def parse_description(content: bytes, origin: str, python: bool = False) -> FmuD
         alone = f": it is for {has} alone" if has else ""
         raise FmuError(f"{origin}: must be an FMU for co-simulation, but has no CoSimulation element{alone}")
     try:
-        return (_description2 if version == "2.0" else _description3)(root, cosimulation, python)
+        if version == "2.0":
+            return _description2(root, cosimulation, python)
+        return _description3(root, cosimulation, python, configured or {})
     except UnusableError as error:
         raise FmuError(f"{origin}: {error}") from None
     except (KeyError, ValueError, IndexError, TypeError) as error:
@@ -145,8 +161,10 @@ def _description2(root: etree._Element, cosimulation: etree._Element, python: bo
     )
 
 
-def _description3(root: etree._Element, cosimulation: etree._Element, python: bool) -> FmuDescription:
-    found = variables3.read_variables(root)
+def _description3(
+    root: etree._Element, cosimulation: etree._Element, python: bool, configured: Mapping[str, Value]
+) -> FmuDescription:
+    found = variables3.read_variables(root, configured)
     variables: Sequence[Variable] = found.scalars
     names = _unique([v.name for v in variables])
     has_events = _flag(cosimulation, "hasEventMode")
@@ -176,6 +194,9 @@ def _description3(root: etree._Element, cosimulation: etree._Element, python: bo
         once=_flag(cosimulation, "canBeInstantiatedOnlyOncePerProcess"),
         access=dict(zip(names, found.accesses, strict=True)),
         events=events,
+        structural=frozenset(found.structural),
+        configured=configured,
+        resized=frozenset(found.resized),
         left_out=_left_out(found.binaries, left_out),
     )
 

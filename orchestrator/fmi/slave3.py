@@ -49,13 +49,22 @@ class Fmu3Slave(FmuSlave):
         self._step = self._library.fmi3DoStep
         self._step.argtypes = [c_void_p, c_double, c_double, c_bool, *[c_void_p] * 4]
         self._step.restype = ctypes.c_int
+        self._configure()
 
     def _needed(self) -> list[str]:
         """Return the functions without which the FMU cannot be run, without their prefix."""
         kinds = sorted({access.kind for access in self._description.access.values()})
         transfers = [f"{direction}{kind}" for direction in ("Set", "Get") for kind in kinds]
         states = [f"{what}{self.STATE}" for what in ("Get", "Set", "Free")] if self.model.can_save_state else []
-        return [*_ALWAYS, *transfers, *states]
+        configured = ["EnterConfigurationMode", "ExitConfigurationMode"] if self._description.configured else []
+        return [*_ALWAYS, *transfers, *states, *configured]
+
+    def _configure(self) -> None:
+        """Give structural parameters their values, in configuration mode."""
+        if self._description.configured:
+            self._call("EnterConfigurationMode")
+            self.set(self._description.configured)
+            self._call("ExitConfigurationMode")
 
     def _instantiate(self) -> tuple[Any, c_void_p]:
         folder, description = extracted(self.path), self._description
@@ -165,6 +174,7 @@ class Fmu3Slave(FmuSlave):
     def reset(self) -> None:
         super().reset()
         self._rolls_back = False
+        self._configure()
 
     def failed(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
         if status >= ENDED:

@@ -1,6 +1,7 @@
 """Variables of FMI 3.0, from a model description: arrays become scalars, what nobody can use is left out."""
 
 import itertools
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -8,7 +9,7 @@ from lxml import etree
 
 from orchestrator.fmi.access import Access, whole_range
 from orchestrator.fmi.starts import number, start_value
-from orchestrator.master.protocol import Variable
+from orchestrator.master.protocol import Value, Variable
 
 TYPES = {
     **dict.fromkeys(("Float64", "Float32"), "Real"),
@@ -34,6 +35,8 @@ class Variables3:
         clocked: the value references of the clocks that a scalar belongs to, by its name.
         inside: names of the inputs that may be set in intermediate updates.
         binaries: names of the variables of type Binary.
+        structural: names of the structural parameters.
+        resized: names of the elements of arrays whose start values are for another size.
     """
 
     scalars: list[Variable] = field(default_factory=list)
@@ -43,14 +46,21 @@ class Variables3:
     clocked: dict[str, tuple[int, ...]] = field(default_factory=dict)
     inside: list[str] = field(default_factory=list)
     binaries: list[str] = field(default_factory=list)
+    structural: list[str] = field(default_factory=list)
+    resized: list[str] = field(default_factory=list)
 
 
-def read_variables(root: etree._Element) -> Variables3:
-    """Return the variables of a model description."""
+def read_variables(root: etree._Element, configured: Mapping[str, Value] | None = None) -> Variables3:
+    """Return the variables of a model description.
+
+    Args:
+        configured: values of structural parameters, in place of their start values.
+    """
+    given = {name: str(value).lower() for name, value in (configured or {}).items()}
     elements = [e for e in root.iterfind("ModelVariables/*") if isinstance(e.tag, str)]
     types = {t.attrib["name"]: t for t in root.iterfind("TypeDefinitions/*") if isinstance(t.tag, str)}
     lengths = {
-        e.attrib["valueReference"]: e.attrib["start"]
+        e.attrib["valueReference"]: given.get(e.attrib["name"], e.attrib["start"])
         for e in elements
         if e.get("causality") == "structuralParameter" and "start" in e.attrib
     }
@@ -62,7 +72,11 @@ def read_variables(root: etree._Element) -> Variables3:
         elif element.tag == "Binary":
             found.binaries.append(name)
         elif element.tag in TYPES:
-            _add(found, element, types.get(element.get("declaredType", "")), _shape(element, lengths))
+            if element.get("causality") == "structuralParameter":
+                found.structural.append(name)
+            shape = _shape(element, lengths)
+            starts = [given[name]] if name in given else _starts(element, math.prod(shape), resized=bool(given))
+            _add(found, element, types.get(element.get("declaredType", "")), shape, starts)
         else:
             raise ValueError(f"the variable {name!r} has the type {element.tag}, which FMI 3.0 does not have")
         if len(found.scalars) > MOST_ELEMENTS:
@@ -79,26 +93,30 @@ def _shape(element: etree._Element, lengths: Mapping[str, str]) -> tuple[int, ..
         if not 0 < size <= MOST_ELEMENTS:
             raise ValueError(f"the variable {element.get('name')!r} has a dimension of size {size}")
         shape.append(size)
+        if math.prod(shape) > MOST_ELEMENTS:
+            raise ValueError(f"the variable {element.get('name')!r} has more than {MOST_ELEMENTS} elements")
     return tuple(shape)
 
 
-def _add(found: Variables3, element: etree._Element, declared: etree._Element | None, shape: tuple[int, ...]) -> None:
+def _add(
+    found: Variables3,
+    element: etree._Element,
+    declared: etree._Element | None,
+    shape: tuple[int, ...],
+    starts: list[str] | None,
+) -> None:
     """Add a variable by its elements, and its aliases, which can only be read."""
     reference, name = int(element.attrib["valueReference"]), element.attrib["name"]
-    kind = str(element.tag)
-    count = 1
-    for size in shape:
-        count *= size
-        if count > MOST_ELEMENTS:
-            raise ValueError(f"the variable {name!r} has more than {MOST_ELEMENTS} elements")
+    kind, count = str(element.tag), math.prod(shape)
     make = _maker(element, declared)
-    starts = _starts(element, count)
     clocks = tuple(int(clock) for clock in element.get("clocks", "").split())
     aliases = [(a.attrib["name"], a.get("description")) for a in element.iterfind("Alias")]
     for number_, index in enumerate(itertools.product(*(range(1, size + 1) for size in shape))):
         place = f"[{','.join(map(str, index))}]" if index else ""
         access = Access("Int64" if kind == "Enumeration" else kind, reference, number_, count)
-        scalar = make(f"{name}{place}", starts[number_])
+        scalar = make(f"{name}{place}", starts[number_] if starts else None)
+        if starts is None:
+            found.resized.append(scalar.name)
         found.scalars.append(scalar)
         found.accesses.append(access)
         found.names.setdefault(reference, []).append(scalar.name)
@@ -137,7 +155,7 @@ def _maker(element: etree._Element, declared: etree._Element | None) -> Callable
     fixed = causality in {"parameter", "calculatedParameter", "structuralParameter"}
     usual = "fixed" if fixed else "continuous" if TYPES[kind] == "Real" else "discrete"
     variability = element.get("variability", usual)
-    if causality == "structuralParameter":  # the arrays have been counted: its start value is final
+    if causality == "structuralParameter":  # the arrays have been counted: its value is final
         causality, variability = "calculatedParameter", "constant"
     widest = whole_range(kind) or (None, None)
     low, high = number(attribute("min")), number(attribute("max"))
@@ -164,17 +182,26 @@ def _maker(element: etree._Element, declared: etree._Element | None) -> Callable
     return make
 
 
-def _starts(element: etree._Element, count: int) -> list[str | None]:
-    """Return the start values of a variable's elements; a single one is that of all."""
+def _starts(element: etree._Element, count: int, resized: bool) -> list[str] | None:
+    """Return the start values of a variable's elements; a single one is that of all.
+
+    Args:
+        resized: the size may be another than that of the start values, of which there are none then.
+
+    Returns:
+        Start values, none where none are stated; ``None``: they are for another size.
+    """
     if element.tag == "String":
         texts: list[str] = [s.get("value", "") for s in element.iterfind("Start")]
     else:
         texts = element.get("start", "").split()
     if len(texts) == 1:
         return [texts[0]] * count
+    if texts and len(texts) != count and resized and element.find("Dimension[@valueReference]") is not None:
+        return None
     if texts and len(texts) != count:
         raise ValueError(f"the variable {element.get('name')!r} has {len(texts)} start values for {count} elements")
-    return list(texts) if texts else [None] * count
+    return texts
 
 
 def read_feedthrough(root: etree._Element, variables: Variables3) -> dict[str, frozenset[str]]:
