@@ -18,7 +18,7 @@ def build_description(name: str) -> bytes:
 def terminals_and_icons(cls: Any) -> bytes:
     """Return ``terminalsAndIcons/terminalsAndIcons.xml``: the icon's place, and the terminals of a slave.
 
-    Torques flow; angles and speeds are signals. Terminals connect what has the same name in both.
+    Torques flow, into what is told its own and out of what is told another's; angles and speeds are signals.
     """
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     picture = SubElement(root, "GraphicalRepresentation")
@@ -27,10 +27,12 @@ def terminals_and_icons(cls: Any) -> bytes:
     SubElement(picture, "Icon", corners)
     if cls.terminals:
         terminals = SubElement(root, "Terminals")
+        inputs = {variable.name for variable in cls.table if variable.causality == "input"}
         for name, members in cls.terminals.items():
             terminal = SubElement(terminals, "Terminal", {"name": name, "matchingRule": "plug"})
             for member, variable in members.items():
-                kind = "inflow" if member == "torque" else "signal"
+                flow = "outflow" if variable in inputs else "inflow"
+                kind = flow if member == "torque" else "signal"
                 names = {"variableName": variable, "memberName": member, "variableKind": kind}
                 SubElement(terminal, "TerminalMemberVariable", names)
     return _xml(root)

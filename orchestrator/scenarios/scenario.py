@@ -27,6 +27,7 @@ from orchestrator.master.system import Connection, Instance, Quantity, SignalSou
 from orchestrator.master.values import one_line, typed_value
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.isolated import Safety, run_safely
+from orchestrator.scenarios.joining import joined
 from orchestrator.scenarios.tables import read_table
 
 MAXIMUM_BYTES = 16 * 2**20
@@ -65,6 +66,10 @@ class _Connection(_Strict, frozen=True, kw_only=True):
     factor: float = 1.0
     offset: float = 0.0
     quantum: float = 0.0
+
+
+class _Terminals(_Strict, frozen=True, kw_only=True):
+    join: tuple[str, str]
 
 
 class _Source(_Strict, tag_field="kind", frozen=True, kw_only=True):
@@ -135,6 +140,7 @@ class _Top(_Strict, frozen=True, kw_only=True):
     start: float = 0.0
     name: str = "scenario"
     connections: list[Any] = []
+    terminals: list[Any] = []
     sources: list[Any] = []
 
 
@@ -149,7 +155,7 @@ def load_scenario(path: Path) -> Scenario:
     reader = _Reader(path, problems)
     algorithm, order = reader.master(top)
     instances = reader.instances(top.instances)
-    connections = reader.connections(top.connections)
+    connections = (*reader.connections(top.connections), *joined(_joints(top, problems), instances, problems))
     sources = reader.sources(top.sources, instances, algorithm.step if algorithm else math.nan, top.start)
     if algorithm is not None:
         try:
@@ -161,6 +167,16 @@ def load_scenario(path: Path) -> Scenario:
     system = System(instances, connections, sources, order)
     raise_problems(system.problems() + system.record_problems(tuple(top.record)), str(path))
     return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))
+
+
+def _joints(top: _Top, problems: list[Problem]) -> list[tuple[str, str, str]]:
+    """Return where each pair of terminals is asked for, and the two."""
+    found = []
+    for k, table in enumerate(top.terminals):
+        pair: _Terminals | None = _convert(table, _Terminals, f"$.terminals[{k}]", problems)
+        if pair is not None:
+            found.append((f"$.terminals[{k}].join", *pair.join))
+    return found
 
 
 def _content(path: Path) -> dict[str, Any]:
