@@ -116,6 +116,7 @@ def join_terminals(first: TerminalEnd, second: TerminalEnd) -> tuple[list[Joint]
     """Return the connections that two terminals make, and what is wrong with the two."""
     a, b = first.terminal, second.terminal
     rules = {a.rule, b.rule}
+    problems: list[str] = []
     if not (rules == {"sequence"} or rules <= {"plug", "bus"}):
         text = "must both have the matchingRule sequence, or plug or bus, but have"
         return [], [f"{text} {a.rule} ({first.address}) and {b.rule} ({second.address})"]
@@ -126,7 +127,7 @@ def join_terminals(first: TerminalEnd, second: TerminalEnd) -> tuple[list[Joint]
         counts = f"{len(a.members)} ({first.address}) and {len(b.members)} ({second.address})"
         if len(a.members) != len(b.members):
             return [], [f"must have as many members in both terminals, but have {counts}"]
-        pairs, problems = list(zip(a.members, b.members, strict=True)), []
+        pairs = list(zip(a.members, b.members, strict=True))
     else:
         pairs, problems = _matched(first, second)
     joints: list[Joint] = []
