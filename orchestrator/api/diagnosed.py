@@ -14,10 +14,15 @@ from orchestrator.api.law import law_result, law_words
 from orchestrator.api.live import live_corrected_model
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.diagnosis.report.corrected import BeforeAfter, before_and_after, build_corrected, fmu_name
+from orchestrator.diagnosis.report.corrected import (
+    BeforeAfter,
+    before_and_after,
+    build_corrected,
+    corrected_model,
+    fmu_name,
+)
 from orchestrator.diagnosis.report.json_results import diagnosis_found, test_found
 from orchestrator.diagnosis.report.law_export import LawRun, build_with_law, run_with_law
-from orchestrator.diagnosis.report.model_file_text import corrected_model
 from orchestrator.diagnosis.report.summary import summarise
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit
 from orchestrator.errors import OutputError

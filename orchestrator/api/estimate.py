@@ -19,7 +19,7 @@ from orchestrator.api.methods import HEAD, MethodResult, describe_record, method
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.report.summary import play_of
-from orchestrator.diagnosis.selection.grading import Grade
+from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.methods import maximum_likelihood, two_encoders

@@ -9,33 +9,29 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from orchestrator.diagnosis.data.admission import check_model, check_record, check_resolved
-from orchestrator.diagnosis.data.test_data import split_records
+from orchestrator.diagnosis.data.records import check_model, check_record, check_resolved, split_records
 from orchestrator.diagnosis.inference.problem import fit_problem
-from orchestrator.diagnosis.model.hidden_gap import find_hidden_gap
 from orchestrator.diagnosis.model.interface import Values
 from orchestrator.diagnosis.model.law_arguments import law_arguments
-from orchestrator.diagnosis.model.plant_effects import effect_parameters
+from orchestrator.diagnosis.model.plant_effects import effect_parameters, in_metres, unit_in
 from orchestrator.diagnosis.model.torque_balance import balance_of
-from orchestrator.diagnosis.model.units import in_metres, unit_in
-from orchestrator.diagnosis.report.drive_gain import find_drive_gain
-from orchestrator.diagnosis.report.estimates import interval_width, parameter_estimates
-from orchestrator.diagnosis.report.graded_effect import add_test_evidence, report_effect, share_values
-from orchestrator.diagnosis.report.hidden_gap import report_hidden_gap
+from orchestrator.diagnosis.report.estimates import (
+    add_test_evidence,
+    find_drive_gain,
+    interval_width,
+    parameter_estimates,
+    report_effect,
+    share_values,
+)
+from orchestrator.diagnosis.report.hidden_gap import HiddenGap, find_hidden_gap, gap_effects, gap_parameters
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.test_report import misfit_on_test_data, misses_of, torque_comparison
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
-from orchestrator.diagnosis.selection.grading import (
-    EffectEvidence,
-    Grade,
-    RecordEvidence,
-    effect_evidence,
-    possible_effects,
-    record_evidence,
-    torque_shares,
-)
-from orchestrator.diagnosis.selection.remaining import Dependence, find_dependences
-from orchestrator.diagnosis.selection.search import SearchResult, leave_out, search_effects
+from orchestrator.diagnosis.selection.evidence import effect_evidence, record_evidence, torque_shares
+from orchestrator.diagnosis.selection.grading import possible_effects
+from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence, Grade, RecordEvidence, SearchResult
+from orchestrator.diagnosis.selection.remaining import find_dependences
+from orchestrator.diagnosis.selection.search import leave_out, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -92,8 +88,24 @@ def diagnose(
     workings = Workings(fitted, test_data, found, tuple(models), nominal, base, final)
     if gap is not None:
         values = model.plant.extended(gap.values.tolist())
-        return report_hidden_gap(replace(workings, final=values), gap, model, settings)
+        return _report_hidden_gap(replace(workings, final=values), gap, model, settings)
     return _report(workings, model, settings)
+
+
+def _report_hidden_gap(workings: Workings, gap: HiddenGap, model: Model, settings: DiagnosisSettings) -> Diagnosis:
+    """Return the diagnosis of a record of one encoder that the estimator's model explains."""
+    parameters = gap_parameters(gap, model, settings.report.level)
+    record = RecordEvidence(0.0, 1.0, 0.0, np.inf)  # the model explains the record to its noise
+    test = misfit_on_test_data(workings, model, settings)
+    effects = gap_effects(gap, test[0].signals[0], settings.grades)
+    verdict = "effects" if effects else "parameters"
+    trust = judge_trust(verdict, effects, True, record, test, parameters, model.uncertain, settings)
+    return Diagnosis(
+        verdict=verdict, effects=effects, nuisances=(), parameters=parameters, left={}, remaining=(), law=None,
+        test=test, record=record, trust=trust,
+        notes=("one encoder: the estimator of the gap explains the record, and no other effect was looked for",),
+        settings=settings, searched=True, model=model, workings=workings,
+    )  # fmt: skip
 
 
 def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Diagnosis:

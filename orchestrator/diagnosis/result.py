@@ -6,11 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.data.test_data import TestData
+from orchestrator.diagnosis.data.records import TestData
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
-from orchestrator.diagnosis.selection.grading import EffectEvidence, Grade, RecordEvidence
-from orchestrator.diagnosis.selection.remaining import Dependence
-from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import orchestrator as oc
-from orchestrator.diagnosis.data.admission import check_model, check_record
+from orchestrator.diagnosis.data.records import check_model, check_record
 from orchestrator.diagnosis.diagnose import diagnose
-from orchestrator.diagnosis.report.drive_gain import find_drive_gain
+from orchestrator.diagnosis.report.estimates import find_drive_gain
 from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis
-from orchestrator.diagnosis.selection.grading import Grade
+from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.records.model_file import default_model, read_model
 from orchestrator.records.record import Record, record_from_columns

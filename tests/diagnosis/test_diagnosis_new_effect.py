@@ -11,7 +11,7 @@ from tests.support.copies import ROOT, copy_project, run_in_copy
 PROGRAM = """
 from pathlib import Path
 from orchestrator.diagnosis.diagnose import diagnose
-from orchestrator.diagnosis.selection.grading import Grade
+from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.records.model_file import read_model
 from pyfmu_sources import servo_axis_parameters as axis
 from tests.support.axis_record import axis_record

@@ -4,14 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.diagnosis.selection.grading import (
-    GRADE_RULES,
-    EffectEvidence,
-    Grade,
-    RecordEvidence,
-    grade_effect,
-    highest_grade,
-)
+from orchestrator.diagnosis.selection.grading import GRADE_RULES, grade_effect, highest_grade
+from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.shared.settings import described
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.data.test_data import TestData, split_records
+from orchestrator.diagnosis.data.records import TestData, split_records
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import record_from_columns

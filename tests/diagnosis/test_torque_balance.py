@@ -7,8 +7,7 @@ from orchestrator.diagnosis.data.signals import prepare_signals, smooth
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.plant_effects import effect_parameters
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
-from orchestrator.diagnosis.report.run_signals import RunSignals
-from orchestrator.diagnosis.report.simulation import simulate
+from orchestrator.diagnosis.report.simulation import RunSignals, simulate
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.records.model_file import default_model

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.report.run_signals import RunSignals
-from orchestrator.diagnosis.report.simulation import Simulation
+from orchestrator.diagnosis.report.simulation import RunSignals, Simulation
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.plants.known.servo_axis import PLANT as AXIS
 from orchestrator.plants.learned import with_law

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from orchestrator.paired.experiment import BACKLASH_MODELS, Experiment
 from orchestrator.records.model_file import default_model
-from orchestrator.diagnosis.data.admission import check_model
+from orchestrator.diagnosis.data.records import check_model
 from pyfmu_sources import contact, drivetrain, drivetrain_parameters as dt
 from pyfmu_sources.model_xml import ENUMERATIONS
 

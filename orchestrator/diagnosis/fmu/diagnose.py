@@ -7,7 +7,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from orchestrator.diagnosis.data.test_data import split_records
+from orchestrator.diagnosis.data.records import split_records
 from orchestrator.diagnosis.fmu.growing import grow_fit
 from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.misfit import misfit_on_test_data, misses_of
@@ -22,20 +22,14 @@ from orchestrator.diagnosis.fmu.units import effect_units, named_values
 from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.model.interface import Values
-from orchestrator.diagnosis.report.estimates import parameter_estimates
-from orchestrator.diagnosis.report.graded_effect import add_test_evidence, report_effect
+from orchestrator.diagnosis.report.estimates import add_test_evidence, parameter_estimates, report_effect
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.result import GradedEffect
-from orchestrator.diagnosis.selection.grading import (
-    EffectEvidence,
-    RecordEvidence,
-    effect_evidence,
-    possible_effects,
-    record_evidence,
-    torque_shares,
-)
+from orchestrator.diagnosis.selection.evidence import effect_evidence, record_evidence, torque_shares
+from orchestrator.diagnosis.selection.grading import possible_effects
+from orchestrator.diagnosis.selection.outcome import EffectEvidence, RecordEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
-from orchestrator.diagnosis.selection.search import SearchResult, fit_base, leave_out, search_effects
+from orchestrator.diagnosis.selection.search import fit_base, leave_out, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
 
 Progress = Callable[[str], None]

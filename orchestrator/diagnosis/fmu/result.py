@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass, field
 
-from orchestrator.diagnosis.data.test_data import TestData
+from orchestrator.diagnosis.data.records import TestData
 from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.model import BoxModel, Data
 from orchestrator.diagnosis.fmu.probing import Probe
 from orchestrator.diagnosis.fmu.problem import BoxProblem
 from orchestrator.diagnosis.fmu.residual_model import FmuResiduals
 from orchestrator.diagnosis.result import DiagnosisOutcome
-from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.selection.outcome import SearchResult
 
 
 @dataclass(frozen=True)

@@ -42,8 +42,7 @@ from orchestrator.diagnosis.model.interface import (
     UncertainParameter,
     Values,
 )
-from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters
-from orchestrator.diagnosis.model.units import in_metres
+from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters, in_metres
 from orchestrator.diagnosis.settings import BalanceSettings, DiagnosisSettings
 from orchestrator.plants.effects import SignalScales, rms
 from orchestrator.plants.measurement import SHIFT

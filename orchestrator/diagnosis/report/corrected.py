@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from orchestrator.building.build import build_variant, ensure_built
 from orchestrator.checking.check import check_fmu
 from orchestrator.diagnosis.model.drive import shifted
-from orchestrator.diagnosis.report.motion_misfit import free_runs, run_parts
-from orchestrator.diagnosis.report.run_signals import RunSignals
-from orchestrator.diagnosis.report.test_report import test_signals
-from orchestrator.diagnosis.result import Diagnosis
+from orchestrator.diagnosis.report.simulation import RunSignals
+from orchestrator.diagnosis.report.test_report import free_runs, run_parts, test_signals
+from orchestrator.diagnosis.result import Diagnosis, ValueEstimate
 from orchestrator.errors import SimulationError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
@@ -22,6 +21,7 @@ from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
 from orchestrator.plants.measurement import LEAD
+from orchestrator.records.model_file import Model
 
 Array = NDArray[np.float64]
 
@@ -140,3 +140,40 @@ def requests_for_fmu(signals: RunSignals, plant: Plant, p: Array) -> Array:
     """Return the requests (n,) for an FMU that takes one a sample: what the log has early comes later."""
     lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
     return shifted(signals.requests, -lead / signals.step)
+
+
+def corrected_model(model: Model, diagnosis: Diagnosis) -> str:
+    """Return the TOML text of a model with the values of a diagnosis.
+
+    Every value that differs from the FMU's default is stated. Those that were fitted carry the half-width of their
+    95 % interval as uncertainty, so that another record may move them.
+
+    Args:
+        model: the model that the record was compared with; its columns and encoders are kept.
+        diagnosis: of the record.
+
+    Returns:
+        The text.
+    """
+    plant, final = model.plant, diagnosis.workings.final
+    fitted: dict[str, ValueEstimate] = dict(diagnosis.parameters)
+    for row in plant.bank:
+        named = next((one for one in diagnosis.effects if one.label == row.label and one.in_model), None)
+        if named is not None:
+            fitted |= {name: named.parameters[short] for short, name in row.parameters.items()}
+    lines = [f'fmu = "{model.fmu}"']
+    for place, entry in enumerate(plant.table):
+        value = float(final[place])
+        if value == entry.default and entry.name not in fitted:
+            continue
+        lines += ["", f'[parameters."{entry.name}"]', f"value = {value!r}"]
+        if entry.name in fitted:
+            low, high = fitted[entry.name].interval
+            lines.append(f"uncertainty = {0.5 * (high - low)!r}")
+    for name, encoder in model.encoders.items():
+        lines += ["", f"[encoders.{name}]"]
+        lines += [f"{key} = {v!r}" for key in ("resolution", "noise") if (v := getattr(encoder, key)) is not None]
+    for name, column in model.columns.items():
+        lines += ["", f"[columns.{name}]", f'name = "{column.name}"']
+        lines += [f'unit = "{column.unit}"'] if column.unit else []
+    return "\n".join(lines) + "\n"

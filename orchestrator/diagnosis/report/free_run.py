@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.report.run_signals import RunSignals
-from orchestrator.diagnosis.report.simulation import Simulation
+from orchestrator.diagnosis.report.simulation import RunSignals, Simulation
 from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import moving

@@ -1,59 +1,91 @@
-"""The report of a gap that the estimator found behind the motor's encoder alone."""
+"""A gap behind the motor's encoder alone: found by the estimator, and graded."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
-from orchestrator.diagnosis.model.hidden_gap import HiddenGap
-from orchestrator.diagnosis.model.units import unit_in
-from orchestrator.diagnosis.report.judgement import judge_trust
-from orchestrator.diagnosis.report.test_report import misfit_on_test_data
-from orchestrator.diagnosis.result import Diagnosis, GradedEffect, ParameterEstimate, ValueEstimate, Workings
-from orchestrator.diagnosis.selection.grading import EffectEvidence, Grade, RecordEvidence
-from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.diagnosis.model.plant_effects import unit_in
+from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, SignalMisfit, ValueEstimate
+from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade
+from orchestrator.diagnosis.settings import GradeSettings
+from orchestrator.errors import OrchestratorError
+from orchestrator.estimation.methods.maximum_likelihood import estimate
+from orchestrator.plants.known.drivetrain import PLANT
 from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
 
-UNSEEN = float("nan")
+Array = NDArray[np.float64]
 
 
-def report_hidden_gap(workings: Workings, gap: HiddenGap, model: Model, settings: DiagnosisSettings) -> Diagnosis:
-    """Return the diagnosis of a record of one encoder that the estimator's model explains.
+@dataclass(frozen=True, eq=False)
+class HiddenGap:
+    """What the estimator says of a record that its model explains.
 
-    Args:
-        workings: with the estimator's parameters as the final model.
-        gap: that was found, or none.
-        model: that the record was compared with.
-        settings: of the grades and the report.
-
-    Returns:
-        The gap by its grade, or that nothing is missing.
+    Attributes:
+        alpha: half-gap at the load [rad]; 0.0: none is seen.
+        standard_error: of it [rad].
+        interval: 95 % [rad].
+        values: parameters of the plant (n,) with the gap.
+        parameters: name -> (value, standard error) of what was fitted beside it.
     """
-    width = float(norm.ppf(0.5 + 0.5 * settings.report.level))
+
+    alpha: float
+    standard_error: float
+    interval: tuple[float, float]
+    values: Array
+    parameters: Mapping[str, tuple[float, float]]
+
+
+def find_hidden_gap(record: Record, model: Model) -> HiddenGap | None:
+    """Return the gap that a record of the motor's encoder alone shows."""
+    alpha = model.parameters.get("alpha")
+    if model.plant is not PLANT or alpha is None or alpha.value > 0.0 or record.missing:
+        return None
+    try:
+        found = estimate(record.without_load_encoder(), model)
+    except (OrchestratorError, FloatingPointError, np.linalg.LinAlgError):
+        return None
+    if found.diagnostics["lacking"]:
+        return None
+    fitted = found.diagnostics["parameters"]
     parameters = {
+        entry.name: (float(fitted[entry.name]["value"]), float(fitted[entry.name]["standard_error"]))
+        for entry in model.uncertain
+        if entry.name in fitted
+    }
+    values = np.asarray(found.curves["model"], dtype=float)
+    if not found.visible:
+        values = np.where(np.arange(values.size) == PLANT.index("alpha"), 0.0, values)
+        return HiddenGap(0.0, np.inf, (0.0, np.inf), values, parameters)
+    return HiddenGap(found.alpha, found.standard_error, found.interval, values, parameters)
+
+
+def gap_parameters(gap: HiddenGap, model: Model, level: float) -> dict[str, ParameterEstimate]:
+    """Return the estimates of the parameters that were fitted beside a gap."""
+    width = float(norm.ppf(0.5 + 0.5 * level))
+    return {
         name: ParameterEstimate(
             value, error, (value - width * error, value + width * error),
             unit_in(model.parameters[name].unit, model), model.parameters[name].value,
         )
         for name, (value, error) in gap.parameters.items()
     }  # fmt: skip
-    record = RecordEvidence(0.0, 1.0, 0.0, np.inf)  # the model explains the record to its noise
-    test = misfit_on_test_data(workings, model, settings)
-    effects = (
-        (_gap_effect(gap, test[0].signals[0].final, test[0].signals[0].parameters, settings),) if gap.alpha else ()
-    )
-    trust = judge_trust(
-        "effects" if effects else "parameters", effects, True, record, test, parameters, model.uncertain, settings
-    )
-    return Diagnosis(
-        verdict="effects" if effects else "parameters", effects=effects, nuisances=(), parameters=parameters, left={},
-        remaining=(), law=None, test=test, record=record, trust=trust,
-        notes=("one encoder: the estimator of the gap explains the record, and no other effect was looked for",),
-        settings=settings, searched=True, model=model, workings=workings,
-    )  # fmt: skip
 
 
-def _gap_effect(gap: HiddenGap, final: float, before: float, settings: DiagnosisSettings) -> GradedEffect:
+def gap_effects(gap: HiddenGap, test: SignalMisfit, grades: GradeSettings) -> tuple[GradedEffect, ...]:
+    """Return the gap as a graded effect; nothing where none is seen.
+
+    Args:
+        gap: that the estimator found.
+        test: misfit on test data.
+        grades: thresholds.
+    """
+    if not gap.alpha:
+        return ()
     size = gap.alpha / gap.standard_error
-    grades = settings.grades
     lowered: tuple[str, ...]
     if size >= grades.certain_size_t:
         grade, lowered = Grade.CERTAIN, ()
@@ -61,7 +93,8 @@ def _gap_effect(gap: HiddenGap, final: float, before: float, settings: Diagnosis
         grade, lowered = Grade.LIKELY, ("sure size",)
     else:
         grade, lowered = Grade.POSSIBLE, ("size",)
-    share = 1.0 - (final / before) ** 2 if before > 0.0 and np.isfinite(before) else UNSEEN
-    evidence = EffectEvidence("backlash@shaft", "gap", size, UNSEEN, UNSEEN, size, (), False, True, share)
+    before = test.parameters
+    share = 1.0 - (test.final / before) ** 2 if before > 0.0 and np.isfinite(before) else np.nan
+    evidence = EffectEvidence("backlash@shaft", "gap", size, np.nan, np.nan, size, (), False, True, share)
     estimate = ValueEstimate(gap.alpha, gap.standard_error, gap.interval, "rad")
-    return GradedEffect("backlash", "shaft", grade, lowered, {"alpha": estimate}, evidence, {"alpha": ()})
+    return (GradedEffect("backlash", "shaft", grade, lowered, {"alpha": estimate}, evidence, {"alpha": ()}),)

@@ -5,8 +5,7 @@ from collections.abc import Mapping
 
 from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit, ValueEstimate
-from orchestrator.diagnosis.selection.remaining import Dependence
-from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.selection.outcome import Dependence, SearchResult
 from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.shared.results.diagnose import (
     AnalysisFound,

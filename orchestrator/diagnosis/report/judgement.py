@@ -6,9 +6,7 @@ import numpy as np
 
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, SignalMisfit, TestMisfit
-from orchestrator.diagnosis.selection.grading import Grade, RecordEvidence
-from orchestrator.diagnosis.selection.remaining import Dependence
-from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import ModelParameter
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from orchestrator.building.build import build_variant
 from orchestrator.building.sources import catalogue, takes_law
 from orchestrator.diagnosis.report.corrected import checked, fmu_name, requests_for_fmu, start_values
-from orchestrator.diagnosis.report.motion_misfit import free_runs, run_parts
-from orchestrator.diagnosis.report.test_report import test_signals
+from orchestrator.diagnosis.report.test_report import free_runs, run_parts, test_signals
 from orchestrator.diagnosis.result import Diagnosis
-from orchestrator.diagnosis.selection.remaining import Dependence
+from orchestrator.diagnosis.selection.outcome import Dependence
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session

@@ -1,6 +1,6 @@
 """The one place that reads test data."""
 
-from orchestrator.diagnosis.data.test_data import R, TestData
+from orchestrator.diagnosis.data.records import R, TestData
 
 
 def open_test_data(data: TestData[R]) -> list[tuple[R, int]]:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, Nuisance, ValueEstimate
-from orchestrator.diagnosis.selection.grading import GRADE_RULES, Grade
+from orchestrator.diagnosis.selection.grading import GRADE_RULES
+from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.plants.description import Plant
 from orchestrator.shared.play import Play
 

@@ -6,64 +6,25 @@ effect. The strongest of these dependences is the law that is learned where no e
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.inference.fitting import (
-    ScoreComparison,
     compare_residuals,
     jackknife_covariance,
     leave_blocks_out,
 )
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import LawArgument
-from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.selection.outcome import Dependence, SearchResult
 from orchestrator.diagnosis.settings import SelectionSettings
 
 Array = NDArray[np.float64]
 KNOTS = 11
 EDGE = 0.005  # share of the rows beyond the first and the last knot
 RIDGE = 1e-9  # of the trace: knots that no row reaches stay where their neighbours are
-
-
-@dataclass(frozen=True)
-class Dependence:
-    """What is left at a body follows a signal.
-
-    Attributes:
-        argument: in words.
-        site: where the torque acts.
-        argument_unit, unit: of knots and values.
-        knots, values: (k,) of the curve, a torque against the motion.
-        errors: (k,) standard errors of the values.
-        comparison: gain on blocks left out, and its paired error.
-        share: of what is left at the body that it explains.
-        formula: of at most two simple terms that run within the band; empty: none does.
-        changes: shares by which the model's own parameters move with it, by name.
-        code: number of the argument in a learned law.
-    """
-
-    argument: str
-    site: str
-    argument_unit: str
-    unit: str
-    knots: tuple[float, ...]
-    values: tuple[float, ...]
-    errors: tuple[float, ...]
-    comparison: ScoreComparison
-    share: float
-    formula: str = ""
-    changes: Mapping[str, float] = field(default_factory=dict)
-    code: int = 0
-
-    @property
-    def words(self) -> str:
-        """Return the dependence as part of a sentence."""
-        text = f"{100.0 * self.share:.0f} % of it follows the {self.argument}"
-        return text + (f", like {self.formula} with s in {self.argument_unit}" if self.formula else "")
 
 
 def find_dependences(

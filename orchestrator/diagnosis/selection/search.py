@@ -5,14 +5,15 @@ than the settings ask for. Effects that are not told apart from it, block by blo
 the one with the fewest values enters. Then each earlier effect that no longer pays is taken out.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, compare, fit_model, weigh_prior
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint
+from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
 from orchestrator.diagnosis.selection.screening import Screening, screened_point
 from orchestrator.diagnosis.settings import SelectionSettings
 
@@ -20,60 +21,6 @@ Progress = Callable[[str], None]
 LOUDER = 2.0  # times that weights must rise by it: else the model leaves hardly any
 SETTLINGS = 5  # of fit and whitening at most
 SETTLED = 0.02  # share of the score by which one changes it that is the last
-
-
-@dataclass(frozen=True, eq=False)
-class TriedEffect:
-    """An effect that was fitted on top of a model."""
-
-    label: str
-    comparison: ScoreComparison
-    fitted: FittedModel
-
-
-@dataclass(frozen=True, eq=False)
-class SearchStep:
-    """One step: the model before, what was tried on top of it, and what was taken ("": nothing).
-
-    Attributes:
-        before: the model.
-        tried: the effects, by gain.
-        taken: label of the effect that entered.
-        family: labels of those that are not told from it.
-    """
-
-    before: FittedModel
-    tried: tuple[TriedEffect, ...]
-    taken: str = ""
-    family: tuple[str, ...] = ()
-
-    @property
-    def entry(self) -> TriedEffect | None:
-        """Return the effect that was taken."""
-        return next((one for one in self.tried if one.label == self.taken), None)
-
-
-@dataclass(frozen=True, eq=False)
-class SearchResult:
-    """What the search ended with.
-
-    Attributes:
-        problem: with the whitening and the prior's weight of the final model.
-        base: the model with re-fitted parameters alone, as the problem of its own time had it.
-        final: the final model.
-        steps: of the search.
-        reviews: label -> the step that it makes in the final model, with the family that it has there.
-        refused: labels that entered once and did not pay in the end.
-        complete: False when time ran out.
-    """
-
-    problem: FitProblem
-    base: FittedModel
-    final: FittedModel
-    steps: tuple[SearchStep, ...] = ()
-    reviews: Mapping[str, SearchStep] = field(default_factory=dict)
-    refused: frozenset[str] = field(default_factory=frozenset)
-    complete: bool = True
 
 
 def search_effects(

@@ -19,7 +19,7 @@ from orchestrator.diagnosis.fmu.reading import read_data
 from orchestrator.diagnosis.fmu.sites import effects_of
 from orchestrator.diagnosis.fmu.subject import subject_of
 from orchestrator.diagnosis.fmu_settings import FmuSettings, ProcessSettings
-from orchestrator.diagnosis.selection.grading import Grade
+from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.scenarios.ssp.read import opened_ssp

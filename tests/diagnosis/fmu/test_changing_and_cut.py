@@ -9,7 +9,7 @@ import orchestrator as oc
 from orchestrator.cli import main
 from orchestrator.diagnosis.fmu.mapping import read_map
 from orchestrator.diagnosis.fmu.subject import subject_of
-from orchestrator.diagnosis.selection.grading import Grade
+from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import InputError
 from pyfmu_sources import port_laws as laws
 from tests.support.box_fmu import DOMAINS, changing_record, coupled_record, write_fmu, write_map, write_scenario

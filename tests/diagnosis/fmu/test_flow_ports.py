@@ -13,7 +13,7 @@ from orchestrator.diagnosis.fmu.mapping import Map, read_map
 from orchestrator.diagnosis.fmu.sites import OF_POSITION, effects_of
 from orchestrator.diagnosis.fmu.ssp_structure import parameter_values
 from orchestrator.diagnosis.fmu.subject import Subject, subject_of
-from orchestrator.diagnosis.selection.grading import Grade
+from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import ModelInterface, Variable
 from tests.support.answers_fmu import build_answers_fmu

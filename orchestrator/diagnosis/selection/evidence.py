@@ -1,0 +1,157 @@
+"""Evidence for the effects of a final model: what leaves with each, and what the record says of the whole model."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.inference.fitting import FittedModel, fit_model
+from orchestrator.diagnosis.inference.problem import FitProblem
+from orchestrator.diagnosis.inference.whitening import band_only
+from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.selection.outcome import EffectEvidence, RecordEvidence, SearchResult
+
+Array = NDArray[np.float64]
+FREE_SPREAD = 30.0  # of a parameter whose prior is off
+
+
+def record_evidence(found: SearchResult) -> RecordEvidence:
+    """Return what the record says of the final model as a whole.
+
+    Args:
+        found: by the search.
+
+    Returns:
+        The evidence.
+    """
+    problem = found.problem
+    left = torque_shares(problem, found.final.point)
+    inertia, error, spread = recorded_inertia(problem, found.final)
+    if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
+        spread = np.inf
+    return RecordEvidence(float(left.max()), inertia, error, spread)
+
+
+def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
+    """Return what speaks for one effect of the final model.
+
+    Args:
+        found: by the search.
+        label: of the effect.
+
+    Returns:
+        The evidence, without what test data say.
+    """
+    problem, final, review = found.problem, found.final, found.reviews[label]
+    effect = problem.effects[label]
+    step = next((step for step in found.steps if step.taken == label), review)
+    leaving, entry = review.entry, step.entry
+    assert leaving is not None
+    assert entry is not None
+    base = missing_torque(problem, found.base.point)
+    shares = [
+        (missing_torque(problem, before.point) - missing_torque(problem, after.point)) / base
+        for before, after in ((review.before, final), (step.before, entry.fitted))
+    ]
+    kinds = {problem.effects[other].kind for other in review.family}
+    return EffectEvidence(
+        label, effect.kind, max(leaving.comparison.t, entry.comparison.t),
+        max(leaving.comparison.gain, entry.comparison.gain), float(max(shares)),
+        size_over_error(problem, final, label), review.family, bool(kinds - {effect.kind}),
+        problem.is_possible(label, final.point.effects[label]),
+    )  # fmt: skip
+
+
+def missing_torque(problem: FitProblem, point: ModelPoint) -> float:
+    """Return the power of what a model leaves within the band, white, in shares of the nominal one's, summed.
+
+    Args:
+        problem: of the records.
+        point: values of the model.
+
+    Returns:
+        The sum over records and channels.
+    """
+    total = 0.0
+    for model, seen, start in zip(
+        problem.models, problem.record_points(point), problem.record_points(problem.start), strict=True
+    ):
+        plain = band_only(model, problem.settings)
+        left, nominal = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals([seen, start]))
+        total += float(np.sum(np.mean(left**2, axis=1) / (np.mean(nominal**2, axis=1) + 1e-300)))
+    return total
+
+
+def torque_shares(problem: FitProblem, point: ModelPoint) -> Array:
+    """Return (channels,) the power that a model leaves within the band over that of what drives each body.
+
+    Args:
+        problem: of the records.
+        point: values of the model.
+
+    Returns:
+        The mean over records.
+    """
+    shares = []
+    for model, seen in zip(problem.models, problem.record_points(point), strict=True):
+        plain = band_only(model, problem.settings)
+        driving = model.driving(seen)
+        power = [
+            plain.apply(one).reshape(len(plain.active), -1)
+            for one in (model.residuals([seen])[0], driving - driving.mean(axis=1, keepdims=True))
+        ]
+        shares.append(np.mean(power[0] ** 2, axis=1) / (np.mean(power[1] ** 2, axis=1) + 1e-300))
+    return np.asarray(np.mean(shares, axis=0))
+
+
+def size_over_error(problem: FitProblem, fitted: FittedModel, label: str) -> float:
+    """Return the sizes of an effect over their errors, blocks' disagreement included.
+
+    Args:
+        problem: of the fit.
+        fitted: the model.
+        label: of the effect.
+
+    Returns:
+        The root mean square over the sizes, their errors' correlation considered.
+    """
+    effect = problem.effects[label]
+    places = [fitted.coordinates.index((label, n)) for n in effect.sizes if (label, n) in fitted.coordinates]
+    if not places:
+        return 0.0
+    values = fitted.point.effects[label]
+    sizes = np.array([values[fitted.coordinates[n][1]] / effect.scales[fitted.coordinates[n][1]] for n in places])  # type: ignore[index]
+    covariance = (fitted.jackknife + fitted.covariance)[np.ix_(places, places)]
+    square = sizes @ np.linalg.lstsq(covariance + 1e-12 * np.eye(len(places)), sizes, rcond=1e-10)[0]
+    return float(np.sqrt(max(square, 0.0) / len(places)))
+
+
+def recorded_inertia(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float]:
+    """Return the inertia that the record asks for by itself, in units of the nominal one, its error and its spread.
+
+    The priors are off, and torque is regressed on motion: an inertia far from the model file's tells that the record
+    is of another machine.
+
+    Args:
+        problem: of the fit.
+        fitted: the final model.
+
+    Returns:
+        Inertia, standard error, spread in the model file; (1, 0, 0) of a model without one.
+    """
+    shares = problem.models[0].inertia_shares()
+    if not shares:
+        return 1.0, 0.0, 0.0
+    freed = replace(problem, models=tuple(model.without_priors(FREE_SPREAD) for model in problem.models))
+    free = fit_model(freed, fitted.point, 3)
+    weights, total = np.zeros(len(free.coordinates)), 0.0
+    for name, share in shares.items():
+        n = next((n for n, entry in enumerate(problem.shared) if entry.name == name), None)
+        if n is None:
+            total += share
+            continue
+        weights[n] = share
+        total += share * free.point.parameters[n] / problem.shared[n].nominal
+    variance = max(float(weights @ covariance @ weights) for covariance in (free.jackknife, free.covariance))
+    spread = max((entry.spread for entry in problem.shared if entry.name in shares), default=0.0)
+    return total, float(np.sqrt(variance)), spread

@@ -1,0 +1,174 @@
+"""What a search ends with, and what speaks for each of its effects: plain immutable values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison
+from orchestrator.diagnosis.inference.problem import FitProblem
+
+
+@dataclass(frozen=True, eq=False)
+class TriedEffect:
+    """An effect that was fitted on top of a model."""
+
+    label: str
+    comparison: ScoreComparison
+    fitted: FittedModel
+
+
+@dataclass(frozen=True, eq=False)
+class SearchStep:
+    """One step: the model before, what was tried on top of it, and what was taken ("": nothing).
+
+    Attributes:
+        before: the model.
+        tried: the effects, by gain.
+        taken: label of the effect that entered.
+        family: labels of those that are not told from it.
+    """
+
+    before: FittedModel
+    tried: tuple[TriedEffect, ...]
+    taken: str = ""
+    family: tuple[str, ...] = ()
+
+    @property
+    def entry(self) -> TriedEffect | None:
+        """Return the effect that was taken."""
+        return next((one for one in self.tried if one.label == self.taken), None)
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """What the search ended with.
+
+    Attributes:
+        problem: with the whitening and the prior's weight of the final model.
+        base: the model with re-fitted parameters alone, as the problem of its own time had it.
+        final: the final model.
+        steps: of the search.
+        reviews: label -> the step that it makes in the final model, with the family that it has there.
+        refused: labels that entered once and did not pay in the end.
+        complete: False when time ran out.
+    """
+
+    problem: FitProblem
+    base: FittedModel
+    final: FittedModel
+    steps: tuple[SearchStep, ...] = ()
+    reviews: Mapping[str, SearchStep] = field(default_factory=dict)
+    refused: frozenset[str] = field(default_factory=frozenset)
+    complete: bool = True
+
+
+class Grade(IntEnum):
+    """How sure a name is, the surest last."""
+
+    POSSIBLE = 0
+    LIKELY = 1
+    CERTAIN = 2
+
+    @property
+    def word(self) -> str:
+        """The grade in results: "possible", "likely" or "certain"."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class RecordEvidence:
+    """What a record says of the final model as a whole.
+
+    Attributes:
+        left: share of the torque that is left, of the body where it is largest.
+        inertia: that the record asks for by itself, in units of the nominal one; 1.0: the model has none.
+        inertia_error: its standard error, in the same unit.
+        inertia_spread: how far the model file lets it be off, as a share.
+    """
+
+    left: float
+    inertia: float
+    inertia_error: float
+    inertia_spread: float
+
+    def inertia_is_off(self, deviations: float) -> bool:
+        """Tell whether the record asks for an inertia that the model file does not allow, twice its error considered.
+
+        Args:
+            deviations: of the model file that count as outside.
+
+        Returns:
+            True where it does: the record is of no such machine.
+        """
+        width = deviations * np.log1p(self.inertia_spread)
+        highest, lowest = self.inertia + 2.0 * self.inertia_error, self.inertia - 2.0 * self.inertia_error
+        return bool(np.log(max(highest, 1e-6)) < -width or np.log(max(lowest, 1e-6)) > width)
+
+
+@dataclass(frozen=True)
+class EffectEvidence:
+    """What speaks for one effect: when it entered, or by what leaves with it, whichever is more.
+
+    Attributes:
+        label, kind: of the effect.
+        t: paired gain over its standard error.
+        gain: share of the squared error that it takes of what is left without it.
+        share: share of the missing torque that it explains.
+        size_t: its sizes over their errors.
+        family: labels that the record does not tell from it.
+        foreign_family: one of them is of another kind.
+        possible: a machine can have such values.
+        motion_share: share of the misfit of free runs on test data that comes back without it; nan: not run.
+        test_torque: the same of what the torque balance leaves of test data, block by block; None: not worked out.
+    """
+
+    label: str
+    kind: str
+    t: float
+    gain: float
+    share: float
+    size_t: float
+    family: tuple[str, ...]
+    foreign_family: bool
+    possible: bool
+    motion_share: float = np.nan
+    test_torque: ScoreComparison | None = None
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """What is left at a body follows a signal.
+
+    Attributes:
+        argument: in words.
+        site: where the torque acts.
+        argument_unit, unit: of knots and values.
+        knots, values: (k,) of the curve, a torque against the motion.
+        errors: (k,) standard errors of the values.
+        comparison: gain on blocks left out, and its paired error.
+        share: of what is left at the body that it explains.
+        formula: of at most two simple terms that run within the band; empty: none does.
+        changes: shares by which the model's own parameters move with it, by name.
+        code: number of the argument in a learned law.
+    """
+
+    argument: str
+    site: str
+    argument_unit: str
+    unit: str
+    knots: tuple[float, ...]
+    values: tuple[float, ...]
+    errors: tuple[float, ...]
+    comparison: ScoreComparison
+    share: float
+    formula: str = ""
+    changes: Mapping[str, float] = field(default_factory=dict)
+    code: int = 0
+
+    @property
+    def words(self) -> str:
+        """Return the dependence as part of a sentence."""
+        text = f"{100.0 * self.share:.0f} % of it follows the {self.argument}"
+        return text + (f", like {self.formula} with s in {self.argument_unit}" if self.formula else "")
