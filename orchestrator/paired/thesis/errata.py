@@ -1,6 +1,5 @@
 """The thesis's errata, each with the computation that shows it."""
 
-import control
 import numpy as np
 
 from orchestrator.errors import DesignError
@@ -10,6 +9,7 @@ from orchestrator.paired.thesis import published
 from orchestrator.paired.thesis.recompute import (
     C_L,
     C,
+    error_covariance,
     model_behind_the_gains,
     observer_gain,
     size_hidden_in_the_filter,
@@ -92,8 +92,7 @@ def _dual_gain() -> Erratum:
 
 def _input_sign() -> Erratum:
     tau = DrivetrainValues().tau
-    right = float(control.dcgain(control.ss([[-1 / tau]], [[1 / tau]], [[1.0]], [[0.0]])))
-    wrong = float(control.dcgain(control.ss([[-1 / tau]], [[-1 / tau]], [[1.0]], [[0.0]])))
+    right, wrong = (-b / (-1 / tau) for b in (1 / tau, -1 / tau))  # where T' = -T/tau + b u is at rest
     return Erratum(
         4,
         "B(6), eq. 3.6",
@@ -148,8 +147,8 @@ def _mean_square() -> Erratum:
 def _noise_inverse() -> Erratum:
     A = model_behind_the_gains()
     gain = observer_gain(A, C_L, published.V_D_EXAMPLE, published.V_N)
-    Y = np.asarray(control.care(A.T, C_L.T, published.V_D_EXAMPLE * np.eye(6), np.array([[published.V_N]]))[0])
-    literal = (Y @ C_L.T).ravel() * published.V_N
+    covariance = error_covariance(A, C_L, published.V_D_EXAMPLE, published.V_N)
+    literal = (covariance @ C_L.T).ravel() * published.V_N
     return Erratum(
         8,
         "eq. 3.24",

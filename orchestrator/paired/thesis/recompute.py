@@ -1,8 +1,8 @@
-"""Recomputes the thesis's matrices, gains and table with python-control, on its own terms."""
+"""Recomputes the thesis's matrices, gains and table on its own terms."""
 
-import control
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_continuous_are
 from scipy.optimize import minimize_scalar
 
 from orchestrator.paired.thesis import published
@@ -40,8 +40,17 @@ def observer_gain(A: Array, output: Array, V_d: float, V_n: float) -> Array:
         A: (6, 6) of the model.
         output: (1, 6) row of the measured angle.
     """
-    gain, _, _ = control.lqr(A.T, output.T, V_d * np.eye(6), np.array([[V_n]]))
-    return np.asarray(gain).ravel()
+    return (output @ error_covariance(A, output, V_d, V_n)).ravel() / V_n
+
+
+def error_covariance(A: Array, output: Array, V_d: float, V_n: float) -> Array:
+    """Return the (6, 6) stationary covariance of the estimate's error; arguments as for :func:`observer_gain`.
+
+    Args:
+        A: (6, 6) of the model.
+        output: (1, 6) row of the measured angle.
+    """
+    return np.asarray(solve_continuous_are(A.T, output.T, V_d * np.eye(6), np.array([[V_n]])))
 
 
 def gain_comparisons() -> list[Comparison]:
