@@ -150,7 +150,7 @@ def _figure(rows: int, size: tuple[float, float]) -> tuple[Figure, Sequence[Axes
     """Return a figure with panels one below the other; fixed margins cost half of what a layout engine takes."""
     figure = Figure(figsize=size)
     FigureCanvasAgg(figure)
-    axes = figure.subplots(rows, 1, sharex=rows > 1, squeeze=False)[:, 0]
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     width, height = size
     figure.subplots_adjust(
         LEFT / width, BOTTOM / height, 1.0 - RIGHT / width, 1.0 - TOP / height, hspace=GAP * rows / height

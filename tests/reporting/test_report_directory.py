@@ -13,7 +13,7 @@ from orchestrator.checking.policy import Policy
 from orchestrator.checking.rules import RULES
 from orchestrator.checking.verdict import judge
 from orchestrator.cli import main
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.paired.metric import ErrorStatistics
 from orchestrator.paired.sweep import COLUMNS
 from orchestrator.reporting import Findings, Plot, ReportTable, report_from_directory, write_report
@@ -144,6 +144,13 @@ def test_report_rebuilds_the_same_page_and_leaves_nothing_else(sweep, capsys):
     assert main(["report", str(sweep)]) == 0
     assert capsys.readouterr().out == f"{sweep / 'report.html'}\n"
     assert (sweep / "report.html").read_bytes() == before
+    assert sorted(p.name for p in sweep.iterdir()) == ["report.html", "sweep.csv", "sweep.json"]
+
+
+def test_a_page_that_cannot_be_moved_into_place_leaves_nothing(sweep):
+    (sweep / "report.html").mkdir()
+    with pytest.raises(OutputError, match=r"cannot write .*report.html"):
+        write_report(sweep)
     assert sorted(p.name for p in sweep.iterdir()) == ["report.html", "sweep.csv", "sweep.json"]
 
 

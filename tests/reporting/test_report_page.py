@@ -134,5 +134,7 @@ def test_a_thinned_curve_keeps_its_peaks_its_gaps_and_its_ends():
     assert None in thin.y
     assert (thin.x[0], thin.x[-1]) == (0, count - 1)
     assert all(thin.labels[i] == str(x) for i, x in enumerate(thin.x))
+    few = Series("c", [0, 1, 2, 3], [1.0, 2.0, 2.0, 1.0])
+    assert thinned(few, 4) is few
     cloud = thinned(Series("b", list(range(count)), y, "points"), 1000)
     assert 900 <= len(cloud.x) <= 1000
