@@ -54,19 +54,10 @@ def diagnose(
 
     Args:
         records: at least 200 rows each; one encoder or two.
-        model: nominal values and how far each may be off.
-        settings: every threshold.
-        test: a record that is test data as a whole; None: the last rows of each record are.
-        search: False: parameters are re-fitted and the model is judged as it stands.
         time_limit: seconds after which the search ends with what it has; None: none.
-        progress: called with what was fitted.
 
     Returns:
         Graded effects, the corrected model, and what is left.
-
-    Raises:
-        ScenarioError: the model has no torque balance, or is too fast for the record.
-        RecordError: nothing moves, or nothing drives.
     """
     whole = [records] if isinstance(records, Record) else list(records)
     check_model(model)

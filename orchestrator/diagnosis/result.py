@@ -40,7 +40,6 @@ class GradedEffect:
     """An effect that the model lacks.
 
     Attributes:
-        name, site: of the effect.
         grade: certain, likely or possible.
         lowered_by: names of the rules that lowered the grade.
         parameters: estimate of each parameter, by short name.
@@ -71,7 +70,6 @@ class Nuisance:
     """A property of the log: a late encoder, an early torque, the gain of the drive.
 
     Attributes:
-        name: of the property.
         grade: certain, likely or possible.
         parameters: estimate of each parameter, by short name.
         lowered_by: names of the rules that lowered the grade.
@@ -88,7 +86,6 @@ class SignalMisfit:
     """Rms of free runs against the measurement of one signal.
 
     Attributes:
-        signal, unit: what was measured.
         noise: standard deviation of its noise.
         nominal, parameters, final: rms of the model as given, re-fitted, and with its effects.
         r_squared: of the final model's free runs.
@@ -118,7 +115,6 @@ class TestMisfit:
     """The misfit on test data of one record.
 
     Attributes:
-        source: of the record.
         rows: of its test part.
         signals: misfit of each encoder.
         torque: (nominal, parameters, final): share of the torque that each leaves; empty: not worked out.
@@ -134,15 +130,7 @@ class TestMisfit:
     still: bool = False
 
     def is_worse(self, more: float, of_noise: float) -> bool:
-        """Tell whether the final model predicts the motion worse than re-fitted parameters do.
-
-        Args:
-            more: share by which chance may make a misfit larger.
-            of_noise: and share of the noise.
-
-        Returns:
-            True where the signals together get worse.
-        """
+        """Tell whether the final model predicts the motion worse than re-fitted parameters do."""
         before, after = (
             np.array([getattr(one, stage) / one.noise for one in self.signals]) for stage in ("parameters", "final")
         )
@@ -180,14 +168,12 @@ class DiagnosisOutcome:
         verdict: "none" (the model explains the record), "parameters" (re-fitted, it does), "effects" (one at least is
             likely) or "unknown" (something is missing, and nothing is likely).
         effects: of the machine, surest first.
-        parameters: estimates by name.
         left: share of each residual's power that no law explains, by body or output.
         remaining: what that follows, strongest first.
         test: misfits on test data.
         record: evidence of the records as a whole.
         trust: how far the corrected model can be trusted.
         notes: what to bear in mind, a sentence each.
-        settings: that were used.
         searched: effects were looked for.
     """
 
@@ -214,14 +200,7 @@ class DiagnosisOutcome:
         return any(signal.is_missed for test in self.test for signal in test.signals)
 
     def graded(self, least: Grade) -> tuple[GradedEffect, ...]:
-        """Return the effects of the machine that are at least so sure.
-
-        Args:
-            least: grade.
-
-        Returns:
-            The effects.
-        """
+        """Return the effects of the machine that are at least so sure."""
         return tuple(effect for effect in self.effects if effect.grade >= least)
 
 
@@ -230,7 +209,6 @@ class Diagnosis(DiagnosisOutcome):
     """The outcome of a diagnosis of a plant of ours; docs/diagnosis.md says what each word means.
 
     Attributes:
-        nuisances: of the log.
         law: the strongest dependence of what is left, as a curve, where it may be used; None: there is none.
         model: that the record was compared with.
         workings: how it was made.

@@ -38,7 +38,6 @@ class BalanceSettings(Settings, frozen=True):
     torque_floor: Annotated[float, share("of the torque's power that no law is better than (0.01 % of the torque)")] = (
         1e-8
     )
-    most_kept: Annotated[int, setting("intermediate signals that are kept for the next values", ge=1)] = 60
 
 
 class FitSettings(Settings, frozen=True):
@@ -72,7 +71,6 @@ class SelectionSettings(Settings, frozen=True):
     look_ahead: Annotated[int, setting("first effects that are tried with a second: two may hide each other", ge=0)] = 3
     certain_alone: Annotated[float, share("gain from which no second effect is looked for at once")] = 0.9
     most_effects: Annotated[int, setting("of a model", ge=0)] = 6
-    peaks: Annotated[int, setting("cycles of a wave that are tried in full", ge=1)] = 8
     prior_deviations: Annotated[
         float, setting("of the model file that an effect may push a parameter to: beyond it is another machine")
     ] = 2.5
@@ -123,9 +121,6 @@ class ReportSettings(Settings, frozen=True):
     worse: Annotated[float, share("by which chance may make the misfit of test data larger")] = 0.05
     of_noise: Annotated[float, share("and share of the encoder's noise")] = 0.1
     level: Annotated[float, share("of reported intervals")] = 0.95
-    start_steps: Annotated[int, setting("Gauss-Newton steps to the initial state of a free run", ge=1)] = 12
-    close: Annotated[float, setting("rms in noise deviations up to which a run is close", ge=1)] = 1.3
-    lost: Annotated[float, setting("rms as a share of the motion from which a run follows nothing", gt=0)] = 0.3
     law_gain: Annotated[float, share("of what is left that a learned law takes on blocks left out")] = 0.2
 
 

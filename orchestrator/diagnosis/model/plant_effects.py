@@ -17,16 +17,7 @@ SINE, COSINE = "sine", "cosine"
 
 
 def candidate_effects(model: Model, scales: SignalScales, channels: Sequence[str]) -> dict[str, CandidateEffect]:
-    """Return the effects that a model may lack, by label.
-
-    Args:
-        model: whose plant has the bank; what it sets itself is no candidate.
-        scales: of the record.
-        channels: names of the bodies with an encoder.
-
-    Returns:
-        The effects.
-    """
+    """Return the effects that a model may lack, by label."""
     plant = model.plant
     found = {}
     for row in plant.bank:
@@ -109,11 +100,6 @@ def _wave_scan(row: Effect, scales: SignalScales, channels: Sequence[str], names
 
 def effect_parameters(plant: Plant, effect: CandidateEffect, values: Values) -> Mapping[str, float]:
     """Return an effect's values by name in the plant's table.
-
-    Args:
-        plant: of the effect.
-        effect: as the analysis sees it.
-        values: of it.
 
     Returns:
         Name -> value; sine and cosine as amplitude and phase.

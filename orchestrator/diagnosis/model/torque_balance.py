@@ -52,6 +52,7 @@ from orchestrator.records.record import Record
 Array = NDArray[np.float64]
 SHORTEST = 1e-9  # rad: distance over which friction of a body that does not move builds up
 INITIAL_TORQUE = "initial torque"
+MOST_KEPT = 60  # intermediate signals, for the next values
 _POOL = ThreadPoolExecutor(2)
 
 
@@ -61,8 +62,6 @@ class TorqueBalance(ResidualModel):
     Args:
         model: nominal values and how far each may be off.
         signals: of the record; with as many angles as the plant has bodies.
-        settings: of the balances.
-        angular: positions are angles, not metres.
     """
 
     def __init__(self, model: Model, signals: Signals, settings: BalanceSettings, angular: bool = True) -> None:
@@ -138,14 +137,7 @@ class TorqueBalance(ResidualModel):
     # --- residuals -----------------------------------------------------------------------------------------
 
     def values_at(self, point: ModelPoint) -> Array:
-        """Return the plant's parameters (n,) at a point.
-
-        Args:
-            point: values of the model.
-
-        Returns:
-            The parameters of the analysis.
-        """
+        """Return the plant's parameters (n,) at a point."""
         p = self.nominal.copy()
         p[self._places] = point.parameters[: len(self._places)]
         given: dict[str, float] = {}
@@ -159,12 +151,6 @@ class TorqueBalance(ResidualModel):
         """Return the plant's parameters (n,) at a point, distances over which friction builds up as the model has them.
 
         Those of the analysis are what the encoder's noise asks for, and nothing of the machine.
-
-        Args:
-            point: values of the model.
-
-        Returns:
-            The parameters of a simulation.
         """
         p = self.values_at(point)
         unreported = [self.plant.index(name) for row in self.plant.bank for name in row.unreported.values()]
@@ -172,14 +158,7 @@ class TorqueBalance(ResidualModel):
         return p
 
     def drive_torque(self, p: Array) -> Array:
-        """Return the drive's torque (n,) [N.m] under the triangle average.
-
-        Args:
-            p: parameters of the analysis.
-
-        Returns:
-            The torque.
-        """
+        """Return the drive's torque (n,) [N.m] under the triangle average."""
         return self._torque(p)
 
     def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
@@ -189,26 +168,12 @@ class TorqueBalance(ResidualModel):
         return list(_POOL.map(self.residual, points))
 
     def residual(self, point: ModelPoint) -> Array:
-        """Return the residuals (channels, n) [N.m] at a point.
-
-        Args:
-            point: values of the model.
-
-        Returns:
-            The residuals, scaled as the head of the module says.
-        """
+        """Return the residuals (channels, n) [N.m] at a point."""
         p = self.values_at(point)
         return np.asarray(self.balance(p, self._initial(point)) * self.residual_scale(point)[:, None])
 
     def residual_scale(self, point: ModelPoint) -> Array:
-        """Return (channels,) residual over missing torque, as the head of the module says.
-
-        Args:
-            point: values of the model.
-
-        Returns:
-            The factors; ones of plain balances.
-        """
+        """Return (channels,) residual over missing torque, as the head of the module says."""
         if not self.scaled:
             return np.ones(len(self.channels))
         p = self.values_at(point)
@@ -225,11 +190,7 @@ class TorqueBalance(ResidualModel):
         """Return the torques (channels, n) [N.m] that are missing at each body.
 
         Args:
-            p: parameters of the analysis.
             initial: torque of the drive at the first row [N.m].
-
-        Returns:
-            The torques.
         """
         plant, step = self.plant, self.step
         angles, speeds, accelerations = self._motion(p)
@@ -277,7 +238,7 @@ class TorqueBalance(ResidualModel):
         for n, angle in enumerate(self._angles):
             key = (n, float(p[places[n]]))
             if key not in self._bristles:
-                if len(self._bristles) > self.settings.most_kept:
+                if len(self._bristles) > MOST_KEPT:
                     self._bristles.clear()
                 steps, bristle = np.diff(angle, prepend=angle[0]), np.empty(self.size)
                 slide_bristle(steps, float(np.exp(key[1])), bristle)
@@ -289,7 +250,7 @@ class TorqueBalance(ResidualModel):
         """Return the drive's torque (n,), kept for the parameters of the drive that were asked for lately."""
         key = tuple(float(p[place]) for place in self._drive)
         if key not in self._torques:
-            if len(self._torques) > self.settings.most_kept:
+            if len(self._torques) > MOST_KEPT:
                 self._torques.clear()
             self._torques[key] = delivered_torque(self.plant, p, self.signals.torque, self.step, self.signals.held)
         return self._torques[key]
@@ -373,16 +334,7 @@ class TorqueBalance(ResidualModel):
 
 
 def balance_of(record: Record, model: Model, settings: DiagnosisSettings) -> TorqueBalance:
-    """Return the torque balances of a model beside a record.
-
-    Args:
-        record: of the machine.
-        model: nominal values and how far each may be off.
-        settings: of the band and the balances.
-
-    Returns:
-        The balances.
-    """
+    """Return the torque balances of a model beside a record."""
     plant = model.plant
     two = len(plant.bodies) > 1
     inertia = None if two else plant.value(plant.extended(model.values), plant.bodies[0].inertia)

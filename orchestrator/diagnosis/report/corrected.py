@@ -111,7 +111,7 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     asked = {model: requests_for_fmu(signals, plant, p) for model, p in models.items()}
     sources = tuple(SignalSource(f"{model}.u", Samples(asked[model][parts[0]], step)) for model in models)
     system = System(instances, (), sources)
-    expected = {model: free_runs(plant, p, signals, parts, settings, history=False) for model, p in models.items()}
+    expected = {model: free_runs(plant, p, signals, parts, history=False) for model, p in models.items()}
     runs: dict[str, list[Array]] = {model: [] for model in models}
     difference, starts = 0.0, list[dict[str, float]]()
     with Session(system, record, GaussSeidel(step), (length - 1) * step) as session:
@@ -147,13 +147,6 @@ def corrected_model(model: Model, diagnosis: Diagnosis) -> str:
 
     Every value that differs from the FMU's default is stated. Those that were fitted carry the half-width of their
     95 % interval as uncertainty, so that another record may move them.
-
-    Args:
-        model: the model that the record was compared with; its columns and encoders are kept.
-        diagnosis: of the record.
-
-    Returns:
-        The text.
     """
     plant, final = model.plant, diagnosis.workings.final
     fitted: dict[str, ValueEstimate] = dict(diagnosis.parameters)

@@ -113,16 +113,7 @@ def report_effect(
     """Return an effect as it is reported.
 
     Args:
-        found: a result whose final model has the effect.
-        evidence: for it.
         names: values of the effect -> parameters by short name.
-        units: of these.
-        record: evidence of the whole record.
-        settings: thresholds.
-        in_model: the corrected model has it.
-
-    Returns:
-        The effect, of the machine.
     """
     label = evidence.label
     name, _, site = label.partition("@")
@@ -133,16 +124,7 @@ def report_effect(
 
 
 def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: Plant) -> tuple[GradedEffect, ...]:
-    """Return effects with one value of each parameter that several have: both end stops are of one stiffness.
-
-    Args:
-        effects: as each was fitted.
-        labels: of those that the model has; the first one that has a parameter sets it.
-        plant: the plant.
-
-    Returns:
-        The effects, in their order.
-    """
+    """Return effects with one value of each parameter that several have: both end stops are of one stiffness."""
     rows = {row.label: row.parameters for row in plant.bank}
     fitted = {one.label: one for one in effects}
     setter = {full: (fitted[label], short) for label in reversed(labels) for short, full in rows[label].items()}
@@ -168,9 +150,6 @@ def add_test_evidence(
     """Return the evidence with what test data say of each effect of the final model: how the rest, re-fitted, does.
 
     Args:
-        evidence: of effects; those that the final model lacks stay as they are.
-        found: by the search.
-        test: misfits of the final model.
         missed: a model -> what its runs miss of the test data, in squares and in units of the noise.
         compared: a model -> how much less the final one leaves of the torque of test data.
     """

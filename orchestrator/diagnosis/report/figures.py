@@ -26,13 +26,7 @@ SHOWN = 6  # effects of a step that are drawn
 
 
 def draw_signals(path: Path, runs: BeforeAfter, diagnosis: Diagnosis) -> None:
-    """Draw the test part: measured and simulated angles, and what each simulation misses, at a scale of its own.
-
-    Args:
-        path: the picture.
-        runs: of both models over the test part.
-        diagnosis: of the record.
-    """
+    """Draw the test part: measured and simulated angles, and what each simulation misses, at a scale of its own."""
     channels = runs.measured.shape[1]
     figure = Figure(figsize=(10.0, 2.3 * 3 * channels), layout="constrained")
     FigureCanvasAgg(figure)
@@ -61,12 +55,7 @@ def draw_signals(path: Path, runs: BeforeAfter, diagnosis: Diagnosis) -> None:
 
 
 def draw_workings(folder: Path, diagnosis: Diagnosis) -> None:
-    """Draw how the search came to its verdict, as ``diagnose_*.png``.
-
-    Args:
-        folder: where to; it exists.
-        diagnosis: with its workings.
-    """
+    """Draw how the search came to its verdict, as ``diagnose_*.png``."""
     _draw_candidates(folder / "diagnose_candidates.png", diagnosis)
     _draw_missing(folder / "diagnose_missing_torque.png", diagnosis)
     _draw_blocks(folder / "diagnose_blocks.png", diagnosis)

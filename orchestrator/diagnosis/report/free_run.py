@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.report.simulation import RunSignals, Simulation
-from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import moving
 from orchestrator.shared.cores import spread
@@ -20,6 +19,9 @@ from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped
 
 Array = NDArray[np.float64]
 
+CLOSE = 1.3  # rms in deviations of the noise up to which a run is close
+LOST = 0.3  # rms as a share of the motion from which a run follows nothing
+STEPS = 12  # of Gauss and Newton to the initial state
 DAMPING = 1e-6  # of the first step: a good guess needs hardly any
 TRIES = 6  # dampings tried in a step
 ENOUGH = 1e-4  # relative gain below which a start has converged
@@ -55,7 +57,6 @@ def free_run(
     guess: Array,
     signals: RunSignals,
     part: slice,
-    settings: ReportSettings,
     history: bool = True,
 ) -> FreeRun:
     """Return the free run whose initial state lies closest to the measurement.
@@ -69,28 +70,28 @@ def free_run(
         part: samples to simulate.
     """
     model = Simulation(plant, p, signals, history)
-    first = _closest(model, guess, part, settings)
-    if (first.straight and not _teeth_may_part(plant, p)) or float(np.max(first.rms / signals.noise)) < settings.close:
+    first = _closest(model, guess, part)
+    if (first.straight and not _teeth_may_part(plant, p)) or float(np.max(first.rms / signals.noise)) < CLOSE:
         return first
     begin, end, _ = part.indices(signals.size)
     start, run = guess, first
     for share in GROWING:
         length = max(round(share * (end - begin)), LEAST_SAMPLES)
         opening = slice(begin, begin + length)
-        run = _closest(model, start, opening, settings)
+        run = _closest(model, start, opening)
         measured = model.measured[opening, : signals.channels]
-        if share == GROWING[0] and _is_lost(run, measured, signals.noise, settings):
+        if share == GROWING[0] and _is_lost(run, measured, signals.noise):
             return first
         start = run.start
     if len(run.outputs) < len(first.outputs):
-        run = _closest(model, start, part, settings)
+        run = _closest(model, start, part)
     cost, other = (float(np.sum((r.rms / signals.noise) ** 2)) for r in (first, run))
     return run if other < cost else first
 
 
-def _is_lost(run: FreeRun, measured: Array, noise: Array, settings: ReportSettings) -> bool:
+def _is_lost(run: FreeRun, measured: Array, noise: Array) -> bool:
     """Tell whether a run over the beginning of a part is far off: a model that does not follow there does nowhere."""
-    far = settings.lost * np.std(measured, axis=0) + settings.close * noise  # a machine may be at rest there
+    far = LOST * np.std(measured, axis=0) + CLOSE * noise  # a machine may be at rest there
     return bool(np.all(run.rms > far))
 
 
@@ -99,7 +100,7 @@ def _teeth_may_part(plant: Plant, p: Array) -> bool:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a run that runs away is infinitely far off
-def _closest(model: Simulation, guess: Array, part: slice, settings: ReportSettings) -> FreeRun:
+def _closest(model: Simulation, guess: Array, part: slice) -> FreeRun:
     """Return the free run at which a descent from the ``guess`` of its initial state ends (damped Gauss-Newton)."""
     plant, signals = model.plant, model.signals
     m = signals.channels
@@ -136,7 +137,7 @@ def _closest(model: Simulation, guess: Array, part: slice, settings: ReportSetti
 
     damping = Damping(DAMPING, 0.0, lambda H: FADE * float(np.trace(H)), TRIES)
     (start, out), _ = damped_fit(
-        (first, outputs(first)), linearise, damping, settings.start_steps,
+        (first, outputs(first)), linearise, damping, STEPS,
         lambda gain, after: gain == 0.0 or gain < ENOUGH * after,
     )  # fmt: skip
     straight = bool(foretold) and abs(foretold[0] - 1.0) < STRAIGHT

@@ -76,13 +76,7 @@ def gap_parameters(gap: HiddenGap, model: Model, level: float) -> dict[str, Para
 
 
 def gap_effects(gap: HiddenGap, test: SignalMisfit, grades: GradeSettings) -> tuple[GradedEffect, ...]:
-    """Return the gap as a graded effect; nothing where none is seen.
-
-    Args:
-        gap: that the estimator found.
-        test: misfit on test data.
-        grades: thresholds.
-    """
+    """Return the gap as a graded effect; nothing where none is seen."""
     if not gap.alpha:
         return ()
     size = gap.alpha / gap.standard_error

@@ -27,14 +27,7 @@ from orchestrator.shared.settings import as_tables
 
 
 def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
-    """Return the results for ``diagnose.json``, as far as the diagnosis knows them.
-
-    Args:
-        diagnosis: of the records.
-
-    Returns:
-        The results without the corrected FMU and what follows from it.
-    """
+    """Return the results for ``diagnose.json``, as far as the diagnosis knows them."""
     play, law = play_of(diagnosis), diagnosis.law
     return DiagnoseFound(
         verdict=diagnosis.verdict,
@@ -58,14 +51,7 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
 
 
 def steps_found(search: SearchResult) -> tuple[StepFound, ...]:
-    """Return the steps of a search as results have them.
-
-    Args:
-        search: that was made.
-
-    Returns:
-        The steps.
-    """
+    """Return the steps of a search as results have them."""
     return tuple(
         StepFound(
             step.before.labels,
@@ -77,15 +63,7 @@ def steps_found(search: SearchResult) -> tuple[StepFound, ...]:
 
 
 def test_found(test: TestMisfit, report: ReportSettings) -> TestFound:
-    """Return how the models do on test data of one record.
-
-    Args:
-        test: misfits.
-        report: settings that say what is worse.
-
-    Returns:
-        The results.
-    """
+    """Return how the models do on test data of one record."""
     misfit = {
         one.signal: SignalMisfitFound(
             _finite(one.nominal), _finite(one.parameters), _finite(one.final), _finite(one.noise), one.unit
@@ -99,14 +77,7 @@ def test_found(test: TestMisfit, report: ReportSettings) -> TestFound:
 
 
 def effect_found(effect: GradedEffect) -> EffectFound:
-    """Return a graded effect as results have it.
-
-    Args:
-        effect: that was found.
-
-    Returns:
-        The result.
-    """
+    """Return a graded effect as results have it."""
     evidence = effect.evidence
     return EffectFound(
         effect.name, effect.site, effect.grade.word, _values(effect.parameters),
@@ -129,14 +100,7 @@ def _values(parameters: Mapping[str, ValueEstimate]) -> dict[str, ValueFound]:
 
 
 def dependence_found(one: Dependence) -> DependenceFound:
-    """Return what is left and follows a signal as results have it.
-
-    Args:
-        one: the dependence.
-
-    Returns:
-        The result.
-    """
+    """Return what is left and follows a signal as results have it."""
     comparison = one.comparison
     return DependenceFound(
         one.site, one.argument, _finite(one.share), _finite(comparison.gain), _finite(comparison.t), one.formula

@@ -18,13 +18,6 @@ def form_verdict(
 ) -> str:  # fmt: skip
     """Return the verdict.
 
-    Args:
-        found: by the search.
-        effects: of the machine and of the log, graded.
-        dependences: of what is left.
-        record: evidence of the whole record.
-        settings: thresholds.
-
     Returns:
         "effects": one at least is likely; "unknown": something is missing and nothing is likely; "none" or
         "parameters":
@@ -56,21 +49,7 @@ def judge_trust(
     verdict: str, effects: Sequence[GradedEffect], searched: bool, record: RecordEvidence, test: Sequence[TestMisfit],
     parameters: dict[str, ParameterEstimate], uncertain: Sequence[ModelParameter], settings: DiagnosisSettings,
 ) -> Trust:  # fmt: skip
-    """Return how far the corrected model can be trusted.
-
-    Args:
-        verdict: of the diagnosis.
-        effects: graded.
-        searched: effects were looked for.
-        record: evidence of the whole record.
-        test: misfits on test data.
-        parameters: estimates by name.
-        uncertain: parameters as the model file or the map has them.
-        settings: thresholds.
-
-    Returns:
-        Level and reasons.
-    """
+    """Return how far the corrected model can be trusted."""
     red, amber = [], []
     if verdict == "unknown":
         why = "no effect of the library is likely" if searched else "no search was made"

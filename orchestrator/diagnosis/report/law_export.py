@@ -109,7 +109,7 @@ def run_with_law(diagnosis: Diagnosis, law: Dependence, fmu: Path) -> LawRun:
     wide, p = with_law(plant), _values_with_law(diagnosis, law)
     encoders, step = plant.encoders[: signals.channels], signals.step
     parts = run_parts(first, signals.size, settings)
-    expected = free_runs(wide, p, signals, parts, settings, history=False)
+    expected = free_runs(wide, p, signals, parts, history=False)
     asked = requests_for_fmu(signals, plant, diagnosis.workings.final)
     instance = fmu_instance("law", fmu, {ON: 1})
     source = SignalSource("law.u", Samples(asked[parts[0]], step))

@@ -57,14 +57,7 @@ REPEAT = "the same torque twice: what comes again is the machine, what does not 
 
 
 def summarise(found: Diagnosis) -> Iterator[str]:
-    """Yield the answer of a diagnosis, a sentence or two a line.
-
-    Args:
-        found: the diagnosis.
-
-    Yields:
-        What is missing; for each effect its size, how sure it is and what it does; what is left; what to do next.
-    """
+    """Yield the answer of a diagnosis, a sentence or two a line."""
     yield headline(found)
     for effect in found.effects:
         yield from _effect(effect, found)
@@ -77,14 +70,7 @@ def summarise(found: Diagnosis) -> Iterator[str]:
 
 
 def effect_words(label: str) -> str:
-    """Return an effect at a site, ``coulomb_friction@motor``, in words.
-
-    Args:
-        label: name and site.
-
-    Returns:
-        The words.
-    """
+    """Return an effect at a site, ``coulomb_friction@motor``, in words."""
     name, _, site = label.partition("@")
     parts = name.split("_")
     words = " ".join(PROPER.get(word, word) for word in parts)
@@ -92,28 +78,13 @@ def effect_words(label: str) -> str:
 
 
 def listed(labels: Sequence[str]) -> str:
-    """Return effects in words, as a list in a sentence.
-
-    Args:
-        labels: names and sites.
-
-    Returns:
-        The words.
-    """
+    """Return effects in words, as a list in a sentence."""
     words = [effect_words(label) for label in labels]
     return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
 
 def headline(found: DiagnosisOutcome, subject: str = "model") -> str:
-    """Return the verdict in one sentence.
-
-    Args:
-        found: the diagnosis.
-        subject: what the record was compared with, in words.
-
-    Returns:
-        The sentence.
-    """
+    """Return the verdict in one sentence."""
     if found.verdict in ("none", "parameters") and found.misses_test_data:
         return (
             f"Verdict: {found.verdict}. No effect of the library is missing, yet the {subject} misses the test data by "
@@ -139,14 +110,7 @@ def headline(found: DiagnosisOutcome, subject: str = "model") -> str:
 
 
 def play_of(found: Diagnosis) -> Play | None:
-    """Return the size of the backlash that was named; None: none is likely.
-
-    Args:
-        found: the diagnosis.
-
-    Returns:
-        Half-gap and play.
-    """
+    """Return the size of the backlash that was named; None: none is likely."""
     gap = next((effect for effect in found.graded(Grade.LIKELY) if effect.name == "backlash"), None)
     if gap is None:
         return None
@@ -167,42 +131,21 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
 
 
 def sizes_line(effect: GradedEffect) -> str:
-    """Return an effect and its sizes, with their 95 % intervals, as a line.
-
-    Args:
-        effect: that was found.
-
-    Returns:
-        The line.
-    """
+    """Return an effect and its sizes, with their 95 % intervals, as a line."""
     sizes = ", ".join(f"{name.replace('_', ' ')} {value_words(e)}" for name, e in effect.parameters.items())
     words = effect_words(effect.label)
     return f"  {words[:1].upper()}{words[1:]}: {sizes}"
 
 
 def value_words(estimate: ValueEstimate) -> str:
-    """Return a value with its unit and 95 % interval in words.
-
-    Args:
-        estimate: of the value.
-
-    Returns:
-        The words.
-    """
+    """Return a value with its unit and 95 % interval in words."""
     low, high = estimate.interval
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
     return f"{estimate.value:.5g}{unit} (95 %: {low:.5g} to {high:.5g})"
 
 
 def test_words(effect: GradedEffect) -> str:
-    """Return what test data say of an effect, as the end of a sentence; nothing where it was not tested.
-
-    Args:
-        effect: that was found.
-
-    Returns:
-        The words.
-    """
+    """Return what test data say of an effect, as the end of a sentence; nothing where it was not tested."""
     share, torque = effect.evidence.motion_share, effect.evidence.test_torque
     if not math.isfinite(share):
         return ""
@@ -218,28 +161,14 @@ def test_words(effect: GradedEffect) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in words.
-
-    Args:
-        share: of one.
-
-    Returns:
-        Whole per cent; what is less, or none at all, as such.
-    """
+    """Return a share in words."""
     if share <= 0.0:
         return "none"
     return "under 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
 
 
 def sureness(effect: GradedEffect) -> str:
-    """Return the grade of an effect, the evidence for it, and the rule that speaks most against it, in words.
-
-    Args:
-        effect: that was found.
-
-    Returns:
-        A sentence or two.
-    """
+    """Return the grade of an effect, the evidence for it, and the rule that speaks most against it, in words."""
     evidence = effect.evidence
     text = f"{effect.grade.word.capitalize()}: its size is {evidence.size_t:.3g} times its error"
     if math.isfinite(evidence.gain):
@@ -258,14 +187,7 @@ def sureness(effect: GradedEffect) -> str:
 
 
 def nuisance_words(nuisance: Nuisance) -> str:
-    """Return a property of the log in words.
-
-    Args:
-        nuisance: the property.
-
-    Returns:
-        Part of a sentence.
-    """
+    """Return a property of the log in words."""
     ((name, e),) = nuisance.parameters.items()
     if name == "gain":
         return (
@@ -302,14 +224,7 @@ def _left(found: Diagnosis) -> str:
 
 
 def left_percent(power: float) -> str:
-    """Return what is left of a signal in words.
-
-    Args:
-        power: share of its power.
-
-    Returns:
-        The share of its rms.
-    """
+    """Return what is left of a signal in words."""
     return f"{100.0 * math.sqrt(power):.2g} %"
 
 
@@ -326,9 +241,6 @@ def _motion(found: Diagnosis) -> Iterator[str]:
 
 def next_steps(found: DiagnosisOutcome) -> Iterator[str]:
     """Yield which record would settle what is open.
-
-    Args:
-        found: the diagnosis.
 
     Yields:
         A sentence each; one at least.

@@ -101,9 +101,6 @@ def torque_comparison(
 ) -> Callable[[ModelPoint], ScoreComparison | None]:
     """Return what compares models with the final one by the whitened torque that they leave of test data.
 
-    Args:
-        test: misfits; what lies still is left out.
-
     Returns:
         A model's values -> how much less the final one leaves; None: the test part is too short to tell.
     """
@@ -134,16 +131,7 @@ LEAST_TRAVEL = 20.0  # in deviations of the noise, from which a test part moves
 
 
 def run_parts(first: int, size: int, settings: ReportSettings) -> list[slice]:
-    """Return the parts of a record over which free runs go: from a row to its end, of one length.
-
-    Args:
-        first: row at which test data begin.
-        size: rows of the record.
-        settings: of the report.
-
-    Returns:
-        The parts, in order.
-    """
+    """Return the parts of a record over which free runs go: from a row to its end, of one length."""
     rows = size - first
     count = max(settings.runs, round(rows / (settings.longest_run * size)))
     count = max(min(count, rows // settings.least_rows), 1)
@@ -152,25 +140,13 @@ def run_parts(first: int, size: int, settings: ReportSettings) -> list[slice]:
 
 
 def free_runs(
-    plant: Plant, p: Array, signals: RunSignals, parts: Sequence[slice], settings: ReportSettings, history: bool = True
+    plant: Plant, p: Array, signals: RunSignals, parts: Sequence[slice], history: bool = True
 ) -> list[FreeRun]:
-    """Return a free run over each part, from the initial state that lies closest.
-
-    Args:
-        plant: the plant.
-        p: its parameters.
-        signals: of the record.
-        parts: of it.
-        settings: of the report.
-        history: as in :class:`Simulation`.
-
-    Returns:
-        The runs.
-    """
+    """Return a free run over each part, from the initial state that lies closest."""
 
     def run(part: slice) -> FreeRun:
         guesses = start_guesses(plant, p, signals, part.start)
-        runs = [free_run(plant, p, guess, signals, part, settings, history) for guess in guesses]
+        runs = [free_run(plant, p, guess, signals, part, history) for guess in guesses]
         return min(runs, key=lambda one: float(np.sum((one.rms / signals.noise) ** 2)))
 
     return spread(run, list(parts))
@@ -178,12 +154,6 @@ def free_runs(
 
 def start_guesses(plant: Plant, p: Array, signals: RunSignals, row: int) -> list[Array]:
     """Return first guesses of the state at a row: one, or three where a load that is not measured lies in a gap.
-
-    Args:
-        plant: the plant.
-        p: its parameters.
-        signals: of the record.
-        row: of it.
 
     Returns:
         States (8,): in mid-gap, and at either flank.
@@ -201,19 +171,8 @@ def start_guesses(plant: Plant, p: Array, signals: RunSignals, row: int) -> list
 
 
 def run_misfit(plant: Plant, p: Array, signals: RunSignals, first: int, settings: ReportSettings) -> Array:
-    """Return the rms (channels,) of free runs over the test part of a record against the measurement.
-
-    Args:
-        plant: the plant.
-        p: its parameters.
-        signals: of the record.
-        first: row at which test data begin.
-        settings: of the report.
-
-    Returns:
-        The rms of each encoder; infinite where runs go astray.
-    """
-    runs = free_runs(plant, p, signals, run_parts(first, signals.size, settings), settings)
+    """Return the rms (channels,) of free runs over the test part of a record against the measurement."""
+    runs = free_runs(plant, p, signals, run_parts(first, signals.size, settings))
     return np.asarray(np.sqrt(np.mean([run.rms**2 for run in runs], axis=0)))
 
 
@@ -221,20 +180,7 @@ def motion_misfit(
     plant: Plant, models: Sequence[Array], signals: RunSignals, first: int, source: str, unit: str,
     settings: ReportSettings,
 ) -> TestMisfit:  # fmt: skip
-    """Return the misfit of the nominal, the re-fitted and the final model on the test part of a record.
-
-    Args:
-        plant: the plant.
-        models: parameters of the three.
-        signals: of the record.
-        first: row at which test data begin.
-        source: name of the record.
-        unit: of positions.
-        settings: of the report.
-
-    Returns:
-        The rms of each encoder.
-    """
+    """Return the misfit of the nominal, the re-fitted and the final model on the test part of a record."""
     rms = [run_misfit(plant, p, signals, first, settings) for p in models]
     parts = run_parts(first, signals.size, settings)
     variance = np.mean([np.var(signals.angles[part], axis=0) for part in parts], axis=0)

@@ -16,14 +16,7 @@ FREE_SPREAD = 30.0  # of a parameter whose prior is off
 
 
 def record_evidence(found: SearchResult) -> RecordEvidence:
-    """Return what the record says of the final model as a whole.
-
-    Args:
-        found: by the search.
-
-    Returns:
-        The evidence.
-    """
+    """Return what the record says of the final model as a whole."""
     problem = found.problem
     left = torque_shares(problem, found.final.point)
     inertia, error, spread = recorded_inertia(problem, found.final)
@@ -33,15 +26,7 @@ def record_evidence(found: SearchResult) -> RecordEvidence:
 
 
 def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
-    """Return what speaks for one effect of the final model.
-
-    Args:
-        found: by the search.
-        label: of the effect.
-
-    Returns:
-        The evidence, without what test data say.
-    """
+    """Return what speaks for one effect of the final model."""
     problem, final, review = found.problem, found.final, found.reviews[label]
     effect = problem.effects[label]
     step = next((step for step in found.steps if step.taken == label), review)
@@ -63,15 +48,7 @@ def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
 
 
 def missing_torque(problem: FitProblem, point: ModelPoint) -> float:
-    """Return the power of what a model leaves within the band, white, in shares of the nominal one's, summed.
-
-    Args:
-        problem: of the records.
-        point: values of the model.
-
-    Returns:
-        The sum over records and channels.
-    """
+    """Return the power of what a model leaves within the band, white, in shares of the nominal one's, summed."""
     total = 0.0
     for model, seen, start in zip(
         problem.models, problem.record_points(point), problem.record_points(problem.start), strict=True
@@ -83,15 +60,7 @@ def missing_torque(problem: FitProblem, point: ModelPoint) -> float:
 
 
 def torque_shares(problem: FitProblem, point: ModelPoint) -> Array:
-    """Return (channels,) the power that a model leaves within the band over that of what drives each body.
-
-    Args:
-        problem: of the records.
-        point: values of the model.
-
-    Returns:
-        The mean over records.
-    """
+    """Return (channels,) the power that a model leaves within the band over that of what drives each body."""
     shares = []
     for model, seen in zip(problem.models, problem.record_points(point), strict=True):
         plain = band_only(model, problem.settings)
@@ -105,16 +74,7 @@ def torque_shares(problem: FitProblem, point: ModelPoint) -> Array:
 
 
 def size_over_error(problem: FitProblem, fitted: FittedModel, label: str) -> float:
-    """Return the sizes of an effect over their errors, blocks' disagreement included.
-
-    Args:
-        problem: of the fit.
-        fitted: the model.
-        label: of the effect.
-
-    Returns:
-        The root mean square over the sizes, their errors' correlation considered.
-    """
+    """Return the sizes of an effect over their errors, blocks' disagreement included."""
     effect = problem.effects[label]
     places = [fitted.coordinates.index((label, n)) for n in effect.sizes if (label, n) in fitted.coordinates]
     if not places:
@@ -131,10 +91,6 @@ def recorded_inertia(problem: FitProblem, fitted: FittedModel) -> tuple[float, f
 
     The priors are off, and torque is regressed on motion: an inertia far from the model file's tells that the record
     is of another machine.
-
-    Args:
-        problem: of the fit.
-        fitted: the final model.
 
     Returns:
         Inertia, standard error, spread in the model file; (1, 0, 0) of a model without one.

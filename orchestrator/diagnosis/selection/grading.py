@@ -20,12 +20,9 @@ class GradeRule:
     """A row that lowers a grade.
 
     Attributes:
-        name: of the rule.
         highest: the grade that an effect has at most where the rule does not hold.
         holds: (effect, record, settings) -> whether it holds.
-        statistic: what is compared.
         setting: name of the threshold.
-        reason: why.
     """
 
     name: str
@@ -128,43 +125,18 @@ GRADE_RULES: tuple[GradeRule, ...] = (
 def grade_effect(
     effect: EffectEvidence, record: RecordEvidence, settings: DiagnosisSettings
 ) -> tuple[Grade, tuple[str, ...]]:
-    """Return the grade of an effect and the names of the rules that lowered it.
-
-    Args:
-        effect: evidence for it.
-        record: evidence of the whole record.
-        settings: thresholds.
-
-    Returns:
-        The grade, and the rules that do not hold.
-    """
+    """Return the grade of an effect and the names of the rules that lowered it."""
     broken = tuple(rule.name for rule in GRADE_RULES if not rule.holds(effect, record, settings))
     return highest_grade(broken), broken
 
 
 def highest_grade(broken: Collection[str]) -> Grade:
-    """Return the grade that an effect has at most where some rules do not hold.
-
-    Args:
-        broken: names of these rules.
-
-    Returns:
-        The grade.
-    """
+    """Return the grade that an effect has at most where some rules do not hold."""
     return min((rule.highest for rule in GRADE_RULES if rule.name in broken), default=Grade.CERTAIN)
 
 
 def possible_effects(
     evidence: Sequence[EffectEvidence], record: RecordEvidence, settings: DiagnosisSettings
 ) -> list[str]:
-    """Return the effects that are not even likely: a corrected model that had them might predict worse.
-
-    Args:
-        evidence: for each effect.
-        record: evidence of the whole record.
-        settings: thresholds.
-
-    Returns:
-        Their labels.
-    """
+    """Return the effects that are not even likely: a corrected model that had them might predict worse."""
     return [one.label for one in evidence if grade_effect(one, record, settings)[0] is Grade.POSSIBLE]

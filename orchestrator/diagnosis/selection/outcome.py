@@ -24,7 +24,6 @@ class SearchStep:
     """One step: the model before, what was tried on top of it, and what was taken ("": nothing).
 
     Attributes:
-        before: the model.
         tried: the effects, by gain.
         taken: label of the effect that entered.
         family: labels of those that are not told from it.
@@ -48,8 +47,6 @@ class SearchResult:
     Attributes:
         problem: with the whitening and the prior's weight of the final model.
         base: the model with re-fitted parameters alone, as the problem of its own time had it.
-        final: the final model.
-        steps: of the search.
         reviews: label -> the step that it makes in the final model, with the family that it has there.
         refused: labels that entered once and did not pay in the end.
         complete: False when time ran out.
@@ -112,7 +109,6 @@ class EffectEvidence:
     """What speaks for one effect: when it entered, or by what leaves with it, whichever is more.
 
     Attributes:
-        label, kind: of the effect.
         t: paired gain over its standard error.
         gain: share of the squared error that it takes of what is left without it.
         share: share of the missing torque that it explains.
@@ -142,7 +138,6 @@ class Dependence:
     """What is left at a body follows a signal.
 
     Attributes:
-        argument: in words.
         site: where the torque acts.
         argument_unit, unit: of knots and values.
         knots, values: (k,) of the curve, a torque against the motion.

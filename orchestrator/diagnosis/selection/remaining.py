@@ -30,16 +30,7 @@ RIDGE = 1e-9  # of the trace: knots that no row reaches stay where their neighbo
 def find_dependences(
     found: SearchResult, arguments: Sequence[LawArgument], settings: SelectionSettings
 ) -> tuple[Dependence, ...]:
-    """Return what the final model leaves and which signals it follows, strongest first.
-
-    Args:
-        found: by the search.
-        arguments: signals to look at.
-        settings: least gain of an effect, and least paired errors by which it must differ from zero.
-
-    Returns:
-        Those that predict blocks left out surely better.
-    """
+    """Return what the final model leaves and which signals it follows, strongest first."""
     tried = [_fit_curve(found, argument) for argument in arguments]
     kept = [
         one for one in tried
@@ -68,9 +59,6 @@ def hats(knots: Array, values: Array) -> Array:
     Args:
         knots: (k,) rising.
         values: (n,) of the signal.
-
-    Returns:
-        The shares.
     """
     place = np.clip(np.searchsorted(knots, values), 1, knots.size - 1)
     share = (values - knots[place - 1]) / (knots[place] - knots[place - 1])
@@ -146,10 +134,6 @@ def formula_of(knots: Array, values: Array, errors: Array, most: float = 1.5) ->
         knots: (k,) arguments.
         values: (k,) of the curve.
         errors: (k,) standard errors of the values.
-        most: mean squared error in standard errors up to which a formula holds.
-
-    Returns:
-        The formula, s being the argument; empty: none does.
     """
     terms = simple_terms(knots)
     weight = 1.0 / np.maximum(errors, 1e-3 * float(np.max(np.abs(values))))

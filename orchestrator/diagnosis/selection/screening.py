@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.inference.fitting import FittedModel
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, Values
-from orchestrator.diagnosis.settings import SelectionSettings
 
 Array = NDArray[np.float64]
+MOST_PEAKS = 8  # cycles of a wave that are tried in full
 TEETH = 15  # values of a comb
 WHOLE = 0.25  # of an effect tried as it is: below this share of it in the fit, its gain counts by that share
 
@@ -28,8 +28,8 @@ class ScreenedEffect:
 class Screening:
     """What a fitted model's own values can explain, taken out of its residuals and of any further column."""
 
-    def __init__(self, problem: FitProblem, fitted: FittedModel, settings: SelectionSettings) -> None:
-        self.problem, self.fitted, self.settings = problem, fitted, settings
+    def __init__(self, problem: FitProblem, fitted: FittedModel) -> None:
+        self.problem, self.fitted = problem, fitted
         prior, slopes = problem.prior(fitted.point, fitted.coordinates)
         whole = np.vstack([fitted.jacobian, np.diag(slopes)])
         self.basis, _ = np.linalg.qr(whole / (np.linalg.norm(whole, axis=0) + 1e-300))
@@ -93,7 +93,7 @@ class Screening:
         if power.size == 0:
             return []
         peaks = [n for n in range(power.size) if power[n] == power[max(0, n - 2) : n + 3].max()]
-        return [float(wave.cycles[n]) for n in sorted(peaks, key=lambda n: -power[n])[: self.settings.peaks]]
+        return [float(wave.cycles[n]) for n in sorted(peaks, key=lambda n: -power[n])[:MOST_PEAKS]]
 
     def _changes(self, trials: Sequence[tuple[CandidateEffect, Values]]) -> list[Array]:
         """Return the columns (rows, k) of each trial: of each amplitude, or of the effect as it is."""

@@ -29,31 +29,14 @@ def search_effects(
     progress: Progress = lambda what: None,
     out_of_time: Callable[[], bool] = lambda: False,
 ) -> SearchResult:
-    """Search for the effects that a model lacks.
-
-    Args:
-        problem: of the records.
-        settings: of the search.
-        progress: called with what was fitted.
-        out_of_time: whether the search must end with what it has.
-
-    Returns:
-        The final model and the way to it.
-    """
+    """Search for the effects that a model lacks. Return the final model and the way to it."""
     base, problem = fit_base(problem)
     search = _Search(settings, progress, out_of_time)
     return search.run(SearchResult(problem, base, base))
 
 
 def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
-    """Return the model with re-fitted parameters, and the problem whitened by what it leaves.
-
-    Args:
-        problem: whitened by the nominal model.
-
-    Returns:
-        Model and problem.
-    """
+    """Return the model with re-fitted parameters, and the problem whitened by what it leaves."""
     starts = [problem.start] if problem.first is None else [problem.first, problem.start]
     fitted = min((fit_model(problem, start) for start in starts), key=lambda one: one.cost)
     for number in range(SETTLINGS):
@@ -82,28 +65,13 @@ def settle_anew(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, F
     """Return what :func:`settle` returns, from the model file's values too where these lead to less.
 
     What the model lacked before may have led its values to where no fit comes back from.
-
-    Args:
-        problem: of the fit.
-        fitted: the model.
-
-    Returns:
-        Problem and model.
     """
     again = fit_model(problem, ModelPoint(problem.start.parameters, fitted.point.effects))
     return settle(problem, again if again.cost < fitted.cost else fitted)
 
 
 def leave_out(found: SearchResult, labels: Sequence[str]) -> SearchResult:
-    """Return the result with a final model that lacks some effects, the rest fitted anew.
-
-    Args:
-        found: by the search.
-        labels: of the effects.
-
-    Returns:
-        The result; the same without labels.
-    """
+    """Return the result with a final model that lacks some effects, the rest fitted anew."""
     if not labels:
         return found
     fitted = fit_model(found.problem, found.final.point.without_effects(labels))
@@ -246,7 +214,7 @@ class _Search:
         return SearchStep(model, tuple(tried), chosen.label, tuple(one.label for one in family if one is not chosen))
 
     def _tried(self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int) -> list[TriedEffect]:
-        screening = Screening(problem, model, self.settings)
+        screening = Screening(problem, model)
         tried = []
         for screened in screening.screen(self._candidates(problem, model, refused))[:count]:
             fitted = fit_model(problem, screened_point(model, screened))
@@ -299,10 +267,6 @@ class _Search:
 
 def farthest_parameter(problem: FitProblem, model: FittedModel) -> float:
     """Return how far the parameter lies that is farthest from the model file, in its standard deviations.
-
-    Args:
-        problem: of the fit.
-        model: fitted.
 
     Returns:
         The distance; 0.0 where every parameter is known.
