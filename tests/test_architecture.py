@@ -37,8 +37,6 @@ LAYERS = (
     {"checking"},
     {"paired", "estimation"},
     {"estimation.inspection", "estimation.methods"},
-    {"diagnosis.fmu_probe_settings"},
-    {"diagnosis.fmu_settings"},
     {"diagnosis.settings"},
     {"diagnosis.data"},
     {"diagnosis.model"},

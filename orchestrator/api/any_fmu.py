@@ -12,22 +12,18 @@ import numpy as np
 
 from orchestrator.api.arguments import choose_settings
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.diagnosis.fmu.deliver import Delivered, deliver
-from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnosing
-from orchestrator.diagnosis.fmu.draft import drafted
+from orchestrator.diagnosis.fmu.corrected_ssp import write_corrected
+from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnose_records
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
-from orchestrator.diagnosis.fmu.misfit import misfit_on_record, stage_runs
-from orchestrator.diagnosis.fmu.model import Data
-from orchestrator.diagnosis.fmu.rate import decimated, factor_of
-from orchestrator.diagnosis.fmu.reading import columns_of, read_data
-from orchestrator.diagnosis.fmu.result import FmuDiagnosis
-from orchestrator.diagnosis.fmu.subject import subject_of
-from orchestrator.diagnosis.fmu.summary import summarise_fmu
+from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor, read_fmu_record
+from orchestrator.diagnosis.fmu.report import FmuDiagnosis, misfit_on_record, stage_runs, summarise_fmu
+from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
 from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, steps_found, test_found
 from orchestrator.diagnosis.result import GradedEffect, TestMisfit
 from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.records.tables import column_names
 from orchestrator.shared.isolation.walls import support
-from orchestrator.shared.results.any_fmu import FmuDiagnosisFound, FmuRemainingFound
+from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import ParameterFound
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Trust
@@ -54,7 +50,7 @@ class FmuDiagnosisResult(Result):
     validation: TestMisfit | None
     seconds: float
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    delivered: list[Delivered] = field(default_factory=list)
+    delivered: list[DeliveredFound] = field(default_factory=list)
 
     @property
     def verdict(self) -> str:
@@ -96,7 +92,9 @@ class FmuDiagnosisResult(Result):
         """Return the summary, and the tables of parameters, candidates and misfits."""
         lines: list[Block] = [*self.summary(), *_tables(self)]
         for d in self.delivered:
-            lines.append(f"Corrected system: {d.path.name}; differs from the fit by {d.difference:.2g} of the noise")
+            lines.append(
+                f"Corrected system: {d.file}; differs from the fit by {d.difference_over_noise:.2g} of the noise"
+            )
         return lines
 
     def results(self, place: Path) -> FmuDiagnosisFound:
@@ -113,9 +111,9 @@ class FmuDiagnosisResult(Result):
             notes=d.notes,
             settings=as_tables(d.settings),
             candidates=steps_found(d.workings.search),
-            model=None if not self.delivered else str(place / self.delivered[0].path.name),
-            delivery=tuple(one.found() for one in self.delivered),
-            step_cost=d.workings.probe.step_cost,
+            model=None if not self.delivered else str(place / self.delivered[0].file),
+            delivery=tuple(self.delivered),
+            step_cost=d.workings.problem.runner.step_cost,
             walls=support().in_words,
             runs=d.workings.problem.runner.runs,
             summary=tuple(summarise_fmu(d)),
@@ -124,7 +122,7 @@ class FmuDiagnosisResult(Result):
 
     def write_files(self, folder: Path) -> None:
         """Write measured and simulated outputs, a figure and the corrected system."""
-        from orchestrator.diagnosis.fmu.figures import draw_signals
+        from orchestrator.diagnosis.fmu.report import draw_signals
 
         problem, stages, test = stage_runs(self.diagnosis.workings)
         header, columns = ["time", *problem.inputs], [problem.data.time, *problem.data.inputs.T]
@@ -138,7 +136,7 @@ class FmuDiagnosisResult(Result):
         draw_signals(folder / "diagnose_signals.png", problem, stages, test)
         if self.verdict != "unknown":
             workings = self.diagnosis.workings
-            self.delivered[:] = [deliver(folder / "corrected.ssp", workings.problem, workings.final)]
+            self.delivered[:] = [write_corrected(folder / "corrected.ssp", workings.problem, workings.final)]
 
     def close(self) -> None:
         """End the child processes now; else they end with the result."""
@@ -173,11 +171,11 @@ def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
             yield table(title, ("record", "output", "as given", "re-fitted", "with effects", "noise", "unit"), cells)
 
 
-def read_records(records: Sequence[Path | str], given: Map, settings: DiagnosisSettings) -> tuple[list[Data], int]:
+def read_records(records: Sequence[Path | str], given: Map, settings: DiagnosisSettings) -> list[FmuRecord]:
     """Return the columns of records that a map names, at the rate that the first one asks for."""
-    found = [read_data(Path(path), given, settings.fmu.read) for path in records]
-    factor = factor_of(found[0], settings.fmu.rate)
-    return [decimated(data, factor) for data in found], factor
+    read = [read_fmu_record(Path(path), given, settings.fmu.uneven) for path in records]
+    factor = decimation_factor(read[0], settings.fmu)
+    return [decimate(record, factor) for record in read]
 
 
 def diagnose_fmu(
@@ -200,15 +198,15 @@ def diagnose_fmu(
     """
     begun = time.monotonic()
     used = choose_settings(settings, DiagnosisSettings)
-    subject = subject_of(Path(fmu))
-    given = read_map(Path(map), subject)
+    system = read_system(Path(fmu))
+    given = read_map(Path(map), system)
     paths = [record] if isinstance(record, (Path, str)) else list(record)
     others = [path for path in (validate, test) if path is not None]
-    read, _ = read_records([*paths, *others], given, used)
+    read = read_records([*paths, *others], given, used)
     further = dict(zip([name for name, path in (("validate", validate), ("test", test)) if path is not None],
                        read[len(paths) :], strict=True))  # fmt: skip
-    found = diagnosing(
-        subject, given, read[: len(paths)], used, test=further.get("test"), search=search, time_limit=time_limit,
+    found = diagnose_records(
+        system, given, read[: len(paths)], used, test=further.get("test"), search=search, time_limit=time_limit,
         progress=progress,
     )  # fmt: skip
     try:
@@ -240,4 +238,4 @@ def draft_map(record: Path | str, fmu: Path | str) -> str:
         >>> "[ports.port_1]" in oc.draft_map("axis.csv", "axis.fmu")
         True
     """
-    return drafted(subject_of(Path(fmu)), columns_of(Path(record)))
+    return draft_map_text(read_system(Path(fmu)), column_names(Path(record)))

@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 from orchestrator.api.any_fmu import Progress, parameter_results, read_records
 from orchestrator.api.arguments import choose_settings
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.diagnosis.fmu.calibrate import FmuCalibration, calibrate_fmu
+from orchestrator.diagnosis.fmu.diagnose import FmuCalibration, calibrate_fmu
 from orchestrator.diagnosis.fmu.mapping import read_map
-from orchestrator.diagnosis.fmu.subject import subject_of
+from orchestrator.diagnosis.fmu.system import read_system
 from orchestrator.diagnosis.report.json_results import test_found
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
@@ -123,13 +123,13 @@ def calibrate(
     """
     begun = time.monotonic()
     used = choose_settings(settings, DiagnosisSettings)
-    subject = subject_of(Path(fmu))
+    system = read_system(Path(fmu))
     if not isinstance(map, (Path, str)):
         raise ScenarioError("`map` must be the path of a TOML file, but is not", "map")
-    given = read_map(Path(map), subject)
+    given = read_map(Path(map), system)
     paths = [record] if isinstance(record, (Path, str)) else list(record)
-    read, _ = read_records(paths, given, used)
-    found = calibrate_fmu(subject, given, read, used, progress)
+    read = read_records(paths, given, used)
+    found = calibrate_fmu(system, given, read, used, progress)
     found.diagnosis.workings.close()
     arguments = {"record": str(paths[0]), "fmu": str(fmu), "map": str(map)}
     return CalibrationResult(found, time.monotonic() - begun, arguments)

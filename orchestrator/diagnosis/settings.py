@@ -5,7 +5,6 @@
 
 from typing import Annotated
 
-from orchestrator.diagnosis.fmu_settings import FmuSettings
 from orchestrator.shared.settings import Settings, note, setting, share
 
 
@@ -122,6 +121,28 @@ class ReportSettings(Settings, frozen=True):
     of_noise: Annotated[float, share("and share of the encoder's noise")] = 0.1
     level: Annotated[float, share("of reported intervals")] = 0.95
     law_gain: Annotated[float, share("of what is left that a learned law takes on blocks left out")] = 0.2
+
+
+class FmuSettings(Settings, frozen=True):
+    """Any FMU beside a record: its processes, the rate of the analysis, pulse responses."""
+
+    loading: Annotated[float, setting("seconds that loading may take: some FMUs unpack a whole tool", gt=0.0)] = 60.0
+    patience: Annotated[float, setting("seconds that the first runs may take beyond loading")] = 20.0
+    most_lost: Annotated[
+        int, setting("processes that an FMU may cost: one effect that it cannot stand costs a few", ge=0)
+    ] = 25
+    process_memory: Annotated[int, setting("MiB that a process may use", ge=1)] = 4096
+    repeats: Annotated[float, share("of the noise by which two runs of one model may differ")] = 1e-3
+    uneven: Annotated[float, share("of a sample by which a time may be off")] = 0.01
+    rows: Annotated[int, setting("rows of a record that are looked at in any case", ge=200)] = 4000
+    per_band: Annotated[float, setting("rate over the frequency below which nearly all motion lies", gt=2)] = 16.0
+    most_above: Annotated[float, share("of the squared speed that may lie above the band")] = 0.01
+    pulses: Annotated[int, setting("rows of the record at which a pulse is given: an FMU need not be linear", ge=1)] = 6
+    noise_memory: Annotated[
+        float, share("of the record after which noise at a port is forgotten: integrators have no spectrum")
+    ] = 0.2
+    linear: Annotated[float, share("by which responses along the record may differ, to tell what effects change")] = 0.1
+    start_spread: Annotated[float, setting("how far the start may be off, in noise deviations of the outputs")] = 10.0
 
 
 class DiagnosisSettings(Settings, frozen=True):

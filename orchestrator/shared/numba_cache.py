@@ -17,9 +17,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 from numba.core.bytecode import FunctionIdentity
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile, _CacheLocator
 
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.code_digest import digest_of
@@ -57,6 +57,18 @@ def kept(**options: Any) -> Callable[[Any], Any]:
         return dispatcher
 
     return decorate
+
+
+def use_cache_read_only() -> None:
+    """Read machine code from beside the sources, where a child process cannot write: what is missing is compiled anew.
+
+    It holds for functions of modules that are imported from then on.
+    """
+    os.environ.pop("NUMBA_CACHE_DIR", None)
+    settings: Any = config
+    settings.CACHE_DIR = ""
+    locator: Any = _CacheLocator
+    locator.ensure_cache_path = lambda self: None
 
 
 class _Files(IndexDataCacheFile):

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.fmu.mapping import InputEntry, Options, OutputEntry
-from orchestrator.diagnosis.fmu.reading import columns_of, read_data
+from orchestrator.diagnosis.fmu.record import read_fmu_record
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.master.protocol import Unit
 from orchestrator.master.units import resolve
+from orchestrator.records.tables import column_names
 from orchestrator.scenarios.tables import read_table
 
 ROWS = 150
@@ -52,11 +53,11 @@ def test_dialects_of_a_record_of_an_fmu(dialect: str, tmp_path: Path) -> None:
     if dialect == "dates":
         form = form.replace("08:{n:02d}:00", "08:00:00.{n:03d}")
         _write(path, head, form)
-        assert read_data(path, _map()).step == pytest.approx(1e-3)
+        assert read_fmu_record(path, _map()).step == pytest.approx(1e-3)
     else:
         _write(path, head, form, comma, step)
-        assert read_data(path, _map()).step == pytest.approx(0.5)
-    data = read_data(path, _map())
+        assert read_fmu_record(path, _map()).step == pytest.approx(0.5)
+    data = read_fmu_record(path, _map())
     np.testing.assert_allclose(data.inputs[:, 0], INPUT)
     np.testing.assert_allclose(data.outputs[:, 0], OUTPUT)
     assert data.notes[0].startswith("CSV")
@@ -65,12 +66,12 @@ def test_dialects_of_a_record_of_an_fmu(dialect: str, tmp_path: Path) -> None:
 def test_units_are_converted_to_those_of_the_fmu(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     _write(path, "time,Q [kW],T [K]\n")
-    data = read_data(path, _map())
+    data = read_fmu_record(path, _map())
     np.testing.assert_allclose(data.inputs[:, 0], 1e3 * INPUT)
     np.testing.assert_allclose(data.outputs[:, 0], OUTPUT - 273.15)
-    np.testing.assert_allclose(read_data(path, _map({})).outputs[:, 0], OUTPUT)  # the FMU states none
-    np.testing.assert_allclose(read_data(path, _map(unit="degC")).outputs[:, 0], OUTPUT)  # the map goes first
-    np.testing.assert_allclose(read_data(path, _map(factor=2.0)).outputs[:, 0], 2.0 * OUTPUT)
+    np.testing.assert_allclose(read_fmu_record(path, _map({})).outputs[:, 0], OUTPUT)  # the FMU states none
+    np.testing.assert_allclose(read_fmu_record(path, _map(unit="degC")).outputs[:, 0], OUTPUT)  # the map goes first
+    np.testing.assert_allclose(read_fmu_record(path, _map(factor=2.0)).outputs[:, 0], 2.0 * OUTPUT)
 
 
 @pytest.mark.parametrize("text", ["furlong", "grad", "W", "rad"])
@@ -78,17 +79,17 @@ def test_units_that_do_not_fit_are_refused_and_the_advice_works(text: str, tmp_p
     path = tmp_path / "log.csv"
     _write(path, f"time,Q,T [{text}]\n")
     with pytest.raises(RecordError, match=r'say `unit = "..."` in \$.outputs.T of the map, or `factor`'):
-        read_data(path, _map())
-    np.testing.assert_allclose(read_data(path, _map(unit="degC")).outputs[:, 0], OUTPUT)
-    np.testing.assert_allclose(read_data(path, _map(factor=0.5)).outputs[:, 0], 0.5 * OUTPUT)
+        read_fmu_record(path, _map())
+    np.testing.assert_allclose(read_fmu_record(path, _map(unit="degC")).outputs[:, 0], OUTPUT)
+    np.testing.assert_allclose(read_fmu_record(path, _map(factor=0.5)).outputs[:, 0], 0.5 * OUTPUT)
 
 
 def test_a_time_in_an_unknown_unit(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     _write(path, "time [ticks],Q,T\n", step=1.0)
     with pytest.raises(RecordError, match=r"say `time_factor = \.\.\.`"):
-        read_data(path, _map())
-    assert read_data(path, _map(time_factor=0.01)).step == pytest.approx(0.01)
+        read_fmu_record(path, _map())
+    assert read_fmu_record(path, _map(time_factor=0.01)).step == pytest.approx(0.01)
 
 
 def test_lost_rows_and_empty_cells_are_filled_and_said(tmp_path: Path) -> None:
@@ -99,7 +100,7 @@ def test_lost_rows_and_empty_cells_are_filled_and_said(tmp_path: Path) -> None:
     lines[61] = lines[61].rsplit(",", 1)[0] + ","
     del lines[91]
     path.write_text("\n".join(lines) + "\n")
-    data = read_data(path, _map())
+    data = read_fmu_record(path, _map())
     assert data.time.size == ROWS
     np.testing.assert_allclose(data.inputs[:, 0], np.where(np.isin(np.arange(ROWS), (30, 90)), INPUT[[29]], INPUT))
     np.testing.assert_allclose(np.delete(data.outputs[:, 0], 30), np.delete(OUTPUT, 30), atol=2e-3)
@@ -118,25 +119,25 @@ def test_what_is_too_much_to_fill_is_refused(rows: slice, said: str | None, tmp_
     del lines[rows]
     path.write_text("\n".join(lines) + "\n")
     if said is None:
-        assert read_data(path, _map()).time.size == ROWS - 1
+        assert read_fmu_record(path, _map()).time.size == ROWS - 1
     else:
         with pytest.raises(RecordError, match=said):
-            read_data(path, _map())
+            read_fmu_record(path, _map())
 
 
 def test_columns_by_number_and_a_stated_line(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     _write(path, "time,Q,T\na,b,c\n")
     with pytest.raises(RecordError, match="no such column: 'Q' of `a,b,c`"):
-        read_data(path, _map(time="a"))
-    assert read_data(path, _map(header=1)).time.size == ROWS
+        read_fmu_record(path, _map(time="a"))
+    assert read_fmu_record(path, _map(header=1)).time.size == ROWS
     given = _map(time="#1")
     given.inputs, given.outputs = {"Q": InputEntry("#2")}, {"T": OutputEntry("#3")}
-    assert read_data(path, given).time.size == ROWS
+    assert read_fmu_record(path, given).time.size == ROWS
     _write(path, "time,Q,T,T\n", "{t},{q},{y},{y}")
-    assert columns_of(path) == ["time", "Q", "T", "T"]
+    assert column_names(path) == ["time", "Q", "T", "T"]
     with pytest.raises(RecordError, match="2 of them: name it by number, such as `#3`"):
-        read_data(path, _map())
+        read_fmu_record(path, _map())
 
 
 @pytest.mark.parametrize(

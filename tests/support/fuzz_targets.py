@@ -17,7 +17,7 @@ import numpy as np
 from orchestrator.api.ssp import export_ssp
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.diagnosis.fmu.mapping import read_map
-from orchestrator.diagnosis.fmu.subject import subject_of
+from orchestrator.diagnosis.fmu.system import read_system
 from orchestrator.errors import OrchestratorError
 from orchestrator.fmi.model_description import read_description
 from orchestrator.records.model_file import read_model
@@ -95,7 +95,7 @@ def map_file(data: bytes) -> bool:
     """A map of any FMU."""
     accepted: list[bool] = []
     with _errors_of_ours(accepted):
-        read_map(_case(data, "map.toml"), subject_of(_folder() / f"{IDENTIFIER}.fmu"))
+        read_map(_case(data, "map.toml"), read_system(_folder() / f"{IDENTIFIER}.fmu"))
     return bool(accepted)
 
 

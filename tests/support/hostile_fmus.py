@@ -83,7 +83,7 @@ import sys
 from pathlib import Path
 seconds = sys.argv.pop(1)
 if "diagnose" in sys.argv:
-    Path("impatient.toml").write_text(f"[fmu.process]\\nloading = {seconds}\\npatience = {seconds}\\n")
+    Path("impatient.toml").write_text(f"[fmu]\\nloading = {seconds}\\npatience = {seconds}\\n")
     sys.argv += ["--settings", "impatient.toml"]
 from orchestrator.__main__ import run
 run()

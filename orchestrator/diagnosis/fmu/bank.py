@@ -1,7 +1,7 @@
 """What may be attached around an FMU: one row each, with where a fit starts from."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 from pyfmu_sources import port_laws as laws
 
 Array = NDArray[np.float64]
+Values = tuple[float, ...]
 INPUT, OUTPUT, PORT, PARAMETER, CUT = "input", "output", "port", "parameter", "cut"
+ONCE_A_TURN = 0.03  # of a turn by which a ripple must differ from gravity, which comes once a turn
+LONG = 0.04  # of the motion over which hysteresis builds up at least: below, it is friction
+STARTS_OFF = 1e-3  # of its rms by which an input starts away from zero to be tried from both
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
+class SignalScales:
     """Typical sizes of what happens where an effect would act; starting values depend on them.
 
     Attributes:
@@ -26,7 +30,6 @@ class Surroundings:
         angular: the position is an angle.
         effort: rms of what goes through a cut, negative where it acts against the twist.
         cycles: wavenumbers of ripples over the position, in order, told apart within its span.
-        once, long: thresholds that tell ripples from gravity, and hysteresis from friction.
     """
 
     h: float
@@ -41,206 +44,174 @@ class Surroundings:
     angular: bool = False
     effort: float = 1.0
     cycles: tuple[float, ...] = ()
-    once: float = 0.0
-    long: float = 0.0
-
-
-Values = tuple[float, ...]
-REMEMBERS = ("input_delay", "input_lag", "input_rate_limit")
-"""Effects in series with an input for which it matters what the signal was before the record."""
 
 
 @dataclass(frozen=True)
-class Kind:
+class EffectKind:
     """One row of the bank.
 
     Attributes:
         where: in series at an ``input`` or an ``output``, as feedback at a ``port``, in the value of a ``parameter``,
             or in the ``cut`` between two FMUs.
+        sort: what sort of law it is, see :class:`CandidateEffect`.
         parameters: their names, in the order of the values.
         units: of each: "effort", "flow", "signal" and "s" stand for the units at the place where it acts.
-        scales: scene -> what counts as a small change of each.
-        starts: scene -> values to try.
-        linear: the response is proportional to all values (found from one small change of each).
+        scales: signal scales -> what counts as a small change of each.
+        starts: signal scales -> values to try; None: the response is proportional to all values.
+        amplitudes: in how many of the values, the first ones, the response is linear, where it is not in all.
         law: number of the law, for feedback.
         lower: smallest value of each.
-        amplitudes: in how many of the values, the first ones, the response is linear, where it is not in all.
+        positive: amplitudes must be.
         needs: the simpler effect that it contains.
         plausible: values -> False where the fit has left what the effect means.
-        scan: scene -> values of the last parameter, in order and so close that the best of them leads a fit to the
-            right one: more than the FMU is run for, looked through with its surrogate.
+        remembers: it matters what the signal was before the record.
+        scan: signal scales -> values in order, so close that the best of them leads a fit to the right one: more than
+            the FMU is run for, looked through where it is linear.
     """
 
     name: str
     where: str
+    sort: str
     parameters: tuple[str, ...]
     units: tuple[str, ...]
-    scales: Callable[[Surroundings], Values]
-    starts: Callable[[Surroundings], tuple[Values, ...]]
-    linear: bool = False
+    scales: Callable[[SignalScales], Values]
+    starts: Callable[[SignalScales], tuple[Values, ...]] | None = None
+    amplitudes: int = 0
     law: int = 0
     lower: Values = ()
-    amplitudes: int = 0
+    positive: bool = False
     needs: str = ""
-    plausible: Callable[[Values, Surroundings], bool] = lambda values, scene: True
-    angular: bool = False
-    scan: Callable[[Surroundings], tuple[float, ...]] = lambda scene: ()
+    plausible: Callable[[Values, SignalScales], bool] = lambda values, scales: True
+    remembers: bool = False
+    scan: Callable[[SignalScales], tuple[float, ...]] = lambda scales: ()
 
 
-def _delays(s: Surroundings) -> tuple[Values, ...]:
-    return tuple((f * s.h,) for f in (0.15, 0.5, 1.0, 1.7, 2.5, 4.0, 6.0, 9.0, 14.0))
+def _shares(shares: Values, of: str) -> Callable[[SignalScales], tuple[Values, ...]]:
+    return lambda s: tuple((f * getattr(s, of),) for f in shares)
 
 
-def _lags(s: Surroundings) -> tuple[Values, ...]:
-    return tuple((f * s.h,) for f in (0.3, 1.0, 3.0, 8.0, 20.0))
-
-
-def _limits(s: Surroundings) -> tuple[Values, ...]:
-    return tuple((f * s.peak,) for f in (0.3, 0.5, 0.65, 0.75, 0.83, 0.89, 0.93, 0.96, 0.985, 0.996))
-
-
-def _widths(s: Surroundings) -> tuple[Values, ...]:
-    return tuple((f * s.peak,) for f in (0.01, 0.03, 0.08, 0.16, 0.3))
-
-
-def _rates(s: Surroundings) -> tuple[Values, ...]:
+def _rates(s: SignalScales) -> tuple[Values, ...]:
     steps = np.abs(np.diff(s.signal))
     top = float(steps.max()) / s.h if len(steps) else 1.0
     return tuple((f * top,) for f in (0.02, 0.05, 0.12, 0.25, 0.5, 0.8))
 
 
-def _quanta(s: Surroundings) -> tuple[Values, ...]:
-    return tuple((f * s.peak,) for f in (0.05, 0.1, 0.2, 0.4))
-
-
-def _all_limits(s: Surroundings) -> tuple[float, ...]:
-    return tuple(float(s.peak * (1.0 - f)) for f in np.geomspace(0.9, 0.001, 48))
-
-
-def _all_widths(s: Surroundings) -> tuple[float, ...]:
-    return tuple(float(s.peak * f) for f in np.geomspace(0.0003, 0.8, 48))
-
-
-def _all_rates(s: Surroundings) -> tuple[float, ...]:
+def _all_rates(s: SignalScales) -> tuple[float, ...]:
     """Return rates up to many times what the samples show: a jump between two of them takes its time all the same."""
     return tuple(float(f * _rates(s)[-1][0]) for f in np.geomspace(0.003, 60.0, 64))
 
 
-def _all_quanta(s: Surroundings) -> tuple[float, ...]:
+def _all_quanta(s: SignalScales) -> tuple[float, ...]:
     """Return quanta of which the peak holds 60 to a half, a quarter more or less each time: no threshold is passed."""
     return tuple(float(s.peak / count) for count in np.arange(60.0, 0.5, -0.25))
 
 
-def _friction(s: Surroundings) -> tuple[Values, ...]:
+def _speeds_and_walks(s: SignalScales) -> tuple[Values, ...]:
     walk = s.speed * s.h
-    return tuple((0.05 * s.size, f * walk) for f in (0.1, 0.6, 3.0, 12.0, 60.0))
+    return tuple((0.0, 0.0, v * s.speed, d * walk) for v in (0.1, 0.3) for d in (0.1, 0.6, 3.0))
 
 
-def _small(share: float) -> Callable[[Surroundings], Values]:
-    return lambda s: (share * s.size,)
+_delays = _shares((0.15, 0.5, 1.0, 1.7, 2.5, 4.0, 6.0, 9.0, 14.0), "h")
+_lags = _shares((0.3, 1.0, 3.0, 8.0, 20.0), "h")
+_limits = _shares((0.3, 0.5, 0.65, 0.75, 0.83, 0.89, 0.93, 0.96, 0.985, 0.996), "peak")
 
 
-def _once_a_turn(values: Values, scene: Surroundings) -> bool:
-    return scene.angular and abs(values[2] - 1.0) < scene.once
-
-
-def _repeats(values: Values, scene: Surroundings) -> bool:
+def _repeats(values: Values, scales: SignalScales) -> bool:
     """Tell whether a ripple comes back within the motion, more than once a turn: else it is a spring, or gravity."""
-    slow = bool(scene.cycles) and abs(values[2]) < 0.5 * scene.cycles[0]
-    return not slow and not _once_a_turn(values, scene)
+    slow = bool(scales.cycles) and abs(values[2]) < 0.5 * scales.cycles[0]
+    return not slow and not (scales.angular and abs(values[2] - 1.0) < ONCE_A_TURN)
 
 
-def _positive(values: Values, scene: Surroundings) -> bool:
-    del scene
+def _positive(values: Values, scales: SignalScales) -> bool:
+    del scales
     return values[0] > 0.0
 
 
 _SERIES = (
-    Kind("input_gain", INPUT, ("gain",), ("1",), lambda s: (0.01,), lambda s: ((0.01,),), True),
-    Kind("input_offset", INPUT, ("offset",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True),
-    Kind("input_delay", INPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,)),
-    Kind("input_lag", INPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,)),
-    Kind("input_saturation", INPUT, ("limit",), ("effort",), lambda s: (0.003 * s.peak,), _limits, lower=(0.0,),
-         scan=_all_limits),
-    Kind("input_dead_zone", INPUT, ("width",), ("effort",), lambda s: (0.003 * s.peak,), _widths, lower=(0.0,),
-         scan=_all_widths),
-    Kind("input_rate_limit", INPUT, ("rate",), ("effort/s",), lambda s: (0.01 * _rates(s)[2][0],), _rates,
-         lower=(1e-30,), scan=_all_rates),
-    Kind("input_quantisation", INPUT, ("step",), ("effort",), lambda s: (0.01 * s.peak,), _quanta, lower=(0.0,),
-         scan=_all_quanta),
-    Kind("output_gain", OUTPUT, ("gain",), ("1",), lambda s: (0.003,), lambda s: ((0.01,),), True),
-    Kind("output_offset", OUTPUT, ("offset",), ("flow",), lambda s: (s.noise,), lambda s: ((s.noise,),), True),
-    Kind("output_delay", OUTPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,)),
-    Kind("output_lag", OUTPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,)),
-    Kind("output_quantisation", OUTPUT, ("step",), ("flow",), lambda s: (s.noise,),
-         lambda s: tuple((f * s.noise,) for f in (6.0, 15.0, 40.0, 100.0)), lower=(0.0,)),
+    EffectKind("input_gain", INPUT, "gain", ("gain",), ("1",), lambda s: (0.01,)),
+    EffectKind("input_offset", INPUT, "constant", ("offset",), ("effort",), lambda s: (0.01 * s.size,)),
+    EffectKind("input_delay", INPUT, "timing", ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,),
+               remembers=True),
+    EffectKind("input_lag", INPUT, "timing", ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,),
+               remembers=True),
+    EffectKind("input_saturation", INPUT, "limit", ("limit",), ("effort",), lambda s: (0.003 * s.peak,), _limits,
+               lower=(0.0,), scan=lambda s: tuple(float(s.peak * (1.0 - f)) for f in np.geomspace(0.9, 0.001, 48))),
+    EffectKind("input_dead_zone", INPUT, "limit", ("width",), ("effort",), lambda s: (0.003 * s.peak,),
+               _shares((0.01, 0.03, 0.08, 0.16, 0.3), "peak"), lower=(0.0,),
+               scan=lambda s: tuple(float(s.peak * f) for f in np.geomspace(0.0003, 0.8, 48))),
+    EffectKind("input_rate_limit", INPUT, "limit", ("rate",), ("effort/s",), lambda s: (0.01 * _rates(s)[2][0],),
+               _rates, lower=(1e-30,), remembers=True, scan=_all_rates),
+    EffectKind("input_quantisation", INPUT, "resolution", ("step",), ("effort",), lambda s: (0.01 * s.peak,),
+               _shares((0.05, 0.1, 0.2, 0.4), "peak"), lower=(0.0,), scan=_all_quanta),
+    EffectKind("output_gain", OUTPUT, "gain", ("gain",), ("1",), lambda s: (0.003,)),
+    EffectKind("output_offset", OUTPUT, "constant", ("offset",), ("flow",), lambda s: (s.noise,)),
+    EffectKind("output_delay", OUTPUT, "timing", ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,)),
+    EffectKind("output_lag", OUTPUT, "timing", ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags,
+               lower=(0.0,)),
+    EffectKind("output_quantisation", OUTPUT, "resolution", ("step",), ("flow",), lambda s: (s.noise,),
+               _shares((6.0, 15.0, 40.0, 100.0), "noise"), lower=(0.0,)),
 )  # fmt: skip
 
 _FEEDBACK = (
-    Kind("coulomb_friction", PORT, ("level", "distance"), ("effort", "flow"),
-         lambda s: (0.01 * s.size, 0.2 * s.speed * s.h), _friction, law=laws.COULOMB, lower=(0.0, 1e-300), amplitudes=1,
-         plausible=lambda v, s: 0.0 < v[0] < 3.0 * s.peak and v[1] < 0.5 * s.span),
-    Kind("stribeck_friction", PORT, ("sliding", "breakaway", "speed", "distance"),
-         ("effort", "effort", "flow/s", "flow"),
-         lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 * s.speed, 0.2 * s.speed * s.h), lambda s: (),
-         law=laws.STRIBECK, lower=(0.0, 0.0, 1e-300, 1e-300), needs="coulomb_friction",
-         plausible=lambda v, s: v[1] > max(1.03 * v[0], 0.0)),
-    Kind("quadratic_drag", PORT, ("coefficient",), ("effort.s2/flow2",), lambda s: (0.01 * s.size / s.speed**2,),
-         lambda s: ((0.01 * s.size / s.speed**2,),), True, laws.QUADRATIC, plausible=_positive),
-    Kind("viscous_drag", PORT, ("coefficient",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
-         lambda s: ((0.01 * s.size / s.speed,),), True, laws.VISCOUS, plausible=_positive),
-    Kind("spring", PORT, ("stiffness",), ("effort/flow",), lambda s: (0.01 * s.size / s.position,),
-         lambda s: ((0.01 * s.size / s.position,),), True, laws.SPRING, plausible=_positive),
-    Kind("hardening_spring", PORT, ("cubic",), ("effort/flow3",), lambda s: (0.01 * s.size / s.position**3,),
-         lambda s: ((0.01 * s.size / s.position**3,),), True, laws.HARDENING),
-    Kind("gravity", PORT, ("sine", "cosine"), ("effort", "effort"), lambda s: (0.01 * s.size, 0.01 * s.size),
-         lambda s: ((0.01 * s.size, 0.01 * s.size),), True, laws.GRAVITY, angular=True),
-    Kind("ripple", PORT, ("sine", "cosine", "wavenumber"), ("effort", "effort", "1/flow"),
-         lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 / s.span),
-         lambda s: tuple((0.01 * s.size, 0.01 * s.size, n) for n in s.cycles[:: max(len(s.cycles) // 24, 1)]),
-         law=laws.RIPPLE, scan=lambda s: s.cycles, amplitudes=2,
-         plausible=_repeats),
-    Kind("hysteresis", PORT, ("level", "distance"), ("effort", "flow"),
-         lambda s: (0.01 * s.size, 0.02 * s.span),
-         lambda s: tuple((0.05 * s.size, f * s.span) for f in (0.08, 0.25, 0.8)),
-         law=laws.HYSTERESIS, lower=(0.0, 1e-300), amplitudes=1,
-         plausible=lambda v, s: 0.0 < v[0] < 10.0 * s.peak and s.long * s.span < v[1] < 3.0 * s.span),
-    Kind("load", PORT, ("effort",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True, laws.LOAD),
-    Kind("directional_friction", PORT, ("difference",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
-         lambda s: ((0.01 * s.size / s.speed,),), True, laws.DIRECTIONAL),
-    Kind("added_inertia", PORT, ("inertia",), ("effort.s2/flow",), lambda s: (0.003 * s.size / s.acceleration,),
-         lambda s: ((0.003 * s.size / s.acceleration,),), True, laws.INERTIA),
+    EffectKind("coulomb_friction", PORT, "friction", ("level", "distance"), ("effort", "flow"),
+               lambda s: (0.01 * s.size, 0.2 * s.speed * s.h),
+               lambda s: tuple((0.0, f * (s.speed * s.h)) for f in (0.1, 0.6, 3.0, 12.0, 60.0)), 1, laws.COULOMB,
+               (0.0, 1e-300), True, plausible=lambda v, s: 0.0 < v[0] < 3.0 * s.peak and v[1] < 0.5 * s.span),
+    EffectKind("stribeck_friction", PORT, "friction", ("sliding", "breakaway", "speed", "distance"),
+               ("effort", "effort", "flow/s", "flow"),
+               lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 * s.speed, 0.2 * s.speed * s.h), _speeds_and_walks, 2,
+               laws.STRIBECK, (0.0, 0.0, 1e-300, 1e-300), True, "coulomb_friction",
+               plausible=lambda v, s: v[1] > max(1.03 * v[0], 0.0)),
+    EffectKind("quadratic_drag", PORT, "speed", ("coefficient",), ("effort.s2/flow2",),
+               lambda s: (0.01 * s.size / s.speed**2,), law=laws.QUADRATIC, positive=True, plausible=_positive),
+    EffectKind("viscous_drag", PORT, "speed", ("coefficient",), ("effort.s/flow",),
+               lambda s: (0.01 * s.size / s.speed,), law=laws.VISCOUS, positive=True, plausible=_positive),
+    EffectKind("spring", PORT, "position", ("stiffness",), ("effort/flow",), lambda s: (0.01 * s.size / s.position,),
+               law=laws.SPRING, positive=True, plausible=_positive),
+    EffectKind("hardening_spring", PORT, "position", ("cubic",), ("effort/flow3",),
+               lambda s: (0.01 * s.size / s.position**3,), law=laws.HARDENING),
+    EffectKind("gravity", PORT, "position", ("sine", "cosine"), ("effort", "effort"),
+               lambda s: (0.01 * s.size, 0.01 * s.size), law=laws.GRAVITY),
+    EffectKind("ripple", PORT, "wave", ("sine", "cosine", "wavenumber"), ("effort", "effort", "1/flow"),
+               lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 / s.span),
+               lambda s: tuple((0.0, 0.0, cycle) for cycle in s.cycles[:1]), 2, laws.RIPPLE, plausible=_repeats),
+    EffectKind("hysteresis", PORT, "memory", ("level", "distance"), ("effort", "flow"),
+               lambda s: (0.01 * s.size, 0.02 * s.span),
+               lambda s: tuple((0.0, f * s.span) for f in (0.08, 0.25, 0.8)), 1, laws.HYSTERESIS, (0.0, 1e-300), True,
+               plausible=lambda v, s: 0.0 < v[0] < 10.0 * s.peak and LONG * s.span < v[1] < 3.0 * s.span),
+    EffectKind("load", PORT, "constant", ("effort",), ("effort",), lambda s: (0.01 * s.size,), law=laws.LOAD),
+    EffectKind("directional_friction", PORT, "speed", ("difference",), ("effort.s/flow",),
+               lambda s: (0.01 * s.size / s.speed,), law=laws.DIRECTIONAL),
+    EffectKind("added_inertia", PORT, "inertia", ("inertia",), ("effort.s2/flow",),
+               lambda s: (0.003 * s.size / s.acceleration,), law=laws.INERTIA),
 )  # fmt: skip
 
-_INSIDE = (
-    Kind("parameter_drift", PARAMETER, ("rate",), ("effort/s",), lambda s: (0.05 * s.size / s.span,),
-         lambda s: ((0.1 * s.size / s.span,),), True),
-    Kind("parameter_dependence", PARAMETER, ("slope",), ("effort/signal",), lambda s: (0.05 * s.size / s.span,),
-         lambda s: ((0.1 * s.size / s.span,),), True),
+_ELSEWHERE = (
+    EffectKind("parameter_drift", PARAMETER, "parameter", ("rate",), ("effort/s",),
+               lambda s: (0.05 * s.size / s.span,)),
+    EffectKind("parameter_dependence", PARAMETER, "parameter", ("slope",), ("effort/signal",),
+               lambda s: (0.05 * s.size / s.span,)),
+    EffectKind("backlash", CUT, "gap", ("width",), ("flow",), lambda s: (0.02 * s.size,),
+               _shares((0.1, 0.4, 1.5, 6.0, 25.0), "size"), law=laws.BACKLASH, lower=(0.0,),
+               plausible=lambda v, s: 0.0 < v[0] < 0.5 * s.span),
+    EffectKind("compliance", CUT, "resonance", ("compliance",), ("flow/effort",), lambda s: (0.01 * s.size / s.effort,),
+               law=laws.COMPLIANCE, positive=True, plausible=_positive),
 )  # fmt: skip
 
-_BETWEEN = (
-    Kind("backlash", CUT, ("width",), ("flow",), lambda s: (0.02 * s.size,),
-         lambda s: tuple((f * s.size,) for f in (0.1, 0.4, 1.5, 6.0, 25.0)), law=laws.BACKLASH, lower=(0.0,),
-         plausible=lambda v, s: 0.0 < v[0] < 0.5 * s.span),
-    Kind("compliance", CUT, ("compliance",), ("flow/effort",), lambda s: (0.01 * s.size / s.effort,),
-         lambda s: ((0.01 * s.size / s.effort,),), True, law=laws.COMPLIANCE, plausible=_positive),
-)  # fmt: skip
-
-BANK: Mapping[str, Kind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK, *_INSIDE, *_BETWEEN)}
+BANK: Mapping[str, EffectKind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK, *_ELSEWHERE)}
 
 
 @dataclass(frozen=True)
-class BoxEffect:
+class FmuEffect:
     """An effect of the bank at a place: the name of an input, an output, a parameter, a port or a cut of the map.
 
     ``at_rest``: a signal with memory was zero before the record, and not what it was at first. ``signal``: what a
     parameter depends on.
     """
 
-    kind: Kind
+    kind: EffectKind
     place: str
-    scene: Surroundings = field(compare=False, repr=False)
+    scales: SignalScales = field(compare=False, repr=False)
     at_rest: bool = False
     signal: str = ""
 
@@ -250,10 +221,18 @@ class BoxEffect:
         return f"{self.kind.name}@{self.place}" + (f"({self.signal})" if self.signal else "")
 
     @property
-    def amplitudes(self) -> int:
-        """Return in how many of its leading values the response to it is linear."""
-        return len(self.kind.parameters) if self.kind.linear else self.kind.amplitudes
+    def remembers(self) -> bool:
+        """Whether it matters what the signal was before the record."""
+        return self.kind.remembers and abs(self.scales.signal[0]) > STARTS_OFF * self.scales.size
 
-    def bounded(self, values: Array) -> Array:
-        """Return values no smaller than what the law allows."""
-        return np.maximum(values, self.kind.lower) if self.kind.lower else values
+    def at(self, values: Values) -> tuple["FmuEffect", Array]:
+        """Return effect and values as a run takes them, of values as the analysis has them."""
+        count = len(self.kind.parameters)
+        given = np.array(values[:count])
+        given = np.maximum(given, self.kind.lower) if self.kind.lower else given
+        return replace(self, at_rest=len(values) > count and values[count] > 0.5), given
+
+    def named(self, values: Values) -> dict[str, float]:
+        """Return values by name; a gain, which is fitted by what it has more than 1, is the factor."""
+        more = 1.0 if self.kind.name.endswith("_gain") else 0.0
+        return {name: more + value for name, value in zip(self.kind.parameters, values, strict=False)}

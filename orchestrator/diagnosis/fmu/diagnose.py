@@ -1,66 +1,67 @@
-"""The diagnosis of any FMU, once through: probes, residuals, search, grades, what is left, test data, verdict."""
+"""Diagnosis of any FMU, once through: probes, residuals, search, grades, what is left, test data. Its calibration."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
 
 from orchestrator.diagnosis.data.records import split_records
-from orchestrator.diagnosis.fmu.growing import grow_fit
+from orchestrator.diagnosis.fmu.effects import effect_units
 from orchestrator.diagnosis.fmu.mapping import Map
-from orchestrator.diagnosis.fmu.misfit import misfit_on_test_data, misses_of
-from orchestrator.diagnosis.fmu.model import Data
-from orchestrator.diagnosis.fmu.prepare import prepare_problems
-from orchestrator.diagnosis.fmu.problem import BoxProblem
-from orchestrator.diagnosis.fmu.remaining_arguments import port_arguments
-from orchestrator.diagnosis.fmu.residual_model import FmuResiduals
-from orchestrator.diagnosis.fmu.result import FmuDiagnosis, FmuWorkings
-from orchestrator.diagnosis.fmu.subject import Subject
-from orchestrator.diagnosis.fmu.units import effect_units, named_values
+from orchestrator.diagnosis.fmu.probing import prepare_problems
+from orchestrator.diagnosis.fmu.problem import FmuProblem
+from orchestrator.diagnosis.fmu.record import FmuRecord
+from orchestrator.diagnosis.fmu.report import FmuDiagnosis, FmuWorkings, misfit_on_test_data, misses_of
+from orchestrator.diagnosis.fmu.residual_model import FmuResiduals, port_arguments
+from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
-from orchestrator.diagnosis.model.interface import Values
-from orchestrator.diagnosis.report.estimates import add_test_evidence, parameter_estimates, report_effect
+from orchestrator.diagnosis.inference.whitening import band_only
+from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.report.estimates import (
+    add_test_evidence,
+    parameter_estimates,
+    report_effect,
+    value_covariance,
+)
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
-from orchestrator.diagnosis.result import GradedEffect
 from orchestrator.diagnosis.selection.evidence import effect_evidence, record_evidence, torque_shares
 from orchestrator.diagnosis.selection.grading import possible_effects
-from orchestrator.diagnosis.selection.outcome import EffectEvidence, RecordEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
 from orchestrator.diagnosis.selection.search import fit_base, leave_out, search_effects
-from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.diagnosis.settings import DiagnosisSettings, FitSettings
+from orchestrator.errors import ScenarioError
 
 Progress = Callable[[str], None]
 DEFAULT_SETTINGS = DiagnosisSettings()
+PARTS = (1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0)  # of a record, fitted one after the other
+ITERATIONS = 8  # of each part: a motion that is hardly to be foretold converges slowly
+CONFOUNDED = 0.95  # correlation from which two parameters count as not told apart
+LEARNED = 0.3  # share of its uncertainty below which the records have said little of a parameter
 START_PAYS = 30.0  # squared whitened error that another start must take to be granted: a true one takes far more
 
 
 def diagnose_fmu(
-    subject: Subject,
+    system: FmuSystem,
     given: Map,
-    records: Sequence[Data],
+    records: Sequence[FmuRecord],
     settings: DiagnosisSettings = DEFAULT_SETTINGS,
     *,
-    test: Data | None = None,
+    test: FmuRecord | None = None,
     search: bool = True,
     time_limit: float | None = None,
     progress: Progress = lambda what: None,
-    workers: int | None = None,
 ) -> FmuDiagnosis:
     """Compare records of one machine with an FMU, or several, and name what is missing around it.
 
     Args:
-        subject: the FMU, or several.
-        given: the map.
         records: at one sample time.
-        settings: every threshold.
         test: a record that is test data as a whole; None: the last rows of each record are.
         search: False: parameters are re-fitted and the model is judged as it stands.
         time_limit: seconds after which the search ends with what it has; None: the map's budget.
         progress: called with what was fitted.
-        workers: child processes.
 
     Returns:
         Graded effects, the corrected model, and what is left; whoever has it ends the FMU's processes by its workings.
@@ -72,33 +73,23 @@ def diagnose_fmu(
     until = time.monotonic() + (given.options.budget if time_limit is None else time_limit)
     fitted, test_data = split_records(tuple(records), settings.test_share, test)
     progress("probing")
-    problems, probe = prepare_problems(subject, given, fitted, workers, progress, settings.fmu)
+    problems, notes = prepare_problems(system, given, fitted, None, progress, settings.fmu)
     try:
         with np.errstate(all="ignore"):
-            problem = problem_of(problems, settings)
+            problem = _fit_problem(problems, settings)
             chosen = settings.selection if search else msgspec.structs.replace(settings.selection, most_effects=0)
             found = search_effects(problem, chosen, progress, lambda: time.monotonic() > until)
             residuals = tuple(model for model in problem.models if isinstance(model, FmuResiduals))
-            points = (found.problem.start, found.base.point, found.final.point)
-            models = (residuals[0].box_model(found.problem.record_points(point)[0]) for point in points)
-            return _report(FmuWorkings(test_data, found, residuals, probe, *models), settings)
+            return _report(FmuWorkings(test_data, found, residuals), notes, settings)
     except BaseException:
         problems[0].runner.close()
         raise
 
 
-def problem_of(problems: Sequence[BoxProblem], settings: DiagnosisSettings) -> FitProblem:
-    """Return the problem of some records, with a start that is off where that pays.
-
-    Args:
-        problems: FMU and record, each.
-        settings: of fits.
-
-    Returns:
-        The problem.
-    """
+def _fit_problem(problems: Sequence[FmuProblem], settings: DiagnosisSettings) -> FitProblem:
+    """Return the problem of some records, with a start that is off where that pays."""
     models = tuple(FmuResiduals(problem) for problem in problems)
-    whole = fit_problem(models, settings.fit, grow_fit(models[0], settings.fit) if len(models) == 1 else None)
+    whole = fit_problem(models, settings.fit, _grow_fit(models[0], settings.fit) if len(models) == 1 else None)
     if all(len(model.parameters) == len(model.without_start().parameters) for model in models):
         return whole
     base, settled = fit_base(whole)
@@ -108,20 +99,37 @@ def problem_of(problems: Sequence[BoxProblem], settings: DiagnosisSettings) -> F
     return whole if without.cost - base.cost > START_PAYS else fit_problem(exact, settings.fit)
 
 
-def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
+def _grow_fit(model: FmuResiduals, settings: FitSettings) -> ModelPoint | None:
+    """Return values that bring free runs of an FMU that is not linear close to the record.
+
+    A free run that has left the record does not say how to come back: the part over which it keeps close is fitted
+    first, residuals in units of the outputs' noise.
+    """
+    if model.is_linear:
+        return None
+    plain = band_only(model, settings)
+    white = replace(plain, weights=plain.weights / model.problem.noise[:, None])
+    point = FitProblem((model,), (white,), settings).start
+    for part in PARTS:
+        active = white.active.copy()
+        active[:, white.rows > part * model.size] = 0.0
+        point = fit_model(FitProblem((model,), (replace(white, active=active),), settings), point, ITERATIONS).point
+    return point
+
+
+def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSettings) -> FmuDiagnosis:
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
     searched, problem = workings.search, workings.problem
     record = record_evidence(searched)
     evidence = [effect_evidence(searched, label) for label in searched.final.labels]
     found = leave_out(searched, possible_effects(evidence, record, settings))
-    final = workings.residuals[0].box_model(found.problem.record_points(found.final.point)[0])
-    workings = replace(workings, search=found, final=final)
+    workings = replace(workings, search=found)
     test = misfit_on_test_data(workings)
-    labels = found.final.labels
-    graded = tuple(
-        _graded(workings, found if one.label in labels else searched, one, record, settings, one.label in labels)
-        for one in add_test_evidence(evidence, found, test, misses_of(workings))
-    )
+    graded = []
+    for one in add_test_evidence(evidence, found, test, misses_of(workings)):
+        effect, in_model = workings.residuals[0].placed[one.label], one.label in found.final.labels
+        source, units = found if in_model else searched, effect_units(problem, effect)
+        graded.append(report_effect(source, one, effect.named, units, record, settings, in_model))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection)
     verdict = form_verdict(found, graded, remaining, record, settings)
@@ -129,7 +137,7 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
         verdict, graded, bool(searched.steps), record, test, parameters, problem.map.uncertain, settings
     )
     left = torque_shares(found.problem, found.final.point)
-    notes = [*workings.probe.notes, *problem.runner.remarks]
+    notes = [*notes, *problem.runner.remarks]
     if not found.complete:
         notes.append("the time limit ended the search: effects that were not tried may be missing")
     return FmuDiagnosis(
@@ -139,14 +147,58 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     )  # fmt: skip
 
 
-def _graded(
-    workings: FmuWorkings, found: SearchResult, evidence: EffectEvidence, record: RecordEvidence,
-    settings: DiagnosisSettings, in_model: bool,
-) -> GradedEffect:  # fmt: skip
-    effect, _ = workings.residuals[0].placed_effect(evidence.label, found.final.point.effects[evidence.label])
+@dataclass(frozen=True)
+class FmuCalibration:
+    """Parameters that explain records.
 
-    def named(values: Values) -> Mapping[str, float]:
-        return named_values(effect, values)
+    Attributes:
+        diagnosis: of the re-fitted model, no effect searched for.
+        learned: name -> share of the granted uncertainty that the records have removed, 0 to 1.
+        confounded: pairs that the records hardly tell apart.
+        explained: free runs over test data miss no output by more than its noise, and what is left follows nothing.
+        notes: sentences.
+    """
 
-    units = effect_units(workings.problem, effect)
-    return report_effect(found, evidence, named, units, record, settings, in_model)
+    diagnosis: FmuDiagnosis
+    learned: Mapping[str, float]
+    confounded: tuple[tuple[str, str], ...]
+    explained: bool
+    notes: tuple[str, ...]
+
+
+def calibrate_fmu(
+    system: FmuSystem, given: Map, records: Sequence[FmuRecord], settings: DiagnosisSettings, progress: Progress
+) -> FmuCalibration:
+    """Return the parameters of an FMU, or of several, that explain records of one machine, and how much they explain.
+
+    Raises:
+        ScenarioError: the map makes no parameter uncertain.
+        FmuError: the FMU cannot be used.
+        SlaveError: it does not run over a record.
+    """
+    if not given.uncertain:
+        raise ScenarioError(f"{given.source}: $.parameters must give an uncertainty to at least one, but gives none")
+    found = diagnose_fmu(system, given, records, settings, search=False, progress=progress)
+    problem, fitted = found.workings.search.problem, found.workings.search.final
+    covariance = value_covariance(fitted)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    names = [entry.name for entry in problem.shared]
+    learned = {
+        entry.name: float(np.clip(1.0 - errors[k] / np.log1p(entry.spread), 0.0, 1.0))
+        for k, entry in enumerate(problem.shared)
+    }
+    correlation = covariance / errors / errors[:, None]
+    pairs = tuple(
+        (names[i], names[j]) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > CONFOUNDED
+    )
+    notes = [*found.notes]
+    notes += [
+        f"the record hardly determines `{name}`: excite what it acts on"
+        for name, share in learned.items()
+        if share < LEARNED
+    ]
+    notes += [f"the record hardly distinguishes `{a}` and `{b}`: excite other frequencies" for a, b in pairs]
+    explained = found.verdict != "unknown" and not found.misses_test_data
+    if not explained:
+        notes.append("the parameters do not explain the record: `diagnose` looks for what is missing")
+    return FmuCalibration(found, learned, pairs, explained, tuple(notes))

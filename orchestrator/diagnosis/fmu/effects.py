@@ -1,121 +1,235 @@
-"""The rows of the bank at their places around an FMU, as effects that the analysis can fit."""
+"""The effects of the bank at their places around an FMU: how large signals are there, and what a fit tries."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu.bank import REMEMBERS, BoxEffect
+from orchestrator.diagnosis.fmu.bank import BANK, CUT, INPUT, OUTPUT, PORT, FmuEffect, SignalScales
+from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
+from orchestrator.plants.compiled import compiled
+from orchestrator.shared.numba_cache import kept
 
 Array = NDArray[np.float64]
-COMBS = 4
-"""Combs that look for a quantum, one within the other."""
 
+_laws = compiled("port_laws")
+_built_up: Any = _laws.built_up
+_has_memory: Any = _laws.has_memory
+_distance: Any = _laws.distance_of
+_resistance: Any = _laws.resistance
+
+FLOWS = ("W", "kW", "m3/s", "m3/h", "l/s", "l/min", "kg/s")
+"""Units of inputs that are flows of heat or matter: what they change has no direction of motion, and no cycles."""
+OF_MOTION = (
+    "coulomb_friction", "stribeck_friction", "directional_friction", "gravity", "ripple", "hysteresis", "added_inertia"
+)  # fmt: skip
+"""Laws that mean something only against a motion, or a current."""
+OF_POSITION = ("spring", "hardening_spring", "gravity", "ripple", "hysteresis")
+"""Laws that depend on where a motion has got to: not offered where only a flow is known."""
+ANGLES = ("rad", "deg", "")
+WINDOW = 7  # samples of the sliding cubic that gives speed and acceleration of a measured motion
+LEAST_PHASE = 4.0  # radians of a ripple within the motion, from which it is no spring
+MOST_CYCLES = 500
+COMBS = 4  # that look for a quantum, one within the other
 AT_REST = "at_rest"
 """Name of a value that is not fitted: 1 where a signal was zero before the record, 0 where it had its first value."""
 
-SORTS = {
-    "input_gain": "gain", "output_gain": "gain", "input_offset": "constant", "output_offset": "constant",
-    "load": "constant", "input_delay": "timing", "input_lag": "timing", "output_delay": "timing",
-    "output_lag": "timing", "input_saturation": "limit", "input_dead_zone": "limit", "input_rate_limit": "limit",
-    "input_quantisation": "resolution", "output_quantisation": "resolution", "coulomb_friction": "friction",
-    "stribeck_friction": "friction", "quadratic_drag": "speed", "viscous_drag": "speed",
-    "directional_friction": "speed", "spring": "position", "hardening_spring": "position", "gravity": "position",
-    "ripple": "wave", "hysteresis": "memory", "added_inertia": "inertia", "parameter_drift": "parameter",
-    "parameter_dependence": "parameter", "backlash": "gap", "compliance": "resonance",
-}  # fmt: skip
-POSITIVE = ("coulomb_friction", "stribeck_friction", "quadratic_drag", "viscous_drag", "spring", "hysteresis",
-            "compliance")  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
-class PlacedEffect:
-    """An effect of the bank at a place, and how the analysis sees it."""
+class Motion:
+    """Position, speed and acceleration (n,) of a port, in its own units."""
 
-    effect: BoxEffect
-    candidate: CandidateEffect
-
-    def at(self, values: Values) -> tuple[BoxEffect, Array]:
-        """Return the effect and its values as the bank has them."""
-        count = len(self.effect.kind.parameters)
-        given = self.effect.bounded(np.array(values[:count]))
-        at_rest = len(values) > count and values[count] > 0.5
-        return replace(self.effect, at_rest=at_rest), given
+    x: Array
+    v: Array
+    a: Array
 
 
-def place_effects(
-    effects: Sequence[BoxEffect],
-    motions: dict[str, Array],
-    through: Callable[[str, Array], Array],
-    starts_off: float,
-    linear: bool,
-) -> dict[str, PlacedEffect]:
-    """Return effects as the analysis sees them, by label.
+def port_motions(problem: FmuProblem, reads: Array) -> dict[str, Motion]:
+    """Return the motion of each port: as measured where its position is a column of the record, else that of a run.
+
+    A run of a model that lacks an effect may be far from the record; what the effect answers to is in the record.
 
     Args:
-        motions: port -> its position (n,), over which ripples repeat.
-        through: port, gradient (outputs, n) by the residuals -> gradient (n,) by the effort at the port.
+        reads: (n, reads) all that is read of a run.
     """
-    sorts = {effect.label: SORTS[effect.kind.name] for effect in effects}
-    found = {}
-    for effect in effects:
-        timing = tuple(o for o, sort in sorts.items() if sort == sorts[effect.label] == "timing" and o != effect.label)
-        simpler = f"{effect.kind.needs}@{effect.place}" if effect.kind.needs else ""
-        grown = tuple(o.label for o in effects if o.kind.needs == effect.kind.name and o.place == effect.place)
-        wave = None
-        if effect.kind.name == "ripple":
-            wave = _wave_scan(effect, motions[effect.place], through)
-        found[effect.label] = PlacedEffect(
-            effect, _candidate(effect, wave, simpler, timing + grown, starts_off, linear)
-        )
+    from scipy.signal import savgol_filter
+
+    step, found = problem.h, {}
+    for name, port in problem.map.ports.items():
+        if port.position in problem.outputs:  # of a flow alone it names the flow
+            y = problem.data.outputs[:, problem.outputs.index(port.position)]
+            orders = range(2 if port.flow_only else 3)
+            slopes = [savgol_filter(y, WINDOW, 3, deriv=order, delta=step) for order in orders]
+            found[name] = Motion(step * np.cumsum(slopes[0]), *slopes) if port.flow_only else Motion(*slopes)
+            continue
+        x = reads[:, problem.runner.reads.index(port.position)]
+        v = np.gradient(x, step) if port.velocity is None else reads[:, problem.runner.reads.index(port.velocity)]
+        x = step * np.cumsum(v) if port.flow_only else x
+        found[name] = Motion(x, v, np.gradient(v, step))
     return found
 
 
-def _candidate(
-    effect: BoxEffect,
-    wave: WaveScan | None,
-    simpler: str,
-    excludes: tuple[str, ...],
-    starts_off: float,
-    linear: bool,
-) -> CandidateEffect:
-    kind, scene = effect.kind, effect.scene
-    count = len(kind.parameters)
-    amplitudes = (0, 1) if kind.name == "stribeck_friction" else tuple(range(effect.amplitudes))
-    starts = _starts(effect, amplitudes, linear)
-    remembers = kind.name in REMEMBERS and abs(scene.signal[0]) > starts_off * scene.size
-    flags = ((0.0,), (1.0,)) if remembers else ((),)
-    positive = tuple(n for n in amplitudes if kind.name in POSITIVE)
-    return CandidateEffect(
-        label=effect.label, kind=SORTS[kind.name], values=(*kind.parameters, *((AT_REST,) if remembers else ())),
-        scales=(*kind.scales(scene), *((1.0,) if remembers else ())),
-        starts=tuple((*start, *flag) for start in starts for flag in flags), amplitudes=amplitudes,
-        fitted=tuple(range(count)), sizes=amplitudes or (0,),
-        lower=(*(kind.lower or (-np.inf,) * count), *((0.0,) if remembers else ())), positive=positive, wave=wave,
-        comb=COMBS if SORTS[kind.name] == "resolution" else 0,
-        contains=(simpler,) if simpler else (), excludes=excludes,
-    )  # fmt: skip
+def efforts_along(motion: Motion, law: int, values: tuple[float, ...], step: float) -> Array:
+    """Return the effort (n,) against the motion that a law has in each sample, ``step`` [s] apart."""
+    q = np.array([*values, *[0.0] * (4 - len(values))])
+    return np.asarray(_efforts(law, motion.x, motion.v, motion.a, q, step))
 
 
-def _starts(effect: BoxEffect, amplitudes: Sequence[int], linear: bool) -> list[Values]:
-    """Return values to try, those that regression finds at zero."""
-    kind, scene = effect.kind, effect.scene
-    given = list(kind.starts(scene))
-    if kind.name == "stribeck_friction":
-        walk = scene.speed * scene.h
-        given = [(0.0, 0.0, v * scene.speed, d * walk) for v in (0.1, 0.3) for d in (0.1, 0.6, 3.0)]
-    elif not amplitudes and linear:
-        given += [(value,) for value in kind.scan(scene)]
-    elif kind.name == "ripple":
-        given = given[:1]
-    starts = [tuple(0.0 if n in amplitudes else v for n, v in enumerate(start)) for start in given]
-    return list(dict.fromkeys(starts))
+@kept()
+def _efforts(law, x, v, a, q, h):  # type: ignore[no-untyped-def]
+    """Return the effort against the motion in each sample."""
+    found, built = np.zeros(len(x)), 0.0
+    for k in range(len(x)):
+        if _has_memory(law):
+            built = _built_up(law, built, v[k], _distance(law, q[1], q[3]), h)
+        found[k] = _resistance(law, x[k], v[k], a[k], built, q[0], q[1], q[2])
+    return found
 
 
-def _wave_scan(effect: BoxEffect, position: Array, through: Callable[[str, Array], Array]) -> WaveScan:
-    place = effect.place
-    return WaveScan(
-        position, 0, len(effect.kind.parameters) - 1, np.array(effect.scene.cycles), lambda g: through(place, g)
-    )
+def find_effects(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
+    """Return every effect that could act, given all that is read of the nominal run (n, reads)."""
+    found = []
+    h, data = problem.h, problem.data
+    for k, name in enumerate(problem.inputs):
+        u = data.driven[:, k]
+        if float(np.ptp(u)) > 0.0:
+            scales = SignalScales(h / data.factor, _rms(u), float(np.max(np.abs(u))), u)
+            found += [FmuEffect(kind, name, scales) for kind in BANK.values() if kind.where == INPUT]
+    for k, name in enumerate(problem.outputs):
+        y = data.outputs[:, k]
+        scales = SignalScales(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
+        found += [FmuEffect(kind, name, scales) for kind in BANK.values() if kind.where == OUTPUT]
+    for name, motion in port_motions(problem, nominal).items():
+        port = problem.map.ports[name]
+        effort = float(problem.drive([problem.runner.inputs.index(port.input)])[0])
+        angular = problem.units.get(port.position, "") in ANGLES and not port.flow_only
+        span = float(np.ptp(motion.x)) or 1.0
+        # From two thirds of a cycle within the span to what the samples still follow, half a radian of it apart.
+        top = 0.5 * np.pi / max(float(np.quantile(np.abs(motion.v), 0.8)) * h, 1e-300)
+        phases = LEAST_PHASE + 0.5 * np.arange(MOST_CYCLES)
+        cycles = tuple(float(phase) / span for phase in phases if phase < top * span)
+        position, speed, acceleration = (_rms(x) or 1.0 for x in (motion.x, motion.v, motion.a))
+        scales = SignalScales(h, effort, effort, motion.x, 0.0, position, span, speed, acceleration, angular,
+                              cycles=cycles)  # fmt: skip
+        left_out: tuple[str, ...] = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
+        left_out += (OF_POSITION if port.flow_only else ()) + (() if angular else ("gravity",))
+        kinds = [kind for kind in BANK.values() if kind.where == PORT and kind.name not in left_out]
+        found += [FmuEffect(kind, name, scales) for kind in kinds]
+    return [*found, *_of_parameters(problem), *_of_cuts(problem, nominal)]
+
+
+def _of_parameters(problem: FmuProblem) -> list[FmuEffect]:
+    """Return what may change the parameters that can be changed within a run."""
+    found = []
+    for u in (u for u in problem.map.uncertain if u.name in problem.map.tunable):
+        clock = problem.data.time - problem.data.time[0]
+        followed = [("parameter_drift", "", clock)]
+        followed += [("parameter_dependence", name, problem.data.signals[:, k])
+                     for k, name in enumerate(problem.map.signals)]  # fmt: skip
+        for kind, name, signal in followed:
+            if (span := float(np.ptp(signal))) > 0.0:
+                scales = SignalScales(problem.h, u.standard_deviation, u.standard_deviation, signal, span=span)
+                found.append(FmuEffect(BANK[kind], u.name, scales, signal=name))
+    return found
+
+
+def _of_cuts(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
+    """Return what may lie in the connections between FMUs; the direction of an effort is seen in the nominal run."""
+    found: list[FmuEffect] = []
+    reads = problem.runner.reads
+    for name, cut in problem.map.cuts.items():
+        wire = next(c for c in problem.runner.system.connections if c.target == cut.input)
+        near = wire.factor * nominal[:, reads.index(wire.source)] + wire.offset
+        span = float(np.ptp(near)) or 1.0
+        size = 0.01 * span
+        if cut.far is not None:
+            twist = near - nominal[:, reads.index(cut.far)]
+            size = float(np.std(twist)) or size
+            scales = SignalScales(problem.h, size, span, near, span=span)
+            found.append(FmuEffect(BANK["backlash"], name, scales))
+        if cut.effort is not None:
+            effort = nominal[:, reads.index(cut.effort)]
+            if cut.far is not None:
+                problem.sign[name] = -1.0 if float(np.mean(effort * twist)) < 0.0 else 1.0
+            scales = SignalScales(problem.h, size, span, near, span=span, effort=_rms(effort) or 1.0)
+            found.append(FmuEffect(BANK["compliance"], name, scales))
+    return found
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def candidate_effects(
+    effects: Sequence[FmuEffect], motions: Mapping[str, Motion], through: Callable[[str, Array], Array], linear: bool
+) -> dict[str, CandidateEffect]:
+    """Return effects as the analysis sees them, by label.
+
+    Args:
+        motions: of the ports, over whose positions ripples repeat.
+        through: port, gradient (outputs, n) by the residuals -> gradient (n,) by the effort at the port.
+        linear: the FMU is.
+    """
+    timing = [effect.label for effect in effects if effect.kind.sort == "timing"]
+    found = {}
+    for effect in effects:
+        kind, label, count = effect.kind, effect.label, len(effect.kind.parameters)
+        amplitudes = tuple(range(count if kind.starts is None else kind.amplitudes))
+        flag = (1.0,) if effect.remembers else ()
+        starts = _starts(effect, linear)
+        excludes = [other for other in timing if kind.sort == "timing" and other != label]
+        excludes += [o.label for o in effects if o.kind.needs == kind.name and o.place == effect.place]
+        found[label] = CandidateEffect(
+            label=label, kind=kind.sort, values=(*kind.parameters, *(AT_REST for _ in flag)),
+            scales=(*kind.scales(effect.scales), *flag),
+            starts=tuple((*start, *past) for start, past in product(starts, ((0.0,), (1.0,)) if flag else ((),))),
+            amplitudes=amplitudes, fitted=tuple(range(count)), sizes=amplitudes or (0,),
+            lower=(*(kind.lower or (-np.inf,) * count), *(0.0 for _ in flag)),
+            positive=amplitudes if kind.positive else (),
+            wave=_wave_scan(effect, motions, through) if kind.name == "ripple" else None,
+            comb=COMBS if kind.sort == "resolution" else 0,
+            contains=(f"{kind.needs}@{effect.place}",) if kind.needs else (), excludes=tuple(excludes),
+        )  # fmt: skip
+    return found
+
+
+def _starts(effect: FmuEffect, linear: bool) -> list[Values]:
+    """Return values to try; those in which the response is linear are zero, and found by regression."""
+    kind = effect.kind
+    if kind.starts is None:
+        return [(0.0,) * len(kind.parameters)]
+    scanned = [(value,) for value in kind.scan(effect.scales)] if linear else []
+    return list(dict.fromkeys([*kind.starts(effect.scales), *scanned]))
+
+
+def _wave_scan(
+    effect: FmuEffect, motions: Mapping[str, Motion], through: Callable[[str, Array], Array]
+) -> WaveScan:  # fmt: skip
+    place, cycles = effect.place, np.array(effect.scales.cycles)
+    return WaveScan(motions[place].x, 0, len(effect.kind.parameters) - 1, cycles, lambda g: through(place, g))
+
+
+def effect_units(problem: FmuProblem, effect: FmuEffect) -> dict[str, str]:
+    """Return the units of an effect's values, at the place where it acts."""
+    unit_of, place = problem.units, effect.place
+    if effect.kind.where == PORT:
+        port = problem.map.ports[place]
+        flow = unit_of.get(port.position, "")
+        names = {"effort": unit_of.get(port.input, ""), "flow": f"({flow or '1'}.s)" if port.flow_only else flow}
+    elif effect.kind.where == CUT:
+        cut = problem.map.cuts[place]
+        names = {"effort": unit_of.get(cut.effort or "", ""), "flow": unit_of.get(cut.input, "")}
+    else:
+        unit = unit_of.get(place, "")
+        names = {"effort": unit, "flow": unit, "signal": effect.signal}
+    found = {}
+    for parameter, general in zip(effect.kind.parameters, effect.kind.units, strict=True):
+        shown = general
+        for key, name in names.items():
+            shown = shown.replace(key, name or "1")
+        found[parameter] = shown
+    return found

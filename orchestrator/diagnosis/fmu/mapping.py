@@ -1,27 +1,6 @@
 """The map between a record and an FMU: which column is which variable, what is uncertain, where effects may act.
 
-A map is TOML::
-
-    [inputs]
-    M_A = { column = "u", hold = "zero" }     # hold "linear": straight lines between samples, for sensed inputs
-    [outputs]
-    phiA = { column = "phi", noise = 2e-4 }   # noise: standard deviation; absent: estimated
-    [parameters]
-    "inertia.J" = { uncertainty = "5 %" }     # or a number in the parameter's unit
-    [start]
-    "inertia.phi" = { uncertainty = 0.02 }
-    [ports.shaft]
-    input = "M_B"                             # what effects at the port add to
-    position = "phiA"                         # any readable variable
-    velocity = "wA"                           # absent: differentiated; alone: a flow, such as a current
-    [signals]
-    warmth = { column = "T", reference = 20 }  # what parameters may depend on
-    [cuts.coupling]                           # with a scenario of several FMUs
-    input = "load.phi_in"                     # the position that one hands to another
-    far = "load.phi"                          # the position beyond it: for a gap
-    effort = "load.tau"                       # what goes through it: for a spring
-    [options]
-    tolerance = 1e-8                          # of the FMU's own solver
+docs/any-fmu.md shows what a map says, as TOML.
 """
 
 import math
@@ -30,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from orchestrator.diagnosis.fmu.subject import Subject
+from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import Unit, Value, Variable
 from orchestrator.master.units import resolve
@@ -40,22 +19,30 @@ from orchestrator.records.model_file import ModelParameter
 MAXIMUM_BYTES = 1 << 24
 
 
-class InputEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ColumnEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A column, and what its numbers are multiplied by, or its unit."""
+
+    column: str = ""
+    factor: float = 1.0
+    unit: str = ""
+
+
+class InputEntry(ColumnEntry, frozen=True):
     """An input that a column drives."""
 
-    column: str = ""
     hold: str = "zero"
-    factor: float = 1.0
-    unit: str = ""
 
 
-class OutputEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class OutputEntry(ColumnEntry, frozen=True):
     """An output that a column measures."""
 
-    column: str = ""
     noise: float | None = None
-    factor: float = 1.0
-    unit: str = ""
+
+
+class SignalEntry(ColumnEntry, frozen=True):
+    """A column that parameters may depend on, and its value at which they are what the map says."""
+
+    reference: float = 0.0
 
 
 class ParameterEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -79,15 +66,6 @@ class PortEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def flow_only(self) -> bool:
         """Whether the flow is all that is known: nothing can depend on a position."""
         return self.position == self.velocity
-
-
-class SignalEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A column that parameters may depend on, and its value at which they are what the map says."""
-
-    column: str = ""
-    reference: float = 0.0
-    factor: float = 1.0
-    unit: str = ""
 
 
 class CutEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -126,35 +104,28 @@ class MapFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     options: Options = Options()
 
 
-class Map(msgspec.Struct, frozen=True):
-    """A map that has been checked against its FMU.
+class Map(MapFile, frozen=True):
+    """A map that has been checked against its FMU, with columns filled in.
 
     Attributes:
-        inputs, outputs, ports, signals, cuts, options: as written, with columns filled in.
         uncertain: what is re-fitted.
         fixed: values by name of what is set and not re-fitted.
+        source: file name, for messages.
         tunable: those of what is re-fitted that their FMU says may change within a run.
         initial: those of what is re-fitted that one record begins with.
-        source: file name, for messages.
         units: of inputs and outputs, where the FMU states them.
     """
 
-    inputs: dict[str, InputEntry]
-    outputs: dict[str, OutputEntry]
-    ports: dict[str, PortEntry]
-    uncertain: tuple[ModelParameter, ...]
-    fixed: dict[str, Value]
-    options: Options
-    source: str
-    signals: dict[str, SignalEntry] = {}
-    cuts: dict[str, CutEntry] = {}
+    uncertain: tuple[ModelParameter, ...] = ()
+    fixed: dict[str, Value] = {}
+    source: str = ""
     tunable: tuple[str, ...] = ()
     initial: tuple[str, ...] = ()
     units: dict[str, Unit] = {}
 
 
-def read_map(path: Path, subject: Subject) -> Map:
-    """Read and check a map."""
+def read_map(path: Path, system: FmuSystem) -> Map:
+    """Read a map, and check it against an FMU, or several."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -165,169 +136,150 @@ def read_map(path: Path, subject: Subject) -> Map:
         written = msgspec.toml.decode(data, type=MapFile)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise ScenarioError(f"{path}: {error}") from None
-    return checked(written, subject, str(path))
+    return _MapCheck(written, system, str(path)).map()
 
 
-def checked(written: MapFile, subject: Subject, source: str) -> Map:
-    """Check a map against an FMU, or several."""
-    look = _Look(subject.model.variables, source)
-    if not written.inputs:
-        raise ScenarioError(f"{source}: $.inputs must name at least one input with a column, but names none")
-    if not written.outputs:
-        raise ScenarioError(f"{source}: $.outputs must name at least one output with a column, but names none")
-    for name, given in written.inputs.items():
-        look.up(f"$.inputs.{name}", name, ("input",))
-        if given.hold not in ("zero", "linear"):
-            raise ScenarioError(f'{source}: $.inputs.{name}.hold must be "zero" or "linear", but is {given.hold!r}')
-        look.factor(f"$.inputs.{name}.factor", given.factor)
-    for name, measured in written.outputs.items():
-        look.up(f"$.outputs.{name}", name, ("output", "local", "input"))
-        look.factor(f"$.outputs.{name}.factor", measured.factor)
-        if measured.noise is not None and not 0.0 < measured.noise < math.inf:
-            raise ScenarioError(f"{source}: $.outputs.{name}.noise must be positive, but is {measured.noise!r}")
-    _check_ports(written, look)
-    for name, signal in written.signals.items():
-        look.factor(f"$.signals.{name}.factor", signal.factor)
-        if not math.isfinite(signal.reference):
-            raise ScenarioError(f"{source}: $.signals.{name}.reference must be finite, but is {signal.reference!r}")
-    _check_connections(written, subject, look)
-    if not 0.0 < written.options.time_factor < math.inf:
-        raise ScenarioError(f"{source}: $.options.time_factor must be positive, but is {written.options.time_factor:g}")
-    if written.options.header is not None and written.options.header < 0:
-        raise ScenarioError(f"{source}: $.options.header must be a line, or 0, but is {written.options.header}")
-    if not 1 <= written.options.substeps <= 1000:
-        raise ScenarioError(f"{source}: $.options.substeps must be 1 to 1000, but is {written.options.substeps}")
-    uncertain: list[ModelParameter] = []
-    fixed: dict[str, Value] = dict(subject.given)
-    for table, entries in (("parameters", written.parameters), ("start", written.start)):
-        for name, entry in entries.items():
-            if look.is_set(f"$.{table}.{name}", name, entry):
-                fixed[name] = look.fixed(f"$.{table}.{name}", name, entry, subject.given.get(name))
-                continue
-            found = look.uncertain(f"$.{table}.{name}", name, entry, subject.given.get(name))
-            if found.uncertainty > 0.0:
-                uncertain.append(found)
-                fixed.pop(name, None)
-            else:
-                fixed[name] = found.value
-    return Map(
-        {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.inputs.items()},
-        {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.outputs.items()},
-        {n: msgspec.structs.replace(e, position=e.position or e.velocity or "") for n, e in written.ports.items()},
-        tuple(uncertain),
-        fixed,
-        written.options,
-        source,
-        {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.signals.items()},
-        written.cuts,
-        tuple(u.name for u in uncertain if subject.model.variables[u.name].variability == "tunable"),
-        tuple(u.name for u in uncertain if u.name in written.start),
-        units={
-            name: resolve(text, subject.model.units)
+class _MapCheck:
+    """Looks up what a map names, and says where it is wrong."""
+
+    def __init__(self, written: MapFile, system: FmuSystem, source: str) -> None:
+        self._written, self._system, self._source = written, system, source
+        self._variables = system.model.variables
+
+    def map(self) -> Map:
+        """Return the map, columns filled in."""
+        written, source = self._written, self._source
+        for table, entries in (("inputs", written.inputs), ("outputs", written.outputs)):
+            self._require(bool(entries), f"$.{table} must name at least one {table[:-1]} with a column, but names none")
+        self._check_columns()
+        self._check_ports()
+        self._check_connections()
+        options = written.options
+        self._require(0.0 < options.time_factor < math.inf,
+                      f"$.options.time_factor must be positive, but is {options.time_factor:g}")  # fmt: skip
+        self._require(options.header is None or options.header >= 0,
+                      f"$.options.header must be a line, or 0, but is {options.header}")  # fmt: skip
+        self._require(1 <= options.substeps <= 1000, f"$.options.substeps must be 1 to 1000, but is {options.substeps}")
+        uncertain: list[ModelParameter] = []
+        fixed: dict[str, Value] = dict(self._system.given)
+        for table, parameters in (("parameters", written.parameters), ("start", written.start)):
+            for name, entry in parameters.items():
+                value = self._parameter(f"$.{table}.{name}", name, entry)
+                if isinstance(value, ModelParameter) and value.uncertainty > 0.0:
+                    uncertain.append(value)
+                    fixed.pop(name, None)
+                else:
+                    fixed[name] = value.value if isinstance(value, ModelParameter) else value
+        columns: dict[str, Any] = {
+            table: _with_columns(getattr(written, table)) for table in ("inputs", "outputs", "signals")
+        }
+        ports = {
+            n: msgspec.structs.replace(e, position=e.position or e.velocity or "") for n, e in written.ports.items()
+        }
+        units = {
+            name: resolve(text, self._system.model.units)
             for name in (*written.inputs, *written.outputs)
-            if (text := subject.model.variables[name].unit)
-        },
-    )
+            if (text := self._variables[name].unit)
+        }
+        tunable = tuple(u.name for u in uncertain if self._variables[u.name].variability == "tunable")
+        initial = tuple(u.name for u in uncertain if u.name in written.start)
+        checked: dict[str, Any] = {
+            "ports": ports,
+            "cuts": written.cuts,
+            "options": options,
+            "uncertain": tuple(uncertain),
+        }
+        return Map(**columns, **checked, fixed=fixed, source=source, tunable=tunable, initial=initial, units=units)
 
+    def _require(self, holds: bool, text: str) -> None:
+        if not holds:
+            raise ScenarioError(f"{self._source}: {text}")
 
-def _check_ports(written: MapFile, look: "_Look") -> None:
-    """Refuse ports without a motion or flow, or of what is no input or output."""
-    for name, port in written.ports.items():
-        look.up(f"$.ports.{name}.input", port.input, ("input",))
-        if not port.position and port.velocity is None:
-            raise ScenarioError(
-                f"{look.source}: $.ports.{name} must have `position`, `velocity` or both, but has neither"
-            )
-        if port.position:
-            look.up(f"$.ports.{name}.position", port.position, ("output", "local"))
-        if port.velocity is not None:
-            look.up(f"$.ports.{name}.velocity", port.velocity, ("output", "local"))
+    def _check_columns(self) -> None:
+        for name, given in self._written.inputs.items():
+            self._variable(f"$.inputs.{name}", name, ("input",))
+            self._require(given.hold in ("zero", "linear"),
+                          f'$.inputs.{name}.hold must be "zero" or "linear", but is {given.hold!r}')  # fmt: skip
+        for name, measured in self._written.outputs.items():
+            self._variable(f"$.outputs.{name}", name, ("output", "local", "input"))
+            self._require(measured.noise is None or 0.0 < measured.noise < math.inf,
+                          f"$.outputs.{name}.noise must be positive, but is {measured.noise!r}")  # fmt: skip
+        for name, signal in self._written.signals.items():
+            self._require(math.isfinite(signal.reference),
+                          f"$.signals.{name}.reference must be finite, but is {signal.reference!r}")  # fmt: skip
+        for table in ("inputs", "outputs", "signals"):
+            for name, entry in getattr(self._written, table).items():
+                self._require(math.isfinite(entry.factor) and entry.factor != 0.0,
+                              f"$.{table}.{name}.factor must be finite and not 0, but is {entry.factor!r}")  # fmt: skip
 
+    def _check_ports(self) -> None:
+        """Refuse ports without a motion or flow, or of what is no input or output."""
+        for name, port in self._written.ports.items():
+            self._variable(f"$.ports.{name}.input", port.input, ("input",))
+            self._require(bool(port.position) or port.velocity is not None,
+                          f"$.ports.{name} must have `position`, `velocity` or both, but has neither")  # fmt: skip
+            for key, variable in (("position", port.position or None), ("velocity", port.velocity)):
+                if variable is not None:
+                    self._variable(f"$.ports.{name}.{key}", variable, ("output", "local"))
 
-def _check_connections(written: MapFile, subject: Subject, look: "_Look") -> None:
-    """Refuse cuts where nothing is handed on, and inputs that are fed from elsewhere."""
-    targets = {c.target for c in subject.connections}
-    for name, cut in written.cuts.items():
-        look.up(f"$.cuts.{name}.input", cut.input, ("input",))
-        if cut.input not in targets:
-            raise ScenarioError(
-                f"{look.source}: $.cuts.{name}.input must be what one FMU of a scenario hands to another, but "
-                f"{cut.input!r} is not connected"
-            )
-        if cut.far is None and cut.effort is None:
-            raise ScenarioError(f"{look.source}: $.cuts.{name} must have `far`, `effort` or both, but has neither")
-        for key, variable in (("far", cut.far), ("effort", cut.effort)):
-            if variable is not None:
-                look.up(f"$.cuts.{name}.{key}", variable, ("output", "local"))
-    for name in subject.fed:
-        if name not in written.inputs:
-            raise ScenarioError(f"{look.source}: $.inputs must give {name!r} a column: the scenario feeds it")
+    def _check_connections(self) -> None:
+        """Refuse cuts where nothing is handed on, and inputs that are fed from elsewhere."""
+        targets = {c.target for c in self._system.connections}
+        for name, cut in self._written.cuts.items():
+            self._variable(f"$.cuts.{name}.input", cut.input, ("input",))
+            self._require(cut.input in targets, f"$.cuts.{name}.input must be what one FMU of a scenario hands to "
+                          f"another, but {cut.input!r} is not connected")  # fmt: skip
+            self._require(cut.far is not None or cut.effort is not None,
+                          f"$.cuts.{name} must have `far`, `effort` or both, but has neither")  # fmt: skip
+            for key, variable in (("far", cut.far), ("effort", cut.effort)):
+                if variable is not None:
+                    self._variable(f"$.cuts.{name}.{key}", variable, ("output", "local"))
+        for name in self._system.fed:
+            self._require(name in self._written.inputs, f"$.inputs must give {name!r} a column: the scenario feeds it")
 
-
-class _Look:
-    """Looks names up, and says where one is wrong."""
-
-    def __init__(self, variables: Any, source: str) -> None:
-        self._variables, self.source = variables, source
-
-    def up(self, where: str, name: str, causalities: tuple[str, ...]) -> Variable:
+    def _variable(self, where: str, name: str, causalities: tuple[str, ...]) -> Variable:
         """Return a variable of type Real."""
         import difflib
 
         if name not in self._variables:
             near = difflib.get_close_matches(name, self._variables, 1)
             hint = f" (did you mean {near[0]!r}?)" if near else ""
-            raise ScenarioError(f"{self.source}: {where} must be a variable of the FMU, but {name!r} is not{hint}")
+            raise ScenarioError(f"{self._source}: {where} must be a variable of the FMU, but {name!r} is not{hint}")
         variable: Variable = self._variables[name]
-        if variable.type != "Real":
-            raise ScenarioError(f"{self.source}: {where} must be of type Real, but is {variable.type}")
-        if variable.causality not in causalities:
-            wanted = " or ".join(causalities)
-            raise ScenarioError(f"{self.source}: {where} must be of causality {wanted}, but is {variable.causality}")
+        self._require(variable.type == "Real", f"{where} must be of type Real, but is {variable.type}")
+        wanted = " or ".join(causalities)
+        self._require(variable.causality in causalities,
+                      f"{where} must be of causality {wanted}, but is {variable.causality}")  # fmt: skip
         return variable
 
-    def factor(self, where: str, factor: float) -> None:
-        """Refuse a factor that cannot be one."""
-        if not (math.isfinite(factor) and factor != 0.0):
-            raise ScenarioError(f"{self.source}: {where} must be finite and not 0, but is {factor!r}")
-
-    def is_set(self, where: str, name: str, entry: ParameterEntry) -> bool:
-        """Whether a parameter is of a type that can be set, but not fitted."""
+    def _parameter(self, where: str, name: str, entry: ParameterEntry) -> ModelParameter | Value:
+        """Return a parameter with its uncertainty as a number; the value alone of what is no Real, and not fitted."""
         variable = self._variables.get(name)
-        if variable is None or variable.type == "Real":
-            return False
-        if entry.uncertainty not in (0.0, ""):
-            raise ScenarioError(
-                f"{self.source}: {where} must be of type Real to be fitted, but is {variable.type}: it can be set, "
-                "with `value` and without `uncertainty`"
-            )
-        return True
-
-    def fixed(self, where: str, name: str, entry: ParameterEntry, given: Value | None) -> Value:
-        """Return the value of a parameter that is no Real."""
-        variable: Variable = self._variables[name]
-        value = next((v for v in (entry.value, given, variable.start) if v is not None), None)
-        if value is None:
-            raise ScenarioError(f"{self.source}: {where}.value must be given: the FMU states no start value")
-        typed, text = typed_value(variable, value)
-        if typed is None:
-            raise ScenarioError(f"{self.source}: {where}.value {text}")
-        return typed
-
-    def uncertain(self, where: str, name: str, entry: ParameterEntry, given: Value | None) -> ModelParameter:
-        """Return a parameter with its uncertainty as a number."""
-        variable = self.up(where, name, ("parameter", "local", "output", "input"))
-        value = next((v for v in (entry.value, given) if v is not None), variable.start)
-        if isinstance(value, (bool, str)):
-            raise ScenarioError(f"{self.source}: {where}.value must be a number, but is {value!r}")
+        given = (entry.value, self._system.given.get(name), None if variable is None else variable.start)
+        value = next((v for v in given if v is not None), None)
+        if variable is not None and variable.type != "Real":
+            self._require(entry.uncertainty in (0.0, ""), f"{where} must be of type Real to be fitted, but is "
+                          f"{variable.type}: it can be set, with `value` and without `uncertainty`")  # fmt: skip
+            if value is None:
+                raise ScenarioError(f"{self._source}: {where}.value must be given: the FMU states no start value")
+            typed, text = typed_value(variable, value)
+            if typed is None:
+                raise ScenarioError(f"{self._source}: {where}.value {text}")
+            return typed
+        variable = self._variable(where, name, ("parameter", "local", "output", "input"))
+        self._require(not isinstance(value, (bool, str)), f"{where}.value must be a number, but is {value!r}")
         if not isinstance(value, int | float) or not math.isfinite(value):
-            raise ScenarioError(f"{self.source}: {where}.value must be given: the FMU states no start value")
-        spread = _spread(f"{self.source}: {where}.uncertainty", entry.uncertainty, float(value))
+            raise ScenarioError(f"{self._source}: {where}.value must be given: the FMU states no start value")
+        spread = _spread(f"{self._source}: {where}.uncertainty", entry.uncertainty, float(value))
         low = -math.inf if variable.minimum is None else float(variable.minimum)
         high = math.inf if variable.maximum is None else float(variable.maximum)
-        if not low <= value <= high:
-            raise ScenarioError(f"{self.source}: {where}.value must be {low:g} to {high:g}, but is {value:g}")
+        self._require(low <= value <= high, f"{where}.value must be {low:g} to {high:g}, but is {value:g}")
         return ModelParameter(name, float(value), spread, variable.unit or "", low, high)
+
+
+def _with_columns(entries: dict[str, ColumnEntry]) -> dict[str, ColumnEntry]:
+    """Return entries, each with the name of its variable as that of the column where it has none."""
+    return {name: msgspec.structs.replace(entry, column=entry.column or name) for name, entry in entries.items()}
 
 
 def _spread(where: str, given: str | float, value: float) -> float:

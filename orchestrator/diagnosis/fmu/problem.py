@@ -1,60 +1,72 @@
 """A record, an FMU and a map, ready to be fitted: models are simulated, residuals come in units of the noise."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu import series
-from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
+from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
+from orchestrator.diagnosis.fmu.coupled_fmus import Run
+from orchestrator.diagnosis.fmu.loop import delay_input, delay_output, lag_input, lag_output, limit_rate, quantise
 from orchestrator.diagnosis.fmu.mapping import Map
-from orchestrator.diagnosis.fmu.model import BoxModel, Data
-from orchestrator.diagnosis.fmu.passed import at_input, at_output
-from orchestrator.diagnosis.fmu.runner import Plan, Runner
-from orchestrator.diagnosis.fmu.wire import Feedback
-from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings
+from orchestrator.diagnosis.fmu.record import FmuRecord, divide_samples
+from orchestrator.diagnosis.fmu.runner import Runner
 from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import Value
 from pyfmu_sources.port_laws import COMPLIANCE
 
 Array = NDArray[np.float64]
+ABSURD = 1e9  # times an output's largest value, beyond which a run has failed
+RUNAWAY = 1e4  # effort of an effect over the drive's, beyond which a run is given up: it is unstable
+IMPULSE = 0.5  # of the drive: the pulse that measures a response
+
+
+@dataclass(frozen=True, eq=False)
+class FmuModel:
+    """A model: values of the uncertain parameters, effects, and their values."""
+
+    p: Array
+    effects: tuple[FmuEffect, ...] = ()
+    values: tuple[Array, ...] = ()
+
+    @property
+    def key(self) -> Hashable:
+        """What two models of the same run have in common."""
+        effects = tuple((e.label, e.at_rest, tuple(v.tolist())) for e, v in zip(self.effects, self.values, strict=True))
+        return tuple(self.p.tolist()), effects
 
 
 @dataclass
-class BoxProblem:
+class FmuProblem:
     """Simulates models of one record.
 
     Attributes:
         m: communication steps in a sample.
         noise: (outputs,) standard deviations.
         sign: of each port and cut, the direction in which its effort acts.
-        units: of the variables that have one.
         short: share by which a communication step is cut short, for an FMU that goes by a clock of its own.
         late: by how much such an FMU takes its inputs late [s]; outputs of ``data`` are as late.
+        n, h: number of samples, and time from one to the next [s].
+        inputs, outputs: names of the variables that the record drives and measures.
+        units: of all variables that have one.
     """
 
-    data: Data
+    data: FmuRecord
     map: Map
     runner: Runner
     m: int
     noise: Array
     sign: dict[str, float] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
-    settings: FmuSettings = DEFAULT
     short: float = 0.0
     late: float = 0.0
     _tables: dict[tuple[int, int], Array] = field(init=False, default_factory=dict, repr=False)
 
-    @property
-    def n(self) -> int:
-        """Return the number of samples."""
-        return len(self.data.time)
-
-    @property
-    def h(self) -> float:
-        """Return the sample time [s]."""
-        return self.data.step
+    def __post_init__(self) -> None:
+        self.settings, self.units = self.runner.settings, self.runner.system.units
+        self.inputs, self.outputs = tuple(self.map.inputs), tuple(self.map.outputs)
+        self.n, self.h = self.data.size, self.data.step
 
     @property
     def step(self) -> float:
@@ -62,75 +74,80 @@ class BoxProblem:
         return self.h / self.m * (1.0 - self.short)
 
     @property
-    def nominal(self) -> BoxModel:
+    def nominal(self) -> FmuModel:
         """Return the model as the user gave it."""
-        return BoxModel(np.array([u.value for u in self.map.uncertain]))
+        return FmuModel(np.array([u.value for u in self.map.uncertain]))
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Return the names of the recorded inputs."""
-        return tuple(self.map.inputs)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Return the names of the measured outputs."""
-        return tuple(self.map.outputs)
-
-    def simulate(self, models: Sequence[BoxModel], rows: int | None = None) -> list[Array | None]:
-        """Return outputs (rows, outputs) of each model; None where the FMU failed, or ran away.
-
-        Args:
-            rows: samples to simulate (default: all).
-        """
-        found = self._runs([self._plan(model, rows) for model in models])
+    def simulate(self, models: Sequence[FmuModel]) -> list[Array | None]:
+        """Return outputs (n, outputs) of each model; None where the FMU failed, or ran away."""
+        found = self._runs([self._run_of(model) for model in models])
         runs = [None if y is None else self._measured(y, model) for y, model in zip(found, models, strict=True)]
-        most = self.settings.process.absurd * np.max(np.abs(self.data.outputs), axis=0)
+        most = ABSURD * np.max(np.abs(self.data.outputs), axis=0)
         return [None if y is None or np.any(np.abs(y) > most) else y for y in runs]
 
-    def read(self, models: Sequence[BoxModel], rows: int | None = None) -> list[Array | None]:
-        """Return all that is read (rows, reads) of each model, before effects at outputs.
-
-        Args:
-            rows: samples to simulate (default: all).
-        """
-        found = self._runs([self._plan(model, rows) for model in models])
+    def read(self, models: Sequence[FmuModel]) -> list[Array | None]:
+        """Return all that is read (n, reads) of each model, before effects at outputs."""
+        found = self._runs([self._run_of(model) for model in models])
         return [None if y is None else y[:: self.m] for y in found]
 
-    def _plan(self, model: BoxModel, rows: int | None) -> Plan:
-        plain = self._plain(self.n if rows is None else rows)
-        return Plan(self.starts(model), self.table(model, plain), self._feedback(model))
+    def read_driven(self, tables: Sequence[Array], step: float | None = None) -> list[Array | None]:
+        """Return all that is read (steps + 1, reads) of the nominal model under other inputs (steps, inputs)."""
+        starts = self.starts(self.nominal)
+        runs = [Run(starts, table) for table in tables]
+        return self.runner.run(runs, float(self.data.time[0]), self.step if step is None else step)
 
-    @property
-    def plain_table(self) -> Array:
-        """Return the recorded inputs over every communication step (steps, inputs)."""
-        return self._plain(self.n)
+    def _run_of(self, model: FmuModel) -> Run:
+        ports, laws = [], []
+        reads, inputs = self.runner.reads, self.runner.inputs
+        for effect, values in zip(model.effects, model.values, strict=True):
+            law, most, velocity = effect.kind.law, math.inf, -1
+            if effect.kind.where == CUT:
+                place, position = inputs.index(self.map.cuts[effect.place].input), reads.index(self.beyond(effect))
+            elif effect.kind.where == PORT:
+                port = self.map.ports[effect.place]
+                place, position = inputs.index(port.input), reads.index(port.position)
+                velocity = -1 if port.velocity is None else reads.index(port.velocity)
+                most = RUNAWAY * float(self.drive([place])[0])
+            else:
+                continue
+            ports.append((place, law, position, velocity))
+            q = (*map(float, values), *[0.0] * (4 - len(values)))
+            laws.append((*q, self.sign.get(effect.place, 1.0), most))
+        return Run(self.starts(model), self.table(model), tuple(ports), tuple(laws))
 
-    def _plain(self, rows: int) -> Array:
-        """Return the recorded inputs up to ``rows`` samples, the same array each time."""
-        key = (rows, self.m)
-        if key not in self._tables:
-            self._tables[key] = series_of(self, rows)
-        return self._tables[key]
+    def plain_table(self, rows: int | None = None) -> Array:
+        """Return the recorded inputs over every communication step up to ``rows`` samples (default: all).
 
-    def _runs(self, plans: Sequence[Plan]) -> list[Array | None]:
-        """Return what is read after every communication step; plans that are the same for the FMU are run once."""
-        keys = [(tuple(p.starts.items()), id(p.table), repr(p.effects)) for p in plans]
-        places = {key: k for k, key in reversed(list(enumerate(keys)))}
-        order = list(places)
-        wanted, start = [plans[places[key]] for key in order], float(self.data.time[0])
-        found = self.runner.run(wanted, start, self.step, 1)
-        by_key = dict(zip(order, found, strict=True))
+        Returns:
+            Shape (steps, inputs), the same array each time; inputs without a column are 0.
+        """
+        rows = self.n if rows is None else rows
+        if (rows, self.m) not in self._tables:
+            table = np.zeros(((rows - 1) * self.m, len(self.runner.inputs)))
+            for k, entry in enumerate(self.map.inputs.values()):
+                u = self.data.driven[: (rows - 1) * self.data.factor + 1, k]
+                table[:, k] = divide_samples(u, self.data.factor, self.m, 1 if entry.hold == "linear" else 0)
+            self._tables[rows, self.m] = table
+        return self._tables[rows, self.m]
+
+    def _runs(self, runs: Sequence[Run]) -> list[Array | None]:
+        """Return what is read after every communication step; runs that are the same for the FMU are made once."""
+        keys = [(tuple(run.starts.items()), id(run.table), run.ports, run.laws) for run in runs]
+        wanted = dict(reversed(list(zip(keys, runs, strict=True))))
+        found = self.runner.run(list(wanted.values()), float(self.data.time[0]), self.step)
+        by_key = dict(zip(wanted, found, strict=True))
         return [by_key[key] for key in keys]
 
-    def must_simulate(self, model: BoxModel) -> Array:
-        """Return outputs (rows, outputs) of a model."""
-        return self._required(self.simulate([model])[0])
+    def must_simulate(self, model: FmuModel) -> Array:
+        """Return outputs (n, outputs) of a model."""
+        return self.require(self.simulate([model])[0])
 
-    def must_read(self, model: BoxModel) -> Array:
-        """Return all that is read (rows, reads) of a model, before effects at outputs."""
-        return self._required(self.read([model])[0])
+    def must_read(self, model: FmuModel) -> Array:
+        """Return all that is read (n, reads) of a model, before effects at outputs."""
+        return self.require(self.read([model])[0])
 
-    def _required(self, run: Array | None) -> Array:
+    def require(self, run: Array | None) -> Array:
+        """Return a run; raise an error where it failed."""
         if run is None:
             raise self.does_not_run()
         return run
@@ -139,34 +156,20 @@ class BoxProblem:
         """Return the error that says why the last run failed."""
         return SlaveError(f"{self.runner.path}: must run over the record, but {self.runner.reason}")
 
-    def residual(self, y: Array) -> Array:
-        """Return measured minus simulated, in units of the noise.
-
-        Args:
-            y: (rows, outputs) simulated.
-
-        Returns:
-            Shape (rows, outputs).
-        """
-        return np.asarray((self.data.outputs[: len(y)] - y) / self.noise)
-
-    def starts(self, model: BoxModel) -> dict[str, Value]:
+    def starts(self, model: FmuModel) -> dict[str, Value]:
         """Return what is set before a run, by name."""
         values: dict[str, Value] = dict(self.map.fixed)
         values |= {u.name: float(v) for u, v in zip(self.map.uncertain, model.p, strict=True)}
         return values
 
-    def table(self, model: BoxModel, plain: Array) -> Array:
+    def table(self, model: FmuModel) -> Array:
         """Return what the FMU's inputs get: the recorded ones behind the effects in series with them.
 
-        Args:
-            plain: (steps, inputs) recorded inputs over every communication step.
-
         Returns:
-            Shape (steps, inputs); ``plain`` itself where no effect acts on an input. Further columns are those of
-            parameters that may change within a run, where one does.
+            Shape (steps, inputs); the plain table itself where no effect acts on an input. Further columns are those
+            of parameters that may change within a run, where one does.
         """
-        table = plain
+        plain = table = self.plain_table()
         if any(effect.kind.where == PARAMETER for effect in model.effects):
             starts = self.starts(model)
             constant = np.tile([starts[name] for name in self.runner.tunables], (len(plain), 1))
@@ -183,40 +186,21 @@ class BoxProblem:
             table[:, column] = at_input(effect, table[:, column], self.step, float(values[0]))
         return table
 
-    def _follows(self, effect: BoxEffect, steps: int) -> Array:
+    def _follows(self, effect: FmuEffect, steps: int) -> Array:
         """Return what a parameter follows in every communication step: the time [s], or a signal."""
         if not effect.signal:
             return np.asarray((np.arange(steps) + 0.5) * self.step)
         signal = self.data.signals[:, list(self.map.signals).index(effect.signal)]
         return np.repeat(signal[: steps // self.m], self.m)
 
-    def _feedback(self, model: BoxModel) -> tuple[Feedback, ...]:
-        found = []
-        for effect, values in zip(model.effects, model.values, strict=True):
-            reads = self.runner.reads
-            q = [float(v) for v in values] + [0.0] * (4 - len(values))
-            if effect.kind.where == CUT:
-                place = self.runner.inputs.index(self.map.cuts[effect.place].input)
-                other = reads.index(self.beyond(effect))
-                found.append(Feedback(place, effect.kind.law, other, -1, self.sign.get(effect.place, 1.0), q))
-            if effect.kind.where != PORT:
-                continue
-            port = self.map.ports[effect.place]
-            velocity = -1 if port.velocity is None else reads.index(port.velocity)
-            place = self.runner.inputs.index(port.input)
-            sign = self.sign.get(effect.place, 1.0)
-            most = self.settings.process.runaway * float(self.drive([place])[0])
-            found.append(Feedback(place, effect.kind.law, reads.index(port.position), velocity, sign, q, most))
-        return tuple(found)
-
-    def beyond(self, effect: BoxEffect) -> str:
+    def beyond(self, effect: FmuEffect) -> str:
         """Return what an effect in a cut needs beside the position that is handed on."""
         cut = self.map.cuts[effect.place]
         name = cut.effort if effect.kind.law == COMPLIANCE else cut.far
         assert name is not None
         return name
 
-    def _measured(self, fine: Array, model: BoxModel) -> Array:
+    def _measured(self, fine: Array, model: FmuModel) -> Array:
         """Return the outputs at the samples, from what is read after every communication step.
 
         Effects behind an output act between the samples too: an output need not be smooth from one to the next.
@@ -232,7 +216,7 @@ class BoxProblem:
         return y[:: self.m]
 
     def pulse_runs(
-        self, model: BoxModel, rows: Sequence[int], places: Sequence[int], beyond: int = 0
+        self, model: FmuModel, rows: Sequence[int], places: Sequence[int], beyond: int = 0
     ) -> tuple[Array, list[list[Array | None]]]:
         """Return the run of a model, and those with a pulse one sample long at some rows of some inputs.
 
@@ -240,22 +224,20 @@ class BoxProblem:
             All that is read (rows, reads) without a pulse; for each input, for each row, outputs (rows, outputs) with
             it, over the pulse's size as a share of the drive; None where the FMU failed.
         """
-        plain, feedback, starts = self._plain(self.n), self._feedback(model), self.starts(model)
-        table = self.table(model, plain)
-        table = np.vstack([table, np.repeat(table[-1:], beyond * self.m, axis=0)]) if beyond else table
-        plans = [Plan(starts, table, feedback)]
+        plain = self._run_of(model)
+        if beyond:
+            plain = replace(plain, table=np.vstack([plain.table, np.repeat(plain.table[-1:], beyond * self.m, axis=0)]))
+        runs = [plain]
         for place, size in zip(places, self.drive(places), strict=True):
             for row in rows:
-                pulsed = table.copy()
-                pulsed[row * self.m : (row + 1) * self.m, place] += self.settings.probe.impulse * size
-                plans.append(Plan(starts, pulsed, feedback))
-        base, *found = self._runs(plans)
+                pulsed = plain.table.copy()
+                pulsed[row * self.m : (row + 1) * self.m, place] += IMPULSE * size
+                runs.append(replace(plain, table=pulsed))
+        base, *found = self._runs(runs)
         if base is None:
             raise self.does_not_run()
-        output = self._measured(base, model)
-        share = self.settings.probe.impulse
-        changes = [None if y is None else (self._measured(y, model) - output) / share for y in found]
-        count = len(rows)
+        output, count = self._measured(base, model), len(rows)
+        changes = [None if y is None else (self._measured(y, model) - output) / IMPULSE for y in found]
         return base[:: self.m], [changes[k * count : (k + 1) * count] for k in range(len(places))]
 
     @property
@@ -266,32 +248,47 @@ class BoxProblem:
 
     def drive(self, places: Sequence[int]) -> Array:
         """Return the size of the effort at each place: of its own column, else of the columns of the same unit."""
-        sizes = self.data.sizes
+        sizes, units = self.data.sizes, self.units
         largest = float(sizes.max()) or 1.0
         found = []
         for place in places:
             own = float(sizes[place]) if place < len(sizes) else 0.0
-            found.append(own or self._like(place, sizes) or largest)
+            like = (float(size) for name, size in zip(self.inputs, sizes, strict=True)
+                    if units.get(name) == units.get(self.runner.inputs[place]))  # fmt: skip
+            found.append(own or max(like, default=0.0) or largest)
         return np.array(found)
 
-    def _like(self, place: int, sizes: Array) -> float:
-        same = [float(s) for name, s in zip(self.inputs, sizes, strict=True)
-                if self.units.get(name) == self.units.get(self.runner.inputs[place])]  # fmt: skip
-        return max(same, default=0.0)
+
+def at_input(effect: FmuEffect, fine: Array, step: float, value: float) -> Array:
+    """Return an input behind an effect in series with it; before the record it had its first value, or was zero."""
+    before = 0.0 if effect.at_rest else float(fine[0])
+    match effect.kind.name:
+        case "input_gain":
+            return np.asarray(fine * (1.0 + value))
+        case "input_offset":
+            return np.asarray(fine + value)
+        case "input_delay":
+            return delay_input(fine, step, value, before)
+        case "input_lag":
+            return np.asarray(lag_input(fine, step, value, before))
+        case "input_saturation":
+            return np.clip(fine, -value, value)
+        case "input_dead_zone":
+            return np.asarray(fine - np.clip(fine, -value, value))
+        case "input_rate_limit":
+            return np.asarray(limit_rate(fine, step, value, before))
+    return quantise(fine, value)
 
 
-def series_of(problem: BoxProblem, rows: int) -> Array:
-    """Return the recorded inputs over every communication step up to ``rows`` samples; other inputs are 0.
-
-    Args:
-        rows: samples.
-
-    Returns:
-        Shape (steps, inputs).
-    """
-    table = np.zeros(((rows - 1) * problem.m, len(problem.runner.inputs)))
-    for k, entry in enumerate(problem.map.inputs.values()):
-        order = 1 if entry.hold == "linear" else 0
-        u = problem.data.driven[: (rows - 1) * problem.data.factor + 1, k]
-        table[:, k] = series.divided(u, problem.data.factor, problem.m, order)
-    return table
+def at_output(effect: FmuEffect, rows: Array, step: float, value: float, m: int) -> Array:
+    """Return an output behind an effect in series with it; ``m``: see :func:`delay_output`."""
+    match effect.kind.name:
+        case "output_gain":
+            return np.asarray(rows * (1.0 + value))
+        case "output_offset":
+            return np.asarray(rows + value)
+        case "output_delay":
+            return delay_output(rows, step, value, m)
+        case "output_lag":
+            return np.asarray(lag_output(rows, step, value))
+    return quantise(rows, value)

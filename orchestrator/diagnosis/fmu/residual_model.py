@@ -7,20 +7,18 @@ measured pulse responses. With them the analysis whitens residuals as it does th
 from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, BoxEffect
-from orchestrator.diagnosis.fmu.effects import place_effects
-from orchestrator.diagnosis.fmu.model import BoxModel
-from orchestrator.diagnosis.fmu.motion import efforts_along, port_motions
-from orchestrator.diagnosis.fmu.passed import at_input, at_output
-from orchestrator.diagnosis.fmu.problem import BoxProblem
+from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, FmuEffect
+from orchestrator.diagnosis.fmu.effects import candidate_effects, efforts_along, find_effects, port_motions
+from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem, at_input, at_output
 from orchestrator.diagnosis.fmu.response import PulseResponses, measure_responses, start_responses
-from orchestrator.diagnosis.fmu.sites import effects_of
 from orchestrator.diagnosis.model.interface import (
     CandidateEffect,
+    LawArgument,
     ModelPoint,
     NoiseSources,
     ResidualModel,
@@ -34,17 +32,18 @@ FAILED = 1e3  # times the span of an output: residual of a run that failed, from
 START = "state at the start"
 KEPT = 3_000_000  # rows of outputs of runs that are kept
 BAND = 0.45  # of the rate of samples: highest frequency of the analysis
+FADE = 0.005  # of the rows over which a record fades in and out: filters must see no step
 
 
 class FmuResiduals(ResidualModel):
     """An FMU, or several, beside one record: a :class:`ResidualModel`."""
 
-    def __init__(self, problem: BoxProblem) -> None:
+    def __init__(self, problem: FmuProblem) -> None:
         self.problem = problem
         self.channels = problem.outputs
         self.step, self.size = problem.h, problem.n
         self.cutoffs = tuple(BAND / problem.h for _ in self.channels)
-        self.edges = problem.settings.response.fade
+        self.edges = FADE
         self.active = np.ones((len(self.channels), self.size))
         self._order = _order(problem)
         self._kept: dict[Hashable, Array | None] = {}
@@ -52,36 +51,32 @@ class FmuResiduals(ResidualModel):
         self._places = self._input_places()
         self.parameters = _parameters(problem, 0)
         reads, responses = measure_responses(problem, problem.nominal, self._places)
-        self.is_linear = responses.is_linear(problem.settings.response.linear)
+        self.is_linear = responses.is_linear(problem.settings.linear)
         self._start = start_responses(problem, problem.nominal, self._places if self.is_linear else ())
         self.parameters = _parameters(problem, len(self._start))
         self._nominal = ModelPoint.nominal(self.parameters)
         self._responses[self._nominal.parameters, ()] = reads, responses
         self.motions = port_motions(problem, reads)
-        self._placed = place_effects(
-            effects_of(problem, reads), {name: m.x for name, m in self.motions.items()}, self._effort_gradient,
-            problem.settings.place.starts_off, self.is_linear,
-        )  # fmt: skip
-        self.effects: Mapping[str, CandidateEffect] = {k: placed.candidate for k, placed in self._placed.items()}
+        effects = find_effects(problem, reads)
+        self.placed = {effect.label: effect for effect in effects}
+        self.effects: Mapping[str, CandidateEffect] = candidate_effects(
+            effects, self.motions, self._effort_gradient, self.is_linear
+        )
 
     # --- residuals -----------------------------------------------------------------------------------------
 
-    def box_model(self, point: ModelPoint) -> BoxModel:
+    def fmu_model(self, point: ModelPoint) -> FmuModel:
         """Return parameters and effects at a point as runs of the FMU take them."""
         p = np.empty(len(self._order))
         for place, entry, value in zip(self._order, self.parameters, point.parameters, strict=False):
             own = self.problem.map.uncertain[place]
             p[place] = np.clip(own.value + value if entry.local else value, own.minimum, own.maximum)
-        found = [self._placed[label].at(values) for label, values in point.effects.items()]
-        return BoxModel(p, tuple(effect for effect, _ in found), tuple(values for _, values in found))
-
-    def placed_effect(self, label: str, values: Values) -> tuple[BoxEffect, Array]:
-        """Return an effect and its values as the bank has them."""
-        return self._placed[label].at(values)
+        found = [self.placed[label].at(values) for label, values in point.effects.items()]
+        return FmuModel(p, tuple(effect for effect, _ in found), tuple(values for _, values in found))
 
     def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
         """Return the residuals (outputs, n) at each of some points; see :class:`ResidualModel`."""
-        runs = self._runs([self.box_model(point) for point in points])
+        runs = self._runs([self.fmu_model(point) for point in points])
         measured = self.problem.data.outputs
         failed = np.broadcast_to(FAILED * np.ptp(measured, axis=0)[:, None], measured.T.shape)
         starts = [self.start_change(point, self.size) for point in points]
@@ -90,7 +85,7 @@ class FmuResiduals(ResidualModel):
             for y, start in zip(runs, starts, strict=True)
         ]
 
-    def _runs(self, models: Sequence[BoxModel]) -> list[Array | None]:
+    def _runs(self, models: Sequence[FmuModel]) -> list[Array | None]:
         """Return the outputs of runs, the last ones kept: fits under another whitening ask again."""
         keys = [model.key for model in models]
         missing = {key: model for key, model in zip(keys, models, strict=True) if key not in self._kept}
@@ -114,8 +109,8 @@ class FmuResiduals(ResidualModel):
 
     def is_possible(self, label: str, values: Values) -> bool:
         """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
-        effect, given = self._placed[label].at(values)
-        return effect.kind.plausible(tuple(given), effect.scene)
+        effect, given = self.placed[label].at(values)
+        return effect.kind.plausible(tuple(given), effect.scales)
 
     def driving(self, point: ModelPoint) -> Array:
         """Return the measured outputs (outputs, n); see :class:`ResidualModel`."""
@@ -152,7 +147,7 @@ class FmuResiduals(ResidualModel):
         own = PulseResponses(
             responses.rows, {place: responses.found[place] for place in self.problem.noise_places}, self.size
         )
-        process = own.frequency_response(frequencies, self.step, self.problem.settings.response.memory)
+        process = own.frequency_response(frequencies, self.step, self.problem.settings.noise_memory)
         return NoiseSources(identity, levels, process, np.zeros(process.shape[2]))
 
     # --- linear approximation ------------------------------------------------------------------------------
@@ -162,24 +157,24 @@ class FmuResiduals(ResidualModel):
         if not self.is_linear:
             return [None] * len(trials)
         reads, responses = self._measured_responses(point)
-        model = self.box_model(point)
+        model = self.fmu_model(point)
         pushes: dict[int, list[tuple[int, Array]]] = {}
         found: list[Array | None] = [None] * len(trials)
-        table = self.problem.table(model, self.problem.plain_table)
+        table = self.problem.table(model)
         for n, (label, values) in enumerate(trials):
-            effect, given = self._placed[label].at(values)
+            effect, given = self.placed[label].at(values)
             if effect.kind.where == OUTPUT:
                 found[n] = self._changed_output(effect, given, reads)
             elif effect.kind.where != PARAMETER:
                 place, push = self._push(effect, given, reads, table)
                 pushes.setdefault(place, []).append((n, push))
         for place, of_place in pushes.items():
-            changes = responses.changes(np.array([push for _, push in of_place]), place)
+            changes = responses.change_outputs(np.array([push for _, push in of_place]), place)
             for (n, _), change in zip(of_place, changes, strict=True):
                 found[n] = -change
         return found
 
-    def _push(self, effect: BoxEffect, values: Array, reads: Array, table: Array) -> tuple[int, Array]:
+    def _push(self, effect: FmuEffect, values: Array, reads: Array, table: Array) -> tuple[int, Array]:
         """Return the input at which an effect acts, and the effort (n,) that it adds there in each sample."""
         problem, runner = self.problem, self.problem.runner
         push = np.zeros(self.size)
@@ -196,17 +191,17 @@ class FmuResiduals(ResidualModel):
         push[:-1] = -problem.sign.get(effect.place, 1.0) * 0.5 * (effort[:-1] + effort[1:])
         return place, push
 
-    def _push_at_cut(self, effect: BoxEffect, values: Array, reads: Array) -> tuple[int, Array]:
+    def _push_at_cut(self, effect: FmuEffect, values: Array, reads: Array) -> tuple[int, Array]:
         problem, runner = self.problem, self.problem.runner
         target = problem.map.cuts[effect.place].input
-        wire = next(c for c in runner.subject.connections if c.target == target)
+        wire = next(c for c in runner.system.connections if c.target == target)
         other = reads[:, runner.reads.index(problem.beyond(effect))]
         if effect.kind.law == COMPLIANCE:
             return runner.inputs.index(target), -values[0] * problem.sign.get(effect.place, 1.0) * other
         between = wire.factor * reads[:, runner.reads.index(wire.source)] + wire.offset - other
         return runner.inputs.index(target), -np.clip(between, -0.5 * values[0], 0.5 * values[0])
 
-    def _changed_output(self, effect: BoxEffect, values: Array, reads: Array) -> Array:
+    def _changed_output(self, effect: FmuEffect, values: Array, reads: Array) -> Array:
         channel = self.problem.outputs.index(effect.place)
         y = reads[:, channel]
         change = np.zeros((len(self.channels), self.size))
@@ -226,7 +221,7 @@ class FmuResiduals(ResidualModel):
         _, responses = self._measured_responses(self._nominal)
         push = np.zeros((1, self.size))
         push[0, :-1] = -problem.sign.get(port, 1.0) * 0.5 * (effort[:-1] + effort[1:])
-        return -responses.changes(push, problem.runner.inputs.index(problem.map.ports[port].input))[0]
+        return -responses.change_outputs(push, problem.runner.inputs.index(problem.map.ports[port].input))[0]
 
     def _effort_gradient(self, port: str, by_residuals: Array) -> Array:
         _, responses = self._measured_responses(self._nominal)
@@ -238,7 +233,7 @@ class FmuResiduals(ResidualModel):
         if key not in self._responses:
             for old in list(self._responses)[1:]:
                 del self._responses[old]
-            self._responses[key] = measure_responses(self.problem, self.box_model(point), self._places)
+            self._responses[key] = measure_responses(self.problem, self.fmu_model(point), self._places)
         return self._responses[key]
 
     def _input_places(self) -> list[int]:
@@ -249,14 +244,14 @@ class FmuResiduals(ResidualModel):
         return [names.index(name) for name in dict.fromkeys(acting)]
 
 
-def _order(problem: BoxProblem) -> list[int]:
+def _order(problem: FmuProblem) -> list[int]:
     """Return the places of the uncertain values of a map in the order of the analysis: those of one record last."""
     uncertain = problem.map.uncertain
     shared = [k for k, u in enumerate(uncertain) if u.value != 0.0 and u.name not in problem.map.initial]
     return [*shared, *(k for k in range(len(uncertain)) if k not in shared)]
 
 
-def _parameters(problem: BoxProblem, starts: int) -> tuple[UncertainParameter, ...]:
+def _parameters(problem: FmuProblem, starts: int) -> tuple[UncertainParameter, ...]:
     found = []
     for k in _order(problem):
         u = problem.map.uncertain[k]
@@ -265,3 +260,28 @@ def _parameters(problem: BoxProblem, starts: int) -> tuple[UncertainParameter, .
         else:
             found.append(UncertainParameter(u.name, u.value, u.uncertainty / abs(u.value), u.unit))
     return (*found, *(UncertainParameter(f"{START} {k + 1}", 1.0, 1.0, local=True) for k in range(starts)))
+
+
+def port_arguments(models: Sequence[FmuResiduals]) -> list[LawArgument]:
+    """Return what an effort at a port may be a function of: position and speed there (or the flow), each input, time.
+
+    Args:
+        models: one for each record.
+    """
+    problem = models[0].problem
+    found = []
+    for port, entry in problem.map.ports.items():
+        unit, effort = problem.units.get(entry.position, ""), problem.units.get(entry.input, "")
+        speeds = [model.motions[port].v for model in models]
+        signals = [("time", "s", [model.problem.data.time - model.problem.data.time[0] for model in models])]
+        if entry.flow_only:
+            signals.append((f"flow at {port}", unit, speeds))
+        else:
+            signals.append((f"position at {port}", unit, [model.motions[port].x for model in models]))
+            signals.append((f"speed at {port}", f"{unit or '1'}/s", speeds))
+        for k, name in enumerate(problem.inputs):
+            signals.append((name, problem.units.get(name, ""), [model.problem.data.inputs[:, k] for model in models]))
+        for name, of_name, values in signals:
+            responses = tuple(partial(model.respond_to_effort, port) for model in models)
+            found.append(LawArgument(name, port, of_name, effort, tuple(values), responses))
+    return found

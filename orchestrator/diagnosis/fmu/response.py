@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from orchestrator.diagnosis.fmu.model import BoxModel
-from orchestrator.diagnosis.fmu.problem import BoxProblem
+from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+START_STATES = 4  # at the start that may be off, where the FMU does not let them be set
+START_LEAST = 1e-3  # of the largest, that a state's response must have: less is rounding
+START_LAGS = 24  # rows before the record at which what was pushed has led to its start
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,7 @@ class PulseResponses:
                     return False
         return True
 
-    def changes(self, pushes: Array, place: int) -> Array:
+    def change_outputs(self, pushes: Array, place: int) -> Array:
         """Return what efforts at an input change of the outputs.
 
         Args:
@@ -52,9 +54,10 @@ class PulseResponses:
             Shape (trials, outputs, n).
         """
         length = next_fast_len(2 * self.size)
-        responses = self.found[place]
-        total = np.zeros((len(pushes), responses[0].shape[1], length // 2 + 1), dtype=complex)
-        for spectrum, part in zip(self._spectra(place, length), self._parts(pushes), strict=True):
+        total = np.zeros((len(pushes), self.found[place][0].shape[1], length // 2 + 1), dtype=complex)
+        for spectrum, row, end in self._spectra(place, length):
+            part = np.zeros_like(pushes)
+            part[:, row:end] = pushes[:, row:end]
             total += rfft(part, length, axis=1)[:, None, :] * spectrum
         return np.asarray(irfft(total, length, axis=2)[:, :, : self.size])
 
@@ -62,9 +65,8 @@ class PulseResponses:
         """Return the gradient (n,) by the effort in each sample, of what has a gradient (outputs, n) by the outputs."""
         length = next_fast_len(2 * self.size)
         spectra = rfft(by_outputs, length, axis=1)
-        ends = (*self.rows[1:], self.size)
         found = np.zeros(self.size)
-        for spectrum, row, end in zip(self._spectra(place, length), self.rows, ends, strict=True):
+        for spectrum, row, end in self._spectra(place, length):
             back = irfft(np.sum(spectra * np.conj(spectrum), axis=0), length)
             found[row:end] = back[row:end]
         return found
@@ -89,26 +91,19 @@ class PulseResponses:
             columns.append(czt(faded, frequencies.size, turn, axis=0))
         return np.stack(columns, axis=2)
 
-    def _spectra(self, place: int, length: int) -> list[Complex]:
-        return [rfft(response.T, length, axis=1) for response in self.found[place]]
-
-    def _parts(self, pushes: Array) -> list[Array]:
-        """Return the pushes between each row of a pulse and the next, zero elsewhere."""
-        found = []
-        for row, end in zip(self.rows, (*self.rows[1:], self.size), strict=True):
-            part = np.zeros_like(pushes)
-            part[:, row:end] = pushes[:, row:end]
-            found.append(part)
-        return found
+    def _spectra(self, place: int, length: int) -> list[tuple[Complex, int, int]]:
+        """Return the spectrum (outputs, f) of each response, and the rows from one pulse to the next that it is for."""
+        spectra = (rfft(response.T, length, axis=1) for response in self.found[place])
+        return list(zip(spectra, self.rows, (*self.rows[1:], self.size), strict=True))
 
 
-def measure_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int]) -> tuple[Array, PulseResponses]:
+def measure_responses(problem: FmuProblem, model: FmuModel, places: Sequence[int]) -> tuple[Array, PulseResponses]:
     """Return the run of a model, and its responses to pulses at some inputs.
 
     Returns:
         All that is read (n, reads), and the responses.
     """
-    count = problem.settings.response.pulses
+    count = problem.settings.pulses
     rows = tuple(int(row) for row in np.unique(np.arange(count) * problem.n // count))
     reads, runs = problem.pulse_runs(model, rows, places)
     found = {}
@@ -125,7 +120,7 @@ def measure_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int
     return reads, PulseResponses(rows, found, problem.n)
 
 
-def start_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int]) -> Array:
+def start_responses(problem: FmuProblem, model: FmuModel, places: Sequence[int]) -> Array:
     """Return what another state at the start changes of the outputs, which an FMU need not let be set.
 
     Any state that inputs lead to is one that pulses before the record have left: what they change later on. The changes
@@ -134,11 +129,10 @@ def start_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int])
     Returns:
         Shape (changes, outputs, rows), each as large at most as the settings grant, a quarter longer than the record.
     """
-    own = problem.settings.response
     reach = max(problem.n // 4, 8)
     rows = problem.n + reach
     _, runs = problem.pulse_runs(model, (0,), places, 2 * reach)
-    lags = np.unique(np.geomspace(1, reach, own.start_lags).astype(int))
+    lags = np.unique(np.geomspace(1, reach, START_LAGS).astype(int))
     found = []
     for (change,) in runs:
         if change is not None and float(np.max(np.abs(change))) > 0.0:
@@ -147,7 +141,7 @@ def start_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int])
     if not found:
         return np.zeros((0, len(problem.outputs), rows))
     left, sizes, _ = np.linalg.svd(np.array(found).T, full_matrices=False)
-    kept = left[:, : own.start_states][:, sizes[: own.start_states] > own.start_least * sizes[0]].T
+    kept = left[:, :START_STATES][:, sizes[:START_STATES] > START_LEAST * sizes[0]].T
     kept = kept.reshape(len(kept), len(problem.outputs), rows)
     kept = kept / np.max(np.abs(kept), axis=(1, 2), keepdims=True)
-    return np.asarray(own.start_spread * kept * problem.noise[:, None])
+    return np.asarray(problem.settings.start_spread * kept * problem.noise[:, None])

@@ -34,6 +34,14 @@ OMS_TOLERANCE = 1e-4
 """Relative tolerance that OMSimulator hands to FMUs where a file states none; stated, it counts as not stated."""
 
 STRUCTURE = "SystemStructure.ssd"
+DATE = "2026-01-01T00:00:00Z"
+"""Date in the files' metadata: fixed, so that the same system gives the same bytes."""
+
+VALUES = "initialValues"
+"""Name of every parameter set: ecos applies the sets of one name, others do not look at it."""
+
+FURTHER = {"ssd": ("ssv", "osp", "oms"), "ssv": ()}
+"""Namespaces that a file of each kind uses beside its own and the common one."""
 EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 MAXIMUM_XML = 64 * 2**20
 
@@ -71,6 +79,21 @@ def require_valid(root: etree._Element, kind: str, origin: str) -> None:
     if not rules.validate(root):
         first = rules.error_log[0]
         raise ScenarioError(f"{origin}: must follow {SCHEMAS[kind]}, but does not: line {first.line}: {first.message}")
+
+
+def new_document(kind: str, element: str, name: str) -> etree._Element:
+    """Return the root of an ``ssd`` or ``ssv`` file."""
+    spaces = {key: SPACES[key] for key in (kind, "ssc", *FURTHER[kind])}
+    root = etree.Element(tag(kind, element), nsmap=spaces, version="1.0", name=name)
+    root.set("generationTool", "backlash-cosim")
+    root.set("generationDateAndTime", DATE)
+    return root
+
+
+def document_bytes(root: etree._Element, kind: str, origin: str) -> bytes:
+    """Return the text of a file that follows the schema of its kind."""
+    require_valid(root, kind, origin)
+    return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 
 
 def add_master(system: etree._Element, step: float, solver_tolerance: float | None) -> None:

@@ -14,19 +14,14 @@ from orchestrator.master.system import Connection, Instance, System, split
 from orchestrator.scenarios.scenario import Scenario
 from orchestrator.scenarios.ssp.common import (
     EXPONENTS,
-    SPACES,
     STRUCTURE,
+    VALUES,
     add_experiment,
     add_master,
-    require_valid,
+    document_bytes,
+    new_document,
     tag,
 )
-
-DATE = "2026-01-01T00:00:00Z"
-"""Date in the files' metadata: fixed, so that the same system gives the same bytes."""
-
-VALUES = "initialValues"
-"""Name of every parameter set: ecos applies the sets of one name, others do not look at it."""
 
 
 def write_ssp(path: Path, scenario: Scenario) -> None:
@@ -80,10 +75,7 @@ def _start_values(system: System, instance: Instance) -> dict[str, Value]:
 
 
 def _structure(scenario: Scenario) -> bytes:
-    spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp", "oms")}
-    root = etree.Element(tag("ssd", "SystemStructureDescription"), nsmap=spaces, version="1.0", name=scenario.name)
-    root.set("generationTool", "backlash-cosim")
-    root.set("generationDateAndTime", DATE)
+    root = new_document("ssd", "SystemStructureDescription", scenario.name)
     system = etree.SubElement(root, tag("ssd", "System"), name="system")
     elements = etree.SubElement(system, tag("ssd", "Elements"))
     for instance in scenario.system.instances:
@@ -96,7 +88,7 @@ def _structure(scenario: Scenario) -> bytes:
     add_master(system, scenario.algorithm.step, min(stated, default=None))
     _units(root, scenario.system.instances)
     add_experiment(root, scenario.start, scenario.stop, scenario.algorithm.step)
-    return _bytes(root, "ssd", STRUCTURE)
+    return document_bytes(root, "ssd", STRUCTURE)
 
 
 def _component(elements: etree._Element, system: System, instance: Instance) -> None:
@@ -178,10 +170,7 @@ def _unit(parent: etree._Element, unit: Unit) -> None:
 
 
 def _values(instance: Instance, values: Mapping[str, Value]) -> bytes:
-    spaces = {key: SPACES[key] for key in ("ssv", "ssc")}
-    root = etree.Element(tag("ssv", "ParameterSet"), nsmap=spaces, version="1.0", name=VALUES)
-    root.set("generationTool", "backlash-cosim")
-    root.set("generationDateAndTime", DATE)
+    root = new_document("ssv", "ParameterSet", VALUES)
     parameters = etree.SubElement(root, tag("ssv", "Parameters"))
     used = set()
     for name, value in values.items():
@@ -194,10 +183,4 @@ def _values(instance: Instance, values: Mapping[str, Value]) -> bytes:
         parent = etree.SubElement(root, tag("ssv", "Units"))
         for unit in units:
             _unit(parent, unit)
-    return _bytes(root, "ssv", _values_file(instance))
-
-
-def _bytes(root: etree._Element, kind: str, name: str) -> bytes:
-    require_valid(root, kind, name)
-    text: bytes = etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
-    return text
+    return document_bytes(root, "ssv", _values_file(instance))

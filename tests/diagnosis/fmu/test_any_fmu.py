@@ -13,14 +13,14 @@ from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
 from orchestrator.diagnosis.fmu.bank import PORT
+from orchestrator.diagnosis.fmu.effects import find_effects
 from orchestrator.diagnosis.fmu.mapping import read_map
-from orchestrator.diagnosis.fmu.prepare import prepare_problems
-from orchestrator.diagnosis.fmu.reading import read_data
-from orchestrator.diagnosis.fmu.sites import effects_of
-from orchestrator.diagnosis.fmu.subject import subject_of
-from orchestrator.diagnosis.fmu_settings import FmuSettings, ProcessSettings
+from orchestrator.diagnosis.fmu.probing import prepare_problems
+from orchestrator.diagnosis.fmu.problem import FmuModel
+from orchestrator.diagnosis.fmu.record import read_fmu_record
+from orchestrator.diagnosis.fmu.system import read_system
 from orchestrator.diagnosis.selection.outcome import Grade
-from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.diagnosis.settings import DiagnosisSettings, FmuSettings
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.shared.results import read
@@ -30,11 +30,6 @@ from tests.support.c_fmu import have_compiler
 
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="no C compiler")
 SPRING, TWO_MASS, CIRCUIT, TANKS = DOMAINS
-
-
-def of_process(process):
-    """All settings, those of the FMU's processes being others."""
-    return DiagnosisSettings(fmu=FmuSettings(process=process))
 
 
 @pytest.fixture
@@ -185,7 +180,7 @@ def test_an_fmu_that_misbehaves_mildly_is_diagnosed_all_the_same(made, fault):
 def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault):
     _, *files = made(SPRING, rows=300, fault=fault)
     with pytest.raises(OrchestratorError) as caught:
-        diagnose(*files, settings=of_process(ProcessSettings(loading=8.0)))
+        diagnose(*files, settings=DiagnosisSettings(fmu=FmuSettings(loading=8.0)))
     assert "\n" not in str(caught.value)
     assert "Spring.fmu" in str(caught.value)
 
@@ -194,18 +189,18 @@ def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault):
 def test_an_fmu_that_hangs_is_ended(made, fault):
     _, *files = made(SPRING, rows=300, fault=fault)
     with pytest.raises(OrchestratorError, match="hangs"):
-        diagnose(*files, settings=of_process(ProcessSettings(loading=3.0, patience=2.0, most_lost=1)))
+        diagnose(*files, settings=DiagnosisSettings(fmu=FmuSettings(loading=3.0, patience=2.0, most_lost=1)))
 
 
 def test_a_run_whose_fed_back_effort_runs_away_is_given_up_before_the_fmu_meets_it(made):
     _, record_path, fmu, map_path = made(SPRING, rows=300, fault="hangs_when_pushed_hard")
-    subject = subject_of(fmu)
-    given = read_map(map_path, subject)
-    (problem,), _ = prepare_problems(subject, given, [read_data(record_path, given)], workers=1)
+    system = read_system(fmu)
+    given = read_map(map_path, system)
+    (problem,), _ = prepare_problems(system, given, [read_fmu_record(record_path, given)], workers=1)
     try:
-        effects = effects_of(problem, problem.must_read(problem.nominal))
+        effects = find_effects(problem, problem.must_read(problem.nominal))
         inertia = next(e for e in effects if e.kind.name == "added_inertia")
-        heavier, unstable = (problem.nominal.extended(inertia, np.array([m])) for m in (0.1, 5.0))
+        heavier, unstable = (FmuModel(problem.nominal.p, (inertia,), (np.array([m]),)) for m in (0.1, 5.0))
         assert problem.simulate([heavier])[0] is not None
         assert problem.simulate([unstable])[0] is None
         assert "run away" in problem.runner.reason
@@ -217,11 +212,13 @@ def test_a_run_whose_fed_back_effort_runs_away_is_given_up_before_the_fmu_meets_
 @pytest.mark.parametrize(("domain", "moves"), [(SPRING, True), (CIRCUIT, True), (TANKS, False)])
 def test_where_the_input_is_a_flow_no_law_of_motion_is_tried(made, domain, moves):
     _, record_path, fmu, map_path = made(domain, rows=300)
-    subject = subject_of(fmu)
-    given = read_map(map_path, subject)
-    (problem,), _ = prepare_problems(subject, given, [read_data(record_path, given)], workers=1)
+    system = read_system(fmu)
+    given = read_map(map_path, system)
+    (problem,), _ = prepare_problems(system, given, [read_fmu_record(record_path, given)], workers=1)
     try:
-        at_port = {e.kind.name for e in effects_of(problem, problem.must_read(problem.nominal)) if e.kind.where == PORT}
+        at_port = {
+            e.kind.name for e in find_effects(problem, problem.must_read(problem.nominal)) if e.kind.where == PORT
+        }
     finally:
         problem.runner.close()
     assert {"load", "spring", "quadratic_drag"} <= at_port
@@ -231,15 +228,15 @@ def test_where_the_input_is_a_flow_no_law_of_motion_is_tried(made, domain, moves
 
 def test_a_run_that_hangs_is_given_up_soon_and_others_go_on(made):
     _, record_path, fmu, map_path = made(SPRING, rows=300, fault="hangs_without_a_push")
-    subject = subject_of(fmu)
-    given = read_map(map_path, subject)
-    settings = FmuSettings(process=ProcessSettings(known=3.0, again=1.0, patience=300.0))
-    (problem,), _ = prepare_problems(subject, given, [read_data(record_path, given)], workers=1, settings=settings)
+    system = read_system(fmu)
+    given = read_map(map_path, system)
+    settings = FmuSettings(patience=300.0)
+    (problem,), _ = prepare_problems(system, given, [read_fmu_record(record_path, given)], workers=1, settings=settings)
     try:
         zone = next(
-            e for e in effects_of(problem, problem.must_read(problem.nominal)) if e.kind.name == "input_dead_zone"
+            e for e in find_effects(problem, problem.must_read(problem.nominal)) if e.kind.name == "input_dead_zone"
         )
-        wide = problem.nominal.extended(zone, np.array([1e9]))
+        wide = FmuModel(problem.nominal.p, (zone,), (np.array([1e9]),))
         begun = time.monotonic()
         runs = problem.simulate([problem.nominal, wide, problem.nominal])
         assert time.monotonic() - begun < 60.0

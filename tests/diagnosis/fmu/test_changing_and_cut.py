@@ -8,7 +8,7 @@ import pytest
 import orchestrator as oc
 from orchestrator.cli import main
 from orchestrator.diagnosis.fmu.mapping import read_map
-from orchestrator.diagnosis.fmu.subject import subject_of
+from orchestrator.diagnosis.fmu.system import read_system
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import InputError
 from pyfmu_sources import port_laws as laws
@@ -96,7 +96,7 @@ def test_a_wrong_cut_is_refused_in_one_line(tmp_path, change, words):
     loop, map_path = write_scenario(tmp_path)
     map_path.write_text(change(map_path.read_text()))
     with pytest.raises(InputError, match=words) as caught:
-        read_map(map_path, subject_of(loop))
+        read_map(map_path, read_system(loop))
     assert "\n" not in str(caught.value)
 
 
@@ -105,10 +105,10 @@ def test_a_scenario_that_rounds_or_feeds_an_input_of_its_own_is_refused(tmp_path
     text = loop.read_text()
     loop.write_text(text.replace('to = "motor.T"', 'to = "motor.T"\nquantum = 0.1'))
     with pytest.raises(InputError, match="without a quantum"):
-        subject_of(loop)
+        read_system(loop)
     loop.write_text(text + '[[sources]]\nto = "load.phi_in"\nkind = "constant"\nvalue = 1.0\n')
     with pytest.raises(InputError, match="the scenario feeds it"):
-        read_map(map_path, subject_of(loop))
+        read_map(map_path, read_system(loop))
 
 
 def test_hysteresis_comes_back_on_a_straight_line_and_friction_does_not():

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.fmu.deliver import deliver
-from orchestrator.diagnosis.fmu.parts import parts_of
-from orchestrator.diagnosis.fmu.problem import series_of
+from orchestrator.diagnosis.fmu.corrected_ssp import corrected_parts, write_corrected
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 
@@ -28,16 +26,16 @@ def test_fmpy_reproduces_the_fit_within_a_tenth_of_the_noise(tmp_path):
         problem, model = workings.problem, workings.final
         assert [effect.name for effect in found.effects] == ["quadratic_drag"]
         path = tmp_path / "corrected.ssp"
-        deliver(path, problem, model)
+        write_corrected(path, problem, model)
         fitted = problem.simulate([model])[0]
         coarse = problem.h / problem.m
         step = coarse / FINER
-        held = series_of(problem, problem.n)[:, 0]
+        held = problem.plain_table()[:, 0]
         values = [
             SimpleNamespace(name=f"plant.{u.name}", value=v)
             for u, v in zip(problem.map.uncertain, model.p, strict=True)
         ]
-        for part in parts_of(problem, model):
+        for part in corrected_parts(problem, model):
             given = part.values | {"lead": 1.5}
             given.pop("has_velocity")
             values += [SimpleNamespace(name=f"{part.name}.{name}", value=value) for name, value in given.items()]

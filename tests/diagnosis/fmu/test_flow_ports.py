@@ -8,11 +8,10 @@ import pytest
 
 from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.fmu.draft import drafted
+from orchestrator.diagnosis.fmu.corrected_ssp import parameter_values
+from orchestrator.diagnosis.fmu.effects import OF_POSITION, find_effects
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
-from orchestrator.diagnosis.fmu.sites import OF_POSITION, effects_of
-from orchestrator.diagnosis.fmu.ssp_structure import parameter_values
-from orchestrator.diagnosis.fmu.subject import Subject, subject_of
+from orchestrator.diagnosis.fmu.system import FmuSystem, draft_map_text, read_system
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import ModelInterface, Variable
@@ -54,7 +53,7 @@ def test_a_resistance_that_grows_with_the_current_is_named_by_its_flow_alone(tmp
         assert (value.value, value.unit) == (pytest.approx(size, rel=0.05), "V.s2/(A.s)2")
         assert max(one.final / one.noise for one in found.test[0].signals) < 1.3
         problem = found.diagnosis.workings.problem
-        offered = {e.kind.name for e in effects_of(problem, problem.must_read(problem.nominal)) if e.place == "coil"}
+        offered = {e.kind.name for e in find_effects(problem, problem.must_read(problem.nominal)) if e.place == "coil"}
         assert {"viscous_drag", "quadratic_drag", "load"} <= offered
         assert not offered & set(OF_POSITION)
     finally:
@@ -66,7 +65,7 @@ MAP = '[inputs]\nu = {{}}\n[outputs]\nx = {{ noise = 1e-3 }}\n[parameters]\ngain
 
 def mapped(folder: Path, more: str) -> Map:
     (folder / "map.toml").write_text(MAP.format(more))
-    return read_map(folder / "map.toml", subject_of(build_answers_fmu(folder, parameters=True)))
+    return read_map(folder / "map.toml", read_system(build_answers_fmu(folder, parameters=True)))
 
 
 @compiled
@@ -121,12 +120,12 @@ def test_a_scenario_may_set_values_of_any_type(tmp_path: Path) -> None:
         'stop = 1.0\nrecord = ["a.x"]\n[master]\nstep = 0.1\n[instances.a]\nfmu = "Answers.fmu"\n'
         "[instances.a.parameters]\non = true\nmode = 2\n"
     )
-    assert subject_of(tmp_path / "s.toml").given == {"a.on": True, "a.mode": 2}
+    assert read_system(tmp_path / "s.toml").given == {"a.on": True, "a.mode": 2}
 
 
-def variables(*entries: tuple[str, str, str]) -> Subject:
+def variables(*entries: tuple[str, str, str]) -> FmuSystem:
     found = {name: Variable(name, causality, unit=unit) for name, causality, unit in entries}
-    return Subject(Path("a.fmu"), {"": Path("a.fmu")}, ModelInterface("M", found))
+    return FmuSystem(Path("a.fmu"), {"": Path("a.fmu")}, ModelInterface("M", found))
 
 
 @pytest.mark.parametrize(
@@ -144,7 +143,7 @@ def variables(*entries: tuple[str, str, str]) -> Subject:
     ],
 )  # fmt: skip
 def test_a_draft_pairs_what_makes_a_power(entries: tuple, port: str) -> None:
-    text = drafted(variables(*entries), [])
+    text = draft_map_text(variables(*entries), [])
     head, _, found = text.partition("[ports.port_1]\n")
     assert found == port
     assert ("no port is drafted" in head) == (not port)

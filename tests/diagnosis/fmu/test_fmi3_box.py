@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.building.native_build import ensure_native
-from orchestrator.diagnosis.fmu.binding import Box
-from orchestrator.diagnosis.fmu.wire import Batch, Job, Load, Wire
+from orchestrator.diagnosis.fmu.coupled_fmus import Batch, CoupledFmus, LoadRequest, Run
 from orchestrator.errors import FmuError, SlaveError
 from tests.support.ball3 import build_ball
 from tests.support.c_fmu import have_compiler
@@ -29,11 +28,11 @@ def run(motor: Path, load: Path) -> np.ndarray:
     """Motor and load, joined by the motor's motion and the shaft's torque."""
     inputs = ["motor.u", "motor.T_shaft", "load.theta_m", "load.omega_m"]
     reads = ["motor.theta_m", "motor.omega_m", "load.T_shaft", "load.theta_l"]
-    wires = [Wire(2, 1, 1.0, 0.0), Wire(0, 2, 1.0, 0.0), Wire(1, 3, 1.0, 0.0)]
-    box = Box(Load({"motor": str(motor), "load": str(load)}, inputs, reads, wires=wires))
+    wires = [(1, 2, 1.0, 0.0), (2, 0, 1.0, 0.0), (3, 1, 1.0, 0.0)]
+    box = CoupledFmus(LoadRequest({"motor": str(motor), "load": str(load)}, inputs, reads, wires=wires))
     table = np.hstack([TABLE, np.zeros((len(TABLE), 3))])
-    job = Job({"load.alpha": 0.02}, 0, [])
-    return box.run(job, Batch(0.0, 1e-3, 2, [table], [job]))
+    job = Run({"load.alpha": 0.02}, table)
+    return box.run(job, Batch(0.0, 1e-3, [job]))
 
 
 def test_both_versions_and_a_mix_have_the_same_bits(halves: dict[int, dict[str, Path]]) -> None:
@@ -43,8 +42,8 @@ def test_both_versions_and_a_mix_have_the_same_bits(halves: dict[int, dict[str, 
         assert run(halves[motor]["MotorHalf"], halves[load]["LoadHalf"]).tobytes() == expected.tobytes()
 
 
-def box_of(path: Path, read: str = "time") -> Box:
-    return Box(Load({"": str(path)}, [], [read]))
+def box_of(path: Path, read: str = "time") -> CoupledFmus:
+    return CoupledFmus(LoadRequest({"": str(path)}, [], [read]))
 
 
 @pytest.mark.parametrize(
@@ -56,9 +55,9 @@ def box_of(path: Path, read: str = "time") -> Box:
     ],
 )
 def test_a_step_that_does_not_end_as_asked_is_an_error(tmp_path: Path, macros: tuple[str, ...], expected: str) -> None:
-    job = Job({}, 0, [])
+    job = Run({}, np.zeros((20, 0)))
     with pytest.raises(SlaveError, match=expected):
-        box_of(build_typed3_fmu(tmp_path, *macros)).run(job, Batch(0.0, 0.01, 1, [np.zeros((20, 0))], [job]))
+        box_of(build_typed3_fmu(tmp_path, *macros)).run(job, Batch(0.0, 0.01, [job]))
 
 
 def test_what_the_loop_cannot_call_is_refused(tmp_path: Path) -> None:

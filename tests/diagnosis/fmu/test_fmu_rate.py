@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.fmu.model import Data
-from orchestrator.diagnosis.fmu.rate import decimated, factor_of
-from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings, RateSettings
-from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor
+from orchestrator.diagnosis.settings import DiagnosisSettings, FmuSettings
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 
@@ -19,7 +17,7 @@ def _data(rows, frequency, step=1e-3):
     time = step * np.arange(rows)
     y = np.sin(2 * np.pi * frequency * time) + NOISE * np.random.default_rng(1).standard_normal(rows)
     u = np.sign(np.sin(2 * np.pi * 0.5 * frequency * time))
-    return Data(time, u[:, None], y[:, None], "record.csv", time[:, None])
+    return FmuRecord(time, u[:, None], y[:, None], "record.csv", time[:, None])
 
 
 @pytest.mark.parametrize(
@@ -28,13 +26,13 @@ def _data(rows, frequency, step=1e-3):
     ids=["short", "slow", "faster", "fast"],
 )
 def test_a_long_record_keeps_the_rate_that_its_outputs_ask_for(rows, frequency, factor):
-    found = factor_of(_data(rows, frequency))
+    found = decimation_factor(_data(rows, frequency))
     assert found == 1 if factor == 1 else abs(found - factor) <= 1
 
 
 def test_fewer_rows_are_looked_at_and_all_inputs_act():
     data = _data(20_000, 1.0)
-    less = decimated(data, 10)
+    less = decimate(data, 10)
     assert less.factor == 10
     assert less.step == pytest.approx(1e-2)
     np.testing.assert_array_equal(less.outputs, data.outputs[:19_990:10])
@@ -49,7 +47,7 @@ def test_a_saturation_between_the_rows_that_are_looked_at_is_found_to_its_size(t
     domain, rng = DOMAINS[0], np.random.default_rng(8)
     case = record(domain, ("input_saturation",), rng, 1300)
     fmu, map_path = write_fmu(tmp_path / "Spring.fmu", domain), write_map(tmp_path / "map.toml", domain)
-    settings = DiagnosisSettings(fmu=FmuSettings(rate=RateSettings(rows=400, per_band=2.1, most_above=0.3)))
+    settings = DiagnosisSettings(fmu=FmuSettings(rows=400, per_band=2.1, most_above=0.3))
     found = diagnose(write_record(tmp_path / "r.csv", case), fmu, map_path, settings=settings)
     found.close()
     assert found.diagnosis.workings.problem.data.factor == 3
@@ -63,4 +61,4 @@ def test_a_saturation_between_the_rows_that_are_looked_at_is_found_to_its_size(t
 
 def test_all_rows_of_a_short_record_stay():
     data = _data(500, 1.0)
-    assert decimated(data, factor_of(data, DEFAULT.rate)) is data
+    assert decimate(data, decimation_factor(data)) is data

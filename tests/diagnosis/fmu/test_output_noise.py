@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.fmu.noise import noise_of, third_differences
-from orchestrator.diagnosis.fmu_settings import DEFAULT
+from orchestrator.diagnosis.fmu.probing import output_noise, third_differences
 
 TRUE = 2e-3
 N = 1500
@@ -21,8 +20,8 @@ def record(count: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
 
 def noise(given: float | None, seen: np.ndarray, *traces: np.ndarray, factor: float = 1.0):
     entry = SimpleNamespace(noise=given, factor=factor)
-    values, notes = noise_of(
-        SimpleNamespace(outputs={"y": entry}), SimpleNamespace(outputs=seen, factor=1), [seen, *traces], DEFAULT.probe
+    values, notes = output_noise(
+        SimpleNamespace(outputs={"y": entry}), SimpleNamespace(outputs=seen, factor=1), [seen, *traces]
     )
     return float(values[0]), notes
 

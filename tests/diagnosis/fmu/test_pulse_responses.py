@@ -24,7 +24,7 @@ def simulated(pushes):
 
 def test_efforts_change_what_a_simulation_says(lag):
     pushes = np.random.default_rng(1).standard_normal((2, ROWS))
-    found = lag.changes(pushes, 2)
+    found = lag.change_outputs(pushes, 2)
     for change, push in zip(found, pushes, strict=True):
         np.testing.assert_allclose(change[0], simulated(push), atol=1e-10)
 
@@ -32,7 +32,7 @@ def test_efforts_change_what_a_simulation_says(lag):
 def test_the_gradient_is_the_transpose(lag):
     rng = np.random.default_rng(2)
     push, by_outputs = rng.standard_normal(ROWS), rng.standard_normal((1, ROWS))
-    assert float(np.sum(lag.changes(push[None], 2)[0] * by_outputs)) == pytest.approx(
+    assert float(np.sum(lag.change_outputs(push[None], 2)[0] * by_outputs)) == pytest.approx(
         float(push @ lag.gradient(by_outputs, 2))
     )
 

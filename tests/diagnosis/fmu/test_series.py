@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.fmu import series
-from orchestrator.diagnosis.fmu.bank import BANK, BoxEffect, Surroundings
-from orchestrator.diagnosis.fmu.passed import at_input
+from orchestrator.diagnosis.fmu import loop
+from orchestrator.diagnosis.fmu.bank import BANK, FmuEffect, SignalScales
+from orchestrator.diagnosis.fmu.problem import at_input
+from orchestrator.diagnosis.fmu.record import divide_samples
 from pyfmu_sources.attachment import SERIES, AttachedEffect
 
 STEP = 0.01
@@ -19,37 +20,37 @@ def signal():
 
 def test_rows_are_divided_into_more_parts_than_rows_or_fewer(signal):
     rows = np.append(signal, 9.0)
-    assert series.divided(rows, 3, 6) == pytest.approx(np.repeat(signal, 2), abs=0.0)
-    assert series.divided(rows, 3, 1) == pytest.approx(signal.reshape(-1, 3).mean(axis=1))
-    halves = series.divided(rows, 3, 2)
+    assert divide_samples(rows, 3, 6) == pytest.approx(np.repeat(signal, 2), abs=0.0)
+    assert divide_samples(rows, 3, 1) == pytest.approx(signal.reshape(-1, 3).mean(axis=1))
+    halves = divide_samples(rows, 3, 2)
     assert halves[0] == pytest.approx((signal[0] + 0.5 * signal[1]) / 1.5)
     assert halves.mean() == pytest.approx(signal.mean())
-    lines = series.divided(np.arange(7.0), 3, 3, order=1)
+    lines = divide_samples(np.arange(7.0), 3, 3, order=1)
     assert lines == pytest.approx(np.arange(6.0) + 0.5)
 
 
 def test_a_delay_of_whole_steps_shifts(signal):
-    late = series.delayed(signal, STEP, 7 * STEP, 0.5)
+    late = loop.delay_input(signal, STEP, 7 * STEP, 0.5)
     assert late[:7] == pytest.approx(0.5)
     assert late[7:] == pytest.approx(signal[:-7])
 
 
 def test_a_lag_gives_the_mean_of_the_exponential():
-    out = series.lagged(np.ones(400), STEP, 0.2, 0.0)
+    out = loop.lag_input(np.ones(400), STEP, 0.2, 0.0)
     ends = np.arange(1, 401) * STEP
     mean = 1.0 - 0.2 / STEP * (np.exp(-(ends - STEP) / 0.2) - np.exp(-ends / 0.2))
     assert out == pytest.approx(mean, abs=1e-12)
 
 
 def test_a_limited_rate_rises_in_a_straight_line():
-    out = series.rate_limited(np.ones(100), STEP, 2.0, 0.0)
+    out = loop.limit_rate(np.ones(100), STEP, 2.0, 0.0)
     assert out[:50] == pytest.approx(2.0 * STEP * (np.arange(50) + 0.5))
     assert out[51:] == pytest.approx(1.0)
 
 
 def test_an_output_that_is_read_late_follows_a_cubic_exactly():
     t = np.arange(100) * STEP
-    late = series.later(t**3 - t, STEP, 0.0234)
+    late = loop.delay_output(t**3 - t, STEP, 0.0234)
     s = t - 0.0234
     assert late[5:] == pytest.approx((s**3 - s)[5:], abs=1e-12)
 
@@ -57,15 +58,15 @@ def test_an_output_that_is_read_late_follows_a_cubic_exactly():
 def test_an_output_that_is_read_late_keeps_its_kinks_where_inputs_jump():
     t = np.arange(81) * STEP
     kinked = np.abs(t - 40 * STEP) + 3.0 * np.maximum(t - 20 * STEP, 0.0) ** 2
-    late = series.later(kinked, STEP, 0.7 * STEP, m=4)
+    late = loop.delay_output(kinked, STEP, 0.7 * STEP, m=4)
     s = t - 0.7 * STEP
     assert late[4:] == pytest.approx((np.abs(s - 40 * STEP) + 3.0 * np.maximum(s - 20 * STEP, 0.0) ** 2)[4:], abs=1e-12)
-    assert np.max(np.abs(series.later(kinked, STEP, 0.7 * STEP) - late)) > 0.01 * STEP
+    assert np.max(np.abs(loop.delay_output(kinked, STEP, 0.7 * STEP) - late)) > 0.01 * STEP
 
 
 def test_an_output_behind_a_lag_follows_a_ramp():
     t = np.arange(500) * STEP
-    out = series.smoothed(t, STEP, 0.1)
+    out = loop.lag_output(t, STEP, 0.1)
     assert out == pytest.approx(t - 0.1 * (1.0 - np.exp(-t / 0.1)), abs=1e-12)
 
 
@@ -89,7 +90,7 @@ def test_the_effect_fmu_reads_an_output_as_late_as_was_fitted(signal, delay, m):
         effect.signal = float(u)
         assert effect.do_step(k * STEP, STEP)
         found.append(effect.result)
-    fitted = series.later(signal, STEP, delay * STEP, m)
+    fitted = loop.delay_output(signal, STEP, delay * STEP, m)
     rows = np.arange(4 * m + 16, len(signal), m)  # those that are compared: what lies between sees no jump ahead
     error = np.abs(np.array(found)[rows - 1] - fitted[rows])
     assert np.max(error) < (1e-12 if m >= 3 or delay >= 2.0 else 0.5 * np.max(np.abs(np.diff(signal, 2))))
@@ -104,7 +105,7 @@ def compare(signal, kind, value, at_rest):
         effect.signal = float(u)
         assert effect.do_step(k * STEP, STEP)
         found.append(effect.result)
-    scene = Surroundings(STEP, 1.0, 1.0, signal)
-    fitted = at_input(BoxEffect(BANK[f"input_{kind}"], "u", scene, at_rest), signal, STEP, value)
+    scales = SignalScales(STEP, 1.0, 1.0, signal)
+    fitted = at_input(FmuEffect(BANK[f"input_{kind}"], "u", scales, at_rest), signal, STEP, value)
     # A variable-step solver makes another path of another last bit: what is delivered must feed it the same one.
     assert found == (pytest.approx(fitted, abs=1e-12) if kind in ("lag", "rate_limit") else fitted.tolist())

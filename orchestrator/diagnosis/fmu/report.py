@@ -1,0 +1,211 @@
+"""What is reported of a diagnosis of any FMU: the misfit of its models on test data, words, and a figure."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.data.records import TestData
+from orchestrator.diagnosis.fmu.mapping import Map
+from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem
+from orchestrator.diagnosis.fmu.record import FmuRecord
+from orchestrator.diagnosis.fmu.residual_model import FmuResiduals
+from orchestrator.diagnosis.fmu.stepping import delay_outputs
+from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.report.open_test_data import open_test_data
+from orchestrator.diagnosis.report.summary import (
+    headline,
+    left_percent,
+    next_steps,
+    percent,
+    sizes_line,
+    sureness,
+    test_words,
+)
+from orchestrator.diagnosis.result import DiagnosisOutcome, SignalMisfit, TestMisfit
+from orchestrator.diagnosis.selection.outcome import SearchResult
+
+Array = NDArray[np.float64]
+STAGES = ("nominal", "refitted", "corrected")
+COLOURS = ("#c8553d", "#e0a030", "#1b6ca8")
+
+
+@dataclass(frozen=True)
+class FmuWorkings:
+    """What figures and the corrected system need of how a diagnosis was made.
+
+    Attributes:
+        test_data: which only the report opens.
+        search: problem, steps and models.
+        residuals: the FMU beside each record, without its test data.
+    """
+
+    test_data: TestData[FmuRecord] = field(repr=False)
+    search: SearchResult = field(repr=False)
+    residuals: tuple[FmuResiduals, ...] = field(repr=False)
+
+    @property
+    def problem(self) -> FmuProblem:
+        """FMU and first record."""
+        return self.residuals[0].problem
+
+    @property
+    def points(self) -> tuple[ModelPoint, ...]:
+        """Values of the nominal, the re-fitted and the final model."""
+        return self.search.problem.start, self.search.base.point, self.search.final.point
+
+    @property
+    def models(self) -> tuple[FmuModel, ...]:
+        """The three models, as runs of the first record take them."""
+        return tuple(self.residuals[0].fmu_model(self.search.problem.record_points(point)[0]) for point in self.points)
+
+    @property
+    def final(self) -> FmuModel:
+        """The final model."""
+        return self.models[-1]
+
+    def close(self) -> None:
+        """End the FMU's processes."""
+        self.problem.runner.close()
+
+
+@dataclass(frozen=True)
+class FmuDiagnosis(DiagnosisOutcome):
+    """The outcome of a diagnosis of any FMU; docs/any-fmu.md says what each word means.
+
+    Attributes:
+        map: that the records were read by.
+        workings: how it was made.
+    """
+
+    map: Map
+    workings: FmuWorkings = field(repr=False)
+
+
+def _test_problems(workings: FmuWorkings) -> list[tuple[FmuProblem, int]]:
+    """Return the FMU beside each record that holds test data, and the first row of the test part."""
+    return [(_beside(workings, data), first) for data, first in open_test_data(workings.test_data)]
+
+
+def _beside(workings: FmuWorkings, data: FmuRecord) -> FmuProblem:
+    return replace(workings.problem, data=delay_outputs(data, workings.problem.late))
+
+
+def misfit_on_test_data(workings: FmuWorkings) -> tuple[TestMisfit, ...]:
+    """Return the misfit of the nominal, the re-fitted and the final model on test data."""
+    return tuple(_misfit(workings, *one, number) for number, one in enumerate(_test_problems(workings)))
+
+
+def misfit_on_record(workings: FmuWorkings, data: FmuRecord) -> TestMisfit:
+    """Return the misfit of the three models on another record, to which nothing was fitted."""
+    return _misfit(workings, _beside(workings, data), 0, 0)
+
+
+def _misfit(workings: FmuWorkings, problem: FmuProblem, first: int, number: int) -> TestMisfit:
+    stages = [_misses(workings, point, problem, first, number) for point in workings.points]
+    signals = tuple(
+        SignalMisfit(name, problem.units.get(name, ""), float(problem.noise[k]), *(float(one[k]) for one in stages))
+        for k, name in enumerate(problem.outputs)
+    )
+    return TestMisfit(problem.data.source, problem.n - first, signals)
+
+
+def misses_of(workings: FmuWorkings) -> Callable[[ModelPoint], float]:
+    """Return what says how much runs of a model miss of the test data.
+
+    Returns:
+        A model's values -> the sum of squares over the outputs, in units of their noise.
+    """
+    problems = _test_problems(workings)
+
+    def missed(point: ModelPoint) -> float:
+        misses = (
+            _misses(workings, point, problem, first, number) / problem.noise
+            for number, (problem, first) in enumerate(problems)
+        )
+        return sum(float(np.sum(one**2)) for one in misses)
+
+    return missed
+
+
+def _misses(workings: FmuWorkings, point: ModelPoint, problem: FmuProblem, first: int, number: int) -> Array:
+    """Return the rms (outputs,) that a run misses from a row on; nan where it fails."""
+    fitted = first > 0  # the record's own start is known from the rows before
+    residuals = workings.residuals[number if fitted else 0]
+    seen = workings.search.problem.record_points(point)[number if fitted else 0]
+    y = problem.simulate([residuals.fmu_model(seen)])[0]
+    if y is None:
+        return np.full(len(problem.outputs), np.nan)
+    if fitted:
+        change = residuals.start_change(seen, problem.n).T
+        y[: len(change)] += change
+    return np.asarray(np.sqrt(np.mean((problem.data.outputs - y)[first:] ** 2, axis=0)))
+
+
+def stage_runs(workings: FmuWorkings) -> tuple[FmuProblem, dict[str, Array], int]:
+    """Return the runs of the three models over the first record as a whole, for figures.
+
+    Returns:
+        FMU and record, outputs (n, outputs) by the model's name, and the first row of the test part.
+    """
+    first = next(((problem, row) for problem, row in _test_problems(workings) if row > 0), None)
+    problem, row = (workings.problem, workings.problem.n) if first is None else first
+    runs = problem.simulate(workings.models)
+    empty = np.full(problem.data.outputs.shape, np.nan)
+    return problem, {name: empty if y is None else y for name, y in zip(STAGES, runs, strict=True)}, row
+
+
+def summarise_fmu(diagnosis: DiagnosisOutcome) -> Iterator[str]:
+    """Yield the answer of a diagnosis, a sentence or two a line.
+
+    Yields:
+        The verdict; for each effect its size and how sure it is; what is left; the misfit on test data.
+    """
+    yield headline(diagnosis, "FMU")
+    for effect in diagnosis.effects:
+        yield sizes_line(effect)
+        yield f"    {sureness(effect)}"
+        yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{test_words(effect)}."
+    left = " and ".join(f"{left_percent(share)} of {name}" for name, share in diagnosis.left.items())
+    strongest = [f"at {one.site} {one.words}" for one in diagnosis.remaining[:2]]
+    follows = "; ".join(strongest) if strongest else "it follows no signal"
+    yield f"What is left (rms, where the model was fitted): {left}; {follows}."
+    for test in diagnosis.test:
+        parts = [
+            f"{one.signal} {one.nominal / one.noise:.3g} -> {one.final / one.noise:.3g} times its noise"
+            for one in test.signals
+        ]
+        rows = f"{test.rows} rows that nothing was fitted to"
+        yield f"Test data of {test.source} ({rows}), rms of runs: {'; '.join(parts)}."
+    yield from next_steps(diagnosis)
+
+
+def draw_signals(path: Path, problem: FmuProblem, stages: Mapping[str, Array], test: int) -> None:
+    """Draw outputs, and the residuals of each model in units of the noise at a scale of its own; shaded: test data.
+
+    Args:
+        stages: name -> outputs (n, outputs) of a model, the best one last.
+    """
+    from matplotlib.figure import Figure
+
+    data, count, last = problem.data, len(problem.outputs), list(stages)[-1]
+    figure = Figure(figsize=(10.0, 2.2 * 3 * count), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(3 * count, 1, sharex=True))
+    for k, name in enumerate(problem.outputs):
+        above, before, after = axes[3 * k : 3 * k + 3]
+        above.plot(data.time, data.outputs[:, k], color="0.6", linewidth=2.0, label="measured")
+        for (label, y), colour in zip(stages.items(), COLOURS, strict=False):
+            above.plot(data.time, y[:, k], color=colour, linewidth=0.8, label=label)
+            below = after if label == last else before
+            residual = (data.outputs[:, k] - y[:, k]) / problem.noise[k]
+            below.plot(data.time, residual, color=colour, linewidth=0.7, label=label)
+        above.set_ylabel(f"{name} [{problem.units.get(name, '1')}]")
+        before.set_ylabel("residual / noise")
+        after.set_ylabel("residual / noise")
+        for axis in (above, before, after):
+            axis.axvspan(data.time[min(test, len(data.time) - 1)], data.time[-1], color="0.93", zorder=-1)
+            axis.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), borderaxespad=0.0, fontsize=8)
+    axes[-1].set_xlabel("time [s]")
+    figure.savefig(path, dpi=110)
