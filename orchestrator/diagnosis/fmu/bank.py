@@ -17,13 +17,13 @@ STARTS_OFF = 1e-3  # of its rms by which an input starts away from zero to be tr
 
 
 @dataclass(frozen=True, eq=False)
-class SignalScales:
+class PlaceScales:
     """Typical sizes of what happens where an effect would act; starting values depend on them.
 
     Attributes:
         h: sample time [s].
         size: rms of the signal (at a port: of the effort that drives it).
-        signal: its samples.
+        signal: its samples (rows,).
         noise: standard deviation of the measurement, for outputs.
         position: rms of the position about zero; span: from the smallest to the largest.
         speed: rms of the speed.
@@ -61,7 +61,7 @@ class EffectKind:
         amplitudes: in how many of the values, the first ones, the response is linear, where it is not in all.
         law: number of the law, for feedback.
         lower: smallest value of each.
-        positive: amplitudes must be.
+        positive: amplitudes below 0 mean nothing.
         needs: the simpler effect that it contains.
         plausible: values -> False where the fit has left what the effect means.
         remembers: it matters what the signal was before the record.
@@ -74,39 +74,39 @@ class EffectKind:
     sort: str
     parameters: tuple[str, ...]
     units: tuple[str, ...]
-    scales: Callable[[SignalScales], Values]
-    starts: Callable[[SignalScales], tuple[Values, ...]] | None = None
+    scales: Callable[[PlaceScales], Values]
+    starts: Callable[[PlaceScales], tuple[Values, ...]] | None = None
     amplitudes: int = 0
     law: int = 0
     lower: Values = ()
     positive: bool = False
     needs: str = ""
-    plausible: Callable[[Values, SignalScales], bool] = lambda values, scales: True
+    plausible: Callable[[Values, PlaceScales], bool] = lambda values, scales: True
     remembers: bool = False
-    scan: Callable[[SignalScales], tuple[float, ...]] = lambda scales: ()
+    scan: Callable[[PlaceScales], tuple[float, ...]] = lambda scales: ()
 
 
-def _shares(shares: Values, of: str) -> Callable[[SignalScales], tuple[Values, ...]]:
+def _shares(shares: Values, of: str) -> Callable[[PlaceScales], tuple[Values, ...]]:
     return lambda s: tuple((f * getattr(s, of),) for f in shares)
 
 
-def _rates(s: SignalScales) -> tuple[Values, ...]:
+def _rates(s: PlaceScales) -> tuple[Values, ...]:
     steps = np.abs(np.diff(s.signal))
     top = float(steps.max()) / s.h if len(steps) else 1.0
     return tuple((f * top,) for f in (0.02, 0.05, 0.12, 0.25, 0.5, 0.8))
 
 
-def _all_rates(s: SignalScales) -> tuple[float, ...]:
+def _all_rates(s: PlaceScales) -> tuple[float, ...]:
     """Return rates up to many times what the samples show: a jump between two of them takes its time all the same."""
     return tuple(float(f * _rates(s)[-1][0]) for f in np.geomspace(0.003, 60.0, 64))
 
 
-def _all_quanta(s: SignalScales) -> tuple[float, ...]:
+def _all_quanta(s: PlaceScales) -> tuple[float, ...]:
     """Return quanta of which the peak holds 60 to a half, a quarter more or less each time: no threshold is passed."""
     return tuple(float(s.peak / count) for count in np.arange(60.0, 0.5, -0.25))
 
 
-def _speeds_and_walks(s: SignalScales) -> tuple[Values, ...]:
+def _speeds_and_walks(s: PlaceScales) -> tuple[Values, ...]:
     walk = s.speed * s.h
     return tuple((0.0, 0.0, v * s.speed, d * walk) for v in (0.1, 0.3) for d in (0.1, 0.6, 3.0))
 
@@ -116,13 +116,13 @@ _lags = _shares((0.3, 1.0, 3.0, 8.0, 20.0), "h")
 _limits = _shares((0.3, 0.5, 0.65, 0.75, 0.83, 0.89, 0.93, 0.96, 0.985, 0.996), "peak")
 
 
-def _repeats(values: Values, scales: SignalScales) -> bool:
+def _repeats(values: Values, scales: PlaceScales) -> bool:
     """Tell whether a ripple comes back within the motion, more than once a turn: else it is a spring, or gravity."""
     slow = bool(scales.cycles) and abs(values[2]) < 0.5 * scales.cycles[0]
     return not slow and not (scales.angular and abs(values[2] - 1.0) < ONCE_A_TURN)
 
 
-def _positive(values: Values, scales: SignalScales) -> bool:
+def _positive(values: Values, scales: PlaceScales) -> bool:
     del scales
     return values[0] > 0.0
 
@@ -211,7 +211,7 @@ class FmuEffect:
 
     kind: EffectKind
     place: str
-    scales: SignalScales = field(compare=False, repr=False)
+    scales: PlaceScales = field(compare=False, repr=False)
     at_rest: bool = False
     signal: str = ""
 
@@ -232,7 +232,7 @@ class FmuEffect:
         given = np.maximum(given, self.kind.lower) if self.kind.lower else given
         return replace(self, at_rest=len(values) > count and values[count] > 0.5), given
 
-    def named(self, values: Values) -> dict[str, float]:
+    def values_by_name(self, values: Values) -> dict[str, float]:
         """Return values by name; a gain, which is fitted by what it has more than 1, is the factor."""
         more = 1.0 if self.kind.name.endswith("_gain") else 0.0
         return {name: more + value for name, value in zip(self.kind.parameters, values, strict=False)}

@@ -68,7 +68,7 @@ class Part:
 
 def write_corrected(path: Path, problem: FmuProblem, model: FmuModel) -> DeliveredFound:
     """Write the corrected system, and compare its run with the fit."""
-    parts, system = corrected_parts(problem, model), problem.runner.system
+    parts, system = effect_parts(problem, model), problem.runner.system
     members = {f"resources/{fmu.name}": fmu.read_bytes() for fmu in system.members.values()}
     attachment = ""
     if parts:
@@ -93,7 +93,7 @@ def write_corrected(path: Path, problem: FmuProblem, model: FmuModel) -> Deliver
         return DeliveredFound(path.name, listed, float("nan"), str(error))
 
 
-def corrected_parts(problem: FmuProblem, model: FmuModel) -> tuple[Part, ...]:
+def effect_parts(problem: FmuProblem, model: FmuModel) -> tuple[Part, ...]:
     """Return the effect FMUs of a corrected model."""
     parts, runner = [], problem.runner
     for k, c in enumerate(runner.system.connections):
@@ -149,7 +149,7 @@ def _difference(path: Path, problem: FmuProblem, model: FmuModel, parts: tuple[P
     """Return the largest rms difference between a run of the system under our master and the fit, over the noise."""
     fitted, table, start = problem.must_simulate(model), problem.plain_table(), float(problem.data.time[0])
     signals = {_border(name, "in"): Samples(table[:, k], problem.step, start) for k, name in enumerate(problem.inputs)}
-    for name in _followed_signals(parts):
+    for name in _signals_followed_by(parts):
         values = problem.data.signals[:-1, list(problem.map.signals).index(name)] + problem.map.signals[name].reference
         signals[_border(name, "in")] = Samples(np.repeat(values, problem.m), problem.step, start)
     worst = 0.0
@@ -175,7 +175,7 @@ def _border(name: str, way: str) -> str:
     return f"{name.replace('.', '_')}_{way}"
 
 
-def _followed_signals(parts: tuple[Part, ...]) -> list[str]:
+def _signals_followed_by(parts: tuple[Part, ...]) -> list[str]:
     """Return the signals that parameters depend on."""
     return list(dict.fromkeys(p.effect.signal for p in parts if p.effect is not None and p.effect.signal))
 
@@ -197,7 +197,7 @@ def _structure(problem: FmuProblem, parts: tuple[Part, ...], attachment: str) ->
     root = new_document("ssd", "SystemStructureDescription", "corrected")
     system = etree.SubElement(root, tag("ssd", "System"), name="system")
     connectors = etree.SubElement(system, tag("ssd", "Connectors"))
-    for name in (*problem.inputs, *_followed_signals(parts)):
+    for name in (*problem.inputs, *_signals_followed_by(parts)):
         _connector(connectors, _border(name, "in"), "input")
     for name in problem.outputs:
         _connector(connectors, _border(name, "out"), "output")

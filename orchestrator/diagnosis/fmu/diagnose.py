@@ -129,7 +129,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     for one in add_test_evidence(evidence, found, test, misses_of(workings)):
         effect, in_model = workings.residuals[0].placed[one.label], one.label in found.final.labels
         source, units = found if in_model else searched, effect_units(problem, effect)
-        graded.append(report_effect(source, one, effect.named, units, record, settings, in_model))
+        graded.append(report_effect(source, one, effect.values_by_name, units, record, settings, in_model))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection)
     verdict = form_verdict(found, graded, remaining, record, settings)
@@ -141,7 +141,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     if not found.complete:
         notes.append("the time limit ended the search: effects that were not tried may be missing")
     return FmuDiagnosis(
-        verdict, tuple(sorted(graded, key=lambda one: -one.grade)), parameters,
+        verdict, tuple(sorted(graded, key=lambda effect: -effect.grade)), parameters,
         dict(zip(problem.outputs, map(float, left), strict=True)), remaining, test, record, trust, tuple(notes),
         settings, bool(searched.steps), problem.map, workings,
     )  # fmt: skip
@@ -156,7 +156,7 @@ class FmuCalibration:
         learned: name -> share of the granted uncertainty that the records have removed, 0 to 1.
         confounded: pairs that the records hardly tell apart.
         explained: free runs over test data miss no output by more than its noise, and what is left follows nothing.
-        notes: sentences.
+        notes: what to bear in mind, a sentence each.
     """
 
     diagnosis: FmuDiagnosis

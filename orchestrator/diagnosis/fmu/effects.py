@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu.bank import BANK, CUT, INPUT, OUTPUT, PORT, FmuEffect, SignalScales
+from orchestrator.diagnosis.fmu.bank import BANK, CUT, INPUT, OUTPUT, PORT, FmuEffect, PlaceScales
 from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
 from orchestrator.plants.compiled import compiled
@@ -95,13 +95,13 @@ def find_effects(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
     found = []
     h, data = problem.h, problem.data
     for k, name in enumerate(problem.inputs):
-        u = data.driven[:, k]
+        u = data.file_inputs[:, k]
         if float(np.ptp(u)) > 0.0:
-            scales = SignalScales(h / data.factor, _rms(u), float(np.max(np.abs(u))), u)
+            scales = PlaceScales(h / data.factor, _rms(u), float(np.max(np.abs(u))), u)
             found += [FmuEffect(kind, name, scales) for kind in BANK.values() if kind.where == INPUT]
     for k, name in enumerate(problem.outputs):
         y = data.outputs[:, k]
-        scales = SignalScales(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
+        scales = PlaceScales(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
         found += [FmuEffect(kind, name, scales) for kind in BANK.values() if kind.where == OUTPUT]
     for name, motion in port_motions(problem, nominal).items():
         port = problem.map.ports[name]
@@ -113,7 +113,7 @@ def find_effects(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
         phases = LEAST_PHASE + 0.5 * np.arange(MOST_CYCLES)
         cycles = tuple(float(phase) / span for phase in phases if phase < top * span)
         position, speed, acceleration = (_rms(x) or 1.0 for x in (motion.x, motion.v, motion.a))
-        scales = SignalScales(h, effort, effort, motion.x, 0.0, position, span, speed, acceleration, angular,
+        scales = PlaceScales(h, effort, effort, motion.x, 0.0, position, span, speed, acceleration, angular,
                               cycles=cycles)  # fmt: skip
         left_out: tuple[str, ...] = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
         left_out += (OF_POSITION if port.flow_only else ()) + (() if angular else ("gravity",))
@@ -132,7 +132,7 @@ def _of_parameters(problem: FmuProblem) -> list[FmuEffect]:
                      for k, name in enumerate(problem.map.signals)]  # fmt: skip
         for kind, name, signal in followed:
             if (span := float(np.ptp(signal))) > 0.0:
-                scales = SignalScales(problem.h, u.standard_deviation, u.standard_deviation, signal, span=span)
+                scales = PlaceScales(problem.h, u.standard_deviation, u.standard_deviation, signal, span=span)
                 found.append(FmuEffect(BANK[kind], u.name, scales, signal=name))
     return found
 
@@ -149,13 +149,13 @@ def _of_cuts(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
         if cut.far is not None:
             twist = near - nominal[:, reads.index(cut.far)]
             size = float(np.std(twist)) or size
-            scales = SignalScales(problem.h, size, span, near, span=span)
+            scales = PlaceScales(problem.h, size, span, near, span=span)
             found.append(FmuEffect(BANK["backlash"], name, scales))
         if cut.effort is not None:
             effort = nominal[:, reads.index(cut.effort)]
             if cut.far is not None:
                 problem.sign[name] = -1.0 if float(np.mean(effort * twist)) < 0.0 else 1.0
-            scales = SignalScales(problem.h, size, span, near, span=span, effort=_rms(effort) or 1.0)
+            scales = PlaceScales(problem.h, size, span, near, span=span, effort=_rms(effort) or 1.0)
             found.append(FmuEffect(BANK["compliance"], name, scales))
     return found
 
@@ -172,7 +172,7 @@ def candidate_effects(
     Args:
         motions: of the ports, over whose positions ripples repeat.
         through: port, gradient (outputs, n) by the residuals -> gradient (n,) by the effort at the port.
-        linear: the FMU is.
+        linear: responses of the FMU are the same all along the record.
     """
     timing = [effect.label for effect in effects if effect.kind.sort == "timing"]
     found = {}

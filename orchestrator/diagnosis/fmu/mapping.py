@@ -270,7 +270,7 @@ class _MapCheck:
         self._require(not isinstance(value, (bool, str)), f"{where}.value must be a number, but is {value!r}")
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise ScenarioError(f"{self._source}: {where}.value must be given: the FMU states no start value")
-        spread = _spread(f"{self._source}: {where}.uncertainty", entry.uncertainty, float(value))
+        spread = _uncertainty(f"{self._source}: {where}.uncertainty", entry.uncertainty, float(value))
         low = -math.inf if variable.minimum is None else float(variable.minimum)
         high = math.inf if variable.maximum is None else float(variable.maximum)
         self._require(low <= value <= high, f"{where}.value must be {low:g} to {high:g}, but is {value:g}")
@@ -282,7 +282,7 @@ def _with_columns(entries: dict[str, ColumnEntry]) -> dict[str, ColumnEntry]:
     return {name: msgspec.structs.replace(entry, column=entry.column or name) for name, entry in entries.items()}
 
 
-def _spread(where: str, given: str | float, value: float) -> float:
+def _uncertainty(where: str, given: str | float, value: float) -> float:
     if isinstance(given, str):
         text = given.strip()
         try:

@@ -81,7 +81,7 @@ class FmuProblem:
     def simulate(self, models: Sequence[FmuModel]) -> list[Array | None]:
         """Return outputs (n, outputs) of each model; None where the FMU failed, or ran away."""
         found = self._runs([self._run_of(model) for model in models])
-        runs = [None if y is None else self._measured(y, model) for y, model in zip(found, models, strict=True)]
+        runs = [None if y is None else self._sampled_outputs(y, model) for y, model in zip(found, models, strict=True)]
         most = ABSURD * np.max(np.abs(self.data.outputs), axis=0)
         return [None if y is None or np.any(np.abs(y) > most) else y for y in runs]
 
@@ -125,7 +125,7 @@ class FmuProblem:
         if (rows, self.m) not in self._tables:
             table = np.zeros(((rows - 1) * self.m, len(self.runner.inputs)))
             for k, entry in enumerate(self.map.inputs.values()):
-                u = self.data.driven[: (rows - 1) * self.data.factor + 1, k]
+                u = self.data.file_inputs[: (rows - 1) * self.data.factor + 1, k]
                 table[:, k] = divide_samples(u, self.data.factor, self.m, 1 if entry.hold == "linear" else 0)
             self._tables[rows, self.m] = table
         return self._tables[rows, self.m]
@@ -200,7 +200,7 @@ class FmuProblem:
         assert name is not None
         return name
 
-    def _measured(self, fine: Array, model: FmuModel) -> Array:
+    def _sampled_outputs(self, fine: Array, model: FmuModel) -> Array:
         """Return the outputs at the samples, from what is read after every communication step.
 
         Effects behind an output act between the samples too: an output need not be smooth from one to the next.
@@ -236,8 +236,8 @@ class FmuProblem:
         base, *found = self._runs(runs)
         if base is None:
             raise self.does_not_run()
-        output, count = self._measured(base, model), len(rows)
-        changes = [None if y is None else (self._measured(y, model) - output) / IMPULSE for y in found]
+        output, count = self._sampled_outputs(base, model), len(rows)
+        changes = [None if y is None else (self._sampled_outputs(y, model) - output) / IMPULSE for y in found]
         return base[:: self.m], [changes[k * count : (k + 1) * count] for k in range(len(places))]
 
     @property

@@ -58,14 +58,14 @@ class FmuRecord:
     notes: tuple[str, ...] = ()
 
     @property
-    def driven(self) -> Array:
+    def file_inputs(self) -> Array:
         """Return the inputs as the file has them, (rows of the file, inputs)."""
         return self.inputs if self.held is None else self.held
 
     @cached_property
     def sizes(self) -> Array:
         """Return the root mean square of each input, (inputs,): every run with an effect at a port asks for it."""
-        return np.asarray(np.sqrt(np.mean(self.driven**2, axis=0)))
+        return np.asarray(np.sqrt(np.mean(self.file_inputs**2, axis=0)))
 
     @property
     def size(self) -> int:
@@ -100,7 +100,7 @@ def read_fmu_record(path: Path, given: Map, uneven: float = DEFAULT.uneven) -> F
     columns = [(f"$.{table}.{name}", name, entry) for table, entries in tables for name, entry in entries.items()]
     options = given.options
     cure = "say `time_factor = ...`, seconds in its unit, in $.options of the map"
-    wanted = [_wanted(where, entry) for where, _, entry in columns]
+    wanted = [_column_request(where, entry) for where, _, entry in columns]
     time = Wanted(options.time, "$.options.time", cure)
     read = read_columns(path, time, wanted, options.time_factor, options.header)
     good = np.isfinite(read.time)
@@ -108,7 +108,7 @@ def read_fmu_record(path: Path, given: Map, uneven: float = DEFAULT.uneven) -> F
     filled, notes = [], list(read.notes)
     for number, (_, name, entry) in enumerate(columns):
         spread = np.full(even.size, np.nan)
-        spread[place] = _converted(read, number, wanted[number], entry.factor, given.units.get(name), name, path)[good]
+        spread[place] = _convert(read, number, wanted[number], entry.factor, given.units.get(name), name, path)[good]
         whole, note = _fill(spread, even, entry, path)
         filled.append(whole)
         notes += note
@@ -126,12 +126,12 @@ def read_fmu_record(path: Path, given: Map, uneven: float = DEFAULT.uneven) -> F
     return FmuRecord(even, inputs, outputs, str(path), signals, notes=tuple(notes))
 
 
-def _wanted(where: str, entry: ColumnEntry) -> Wanted:
+def _column_request(where: str, entry: ColumnEntry) -> Wanted:
     cure = f'say `unit = "..."` in {where} of the map, or `factor` to the unit of the FMU'
     return Wanted(entry.column, f"{where}.column", cure, entry.unit)
 
 
-def _converted(
+def _convert(
     read: NamedColumns, number: int, wanted: Wanted, factor: float, target: Unit | None, name: str, path: Path
 ) -> Array:
     """Return a column in the unit of the FMU's variable; a factor of the map goes before units."""
@@ -256,14 +256,11 @@ def repeat_samples(u: Array, m: int, order: int = 0) -> Array:
 
 
 def divide_samples(u: Array, factor: int, m: int, order: int = 0) -> Array:
-    """Return the means over ``m`` parts of each sample of a signal of which a sample has ``factor`` rows.
+    """Return means (samples * m,) over ``m`` parts of each sample of a signal that has ``factor`` rows in each.
 
     Args:
         u: (samples * factor + 1,) the rows; the last one counts for straight lines alone.
         order: 0: held; 1: straight lines.
-
-    Returns:
-        Shape (samples * m,).
     """
     if m % factor == 0:
         return repeat_samples(u, m // factor, order)

@@ -86,10 +86,10 @@ class FmuDiagnosis(DiagnosisOutcome):
 
 def _test_problems(workings: FmuWorkings) -> list[tuple[FmuProblem, int]]:
     """Return the FMU beside each record that holds test data, and the first row of the test part."""
-    return [(_beside(workings, data), first) for data, first in open_test_data(workings.test_data)]
+    return [(_problem_with(workings, data), first) for data, first in open_test_data(workings.test_data)]
 
 
-def _beside(workings: FmuWorkings, data: FmuRecord) -> FmuProblem:
+def _problem_with(workings: FmuWorkings, data: FmuRecord) -> FmuProblem:
     return replace(workings.problem, data=delay_outputs(data, workings.problem.late))
 
 
@@ -100,7 +100,7 @@ def misfit_on_test_data(workings: FmuWorkings) -> tuple[TestMisfit, ...]:
 
 def misfit_on_record(workings: FmuWorkings, data: FmuRecord) -> TestMisfit:
     """Return the misfit of the three models on another record, to which nothing was fitted."""
-    return _misfit(workings, _beside(workings, data), 0, 0)
+    return _misfit(workings, _problem_with(workings, data), 0, 0)
 
 
 def _misfit(workings: FmuWorkings, problem: FmuProblem, first: int, number: int) -> TestMisfit:
@@ -120,14 +120,14 @@ def misses_of(workings: FmuWorkings) -> Callable[[ModelPoint], float]:
     """
     problems = _test_problems(workings)
 
-    def missed(point: ModelPoint) -> float:
+    def total(point: ModelPoint) -> float:
         misses = (
             _misses(workings, point, problem, first, number) / problem.noise
             for number, (problem, first) in enumerate(problems)
         )
         return sum(float(np.sum(one**2)) for one in misses)
 
-    return missed
+    return total
 
 
 def _misses(workings: FmuWorkings, point: ModelPoint, problem: FmuProblem, first: int, number: int) -> Array:

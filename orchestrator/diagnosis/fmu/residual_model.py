@@ -127,7 +127,7 @@ class FmuResiduals(ResidualModel):
         other._start = self._start[:0]
         other.parameters = self.parameters[: len(self._order)]
         other._nominal = ModelPoint.nominal(other.parameters)
-        other._responses = {(other._nominal.parameters, ()): self._measured_responses(self._nominal)}
+        other._responses = {(other._nominal.parameters, ()): self._responses_at(self._nominal)}
         return other
 
     def without_priors(self, spread: float) -> "FmuResiduals":
@@ -143,7 +143,7 @@ class FmuResiduals(ResidualModel):
         count = len(self.channels)
         identity = np.broadcast_to(np.eye(count, dtype=complex), (frequencies.size, count, count))
         levels = 2.0 * self.problem.noise**2 * self.step
-        _, responses = self._measured_responses(self._nominal)
+        _, responses = self._responses_at(self._nominal)
         own = PulseResponses(
             responses.rows, {place: responses.found[place] for place in self.problem.noise_places}, self.size
         )
@@ -156,7 +156,7 @@ class FmuResiduals(ResidualModel):
         """Return what effects change of the residuals, by the measured responses; see :class:`ResidualModel`."""
         if not self.is_linear:
             return [None] * len(trials)
-        reads, responses = self._measured_responses(point)
+        reads, responses = self._responses_at(point)
         model = self.fmu_model(point)
         pushes: dict[int, list[tuple[int, Array]]] = {}
         found: list[Array | None] = [None] * len(trials)
@@ -164,7 +164,7 @@ class FmuResiduals(ResidualModel):
         for n, (label, values) in enumerate(trials):
             effect, given = self.placed[label].at(values)
             if effect.kind.where == OUTPUT:
-                found[n] = self._changed_output(effect, given, reads)
+                found[n] = self._output_change(effect, given, reads)
             elif effect.kind.where != PARAMETER:
                 place, push = self._push(effect, given, reads, table)
                 pushes.setdefault(place, []).append((n, push))
@@ -201,7 +201,7 @@ class FmuResiduals(ResidualModel):
         between = wire.factor * reads[:, runner.reads.index(wire.source)] + wire.offset - other
         return runner.inputs.index(target), -np.clip(between, -0.5 * values[0], 0.5 * values[0])
 
-    def _changed_output(self, effect: FmuEffect, values: Array, reads: Array) -> Array:
+    def _output_change(self, effect: FmuEffect, values: Array, reads: Array) -> Array:
         channel = self.problem.outputs.index(effect.place)
         y = reads[:, channel]
         change = np.zeros((len(self.channels), self.size))
@@ -218,16 +218,16 @@ class FmuResiduals(ResidualModel):
             Shape (outputs, n).
         """
         problem = self.problem
-        _, responses = self._measured_responses(self._nominal)
+        _, responses = self._responses_at(self._nominal)
         push = np.zeros((1, self.size))
         push[0, :-1] = -problem.sign.get(port, 1.0) * 0.5 * (effort[:-1] + effort[1:])
         return -responses.change_outputs(push, problem.runner.inputs.index(problem.map.ports[port].input))[0]
 
     def _effort_gradient(self, port: str, by_residuals: Array) -> Array:
-        _, responses = self._measured_responses(self._nominal)
+        _, responses = self._responses_at(self._nominal)
         return -responses.gradient(by_residuals, self.problem.runner.inputs.index(self.problem.map.ports[port].input))
 
-    def _measured_responses(self, point: ModelPoint) -> tuple[Array, PulseResponses]:
+    def _responses_at(self, point: ModelPoint) -> tuple[Array, PulseResponses]:
         """Return run and responses at a point, kept for the nominal one and the last."""
         key = (point.parameters, tuple(point.effects.items()))
         if key not in self._responses:

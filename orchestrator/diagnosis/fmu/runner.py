@@ -176,7 +176,7 @@ class Runner:
         """Run some of the runs in this thread's jail; where that is lost, each of them alone in a new one."""
         runs = [batch.runs[k] for k in chunk]
         steps = sum(len(run.table) for run in runs)
-        allowed = self._allowed_time(steps)
+        allowed = self._time_limit(steps)
         most = 8 * (len(runs[0].table) + 1) * len(self.reads) * len(runs) + SLACK
         try:
             jail = self._jail()
@@ -195,7 +195,7 @@ class Runner:
         for k, rows in zip(chunk, self._read_answer(answer, runs, steps), strict=True):
             results[k] = rows
 
-    def _allowed_time(self, steps: int) -> float:
+    def _time_limit(self, steps: int) -> float:
         """Return the seconds that so many steps may take in this thread's child.
 
         An FMU that has hung is known to: with every child that it costs, one more that is late is likelier to hang too.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.fmu.corrected_ssp import corrected_parts, write_corrected
+from orchestrator.diagnosis.fmu.corrected_ssp import effect_parts, write_corrected
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 
@@ -35,7 +35,7 @@ def test_fmpy_reproduces_the_fit_within_a_tenth_of_the_noise(tmp_path):
             SimpleNamespace(name=f"plant.{u.name}", value=v)
             for u, v in zip(problem.map.uncertain, model.p, strict=True)
         ]
-        for part in corrected_parts(problem, model):
+        for part in effect_parts(problem, model):
             given = part.values | {"lead": 1.5}
             given.pop("has_velocity")
             values += [SimpleNamespace(name=f"{part.name}.{name}", value=value) for name, value in given.items()]

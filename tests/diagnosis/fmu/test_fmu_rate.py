@@ -36,7 +36,7 @@ def test_fewer_rows_are_looked_at_and_all_inputs_act():
     assert less.factor == 10
     assert less.step == pytest.approx(1e-2)
     np.testing.assert_array_equal(less.outputs, data.outputs[:19_990:10])
-    np.testing.assert_array_equal(less.driven, data.inputs[:19_990])
+    np.testing.assert_array_equal(less.file_inputs, data.inputs[:19_990])
     held = np.cumsum(data.inputs[:-1, 0])[9::10] * data.step
     assert np.cumsum(less.inputs[:, 0]) * less.step == pytest.approx(held, abs=1e-12)
     assert less.signals[:, 0] == pytest.approx(less.time + 4.5e-3, abs=1e-9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.fmu import loop
-from orchestrator.diagnosis.fmu.bank import BANK, FmuEffect, SignalScales
+from orchestrator.diagnosis.fmu.bank import BANK, FmuEffect, PlaceScales
 from orchestrator.diagnosis.fmu.problem import at_input
 from orchestrator.diagnosis.fmu.record import divide_samples
 from pyfmu_sources.attachment import SERIES, AttachedEffect
@@ -105,7 +105,7 @@ def compare(signal, kind, value, at_rest):
         effect.signal = float(u)
         assert effect.do_step(k * STEP, STEP)
         found.append(effect.result)
-    scales = SignalScales(STEP, 1.0, 1.0, signal)
+    scales = PlaceScales(STEP, 1.0, 1.0, signal)
     fitted = at_input(FmuEffect(BANK[f"input_{kind}"], "u", scales, at_rest), signal, STEP, value)
     # A variable-step solver makes another path of another last bit: what is delivered must feed it the same one.
     assert found == (pytest.approx(fitted, abs=1e-12) if kind in ("lag", "rate_limit") else fitted.tolist())
