@@ -16,9 +16,10 @@ from orchestrator.diagnosis.fmu.corrected_ssp import write_corrected
 from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnose_records
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
 from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor, read_fmu_record
-from orchestrator.diagnosis.fmu.report import FmuDiagnosis, misfit_on_record, stage_runs, summarise_fmu
+from orchestrator.diagnosis.fmu.report import FmuDiagnosis, misfit_on_record, stage_runs
 from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
 from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, steps_found, test_found
+from orchestrator.diagnosis.report.summary import summarise_fmu
 from orchestrator.diagnosis.result import GradedEffect, TestMisfit
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.tables import column_names

@@ -1,6 +1,6 @@
-"""What is reported of a diagnosis of any FMU: the misfit of its models on test data, words, and a figure."""
+"""What is reported of a diagnosis of any FMU: the misfit of its models on test data, and a figure."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -15,15 +15,6 @@ from orchestrator.diagnosis.fmu.residual_model import FmuResiduals
 from orchestrator.diagnosis.fmu.stepping import delay_outputs
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.report.open_test_data import open_test_data
-from orchestrator.diagnosis.report.summary import (
-    headline,
-    left_percent,
-    next_steps,
-    percent,
-    sizes_line,
-    sureness,
-    test_words,
-)
 from orchestrator.diagnosis.result import DiagnosisOutcome, SignalMisfit, TestMisfit
 from orchestrator.diagnosis.selection.outcome import SearchResult
 
@@ -155,31 +146,6 @@ def stage_runs(workings: FmuWorkings) -> tuple[FmuProblem, dict[str, Array], int
     runs = problem.simulate(workings.models)
     empty = np.full(problem.data.outputs.shape, np.nan)
     return problem, {name: empty if y is None else y for name, y in zip(STAGES, runs, strict=True)}, row
-
-
-def summarise_fmu(diagnosis: DiagnosisOutcome) -> Iterator[str]:
-    """Yield the answer of a diagnosis, a sentence or two a line.
-
-    Yields:
-        The verdict; for each effect its size and how sure it is; what is left; the misfit on test data.
-    """
-    yield headline(diagnosis, "FMU")
-    for effect in diagnosis.effects:
-        yield sizes_line(effect)
-        yield f"    {sureness(effect)}"
-        yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{test_words(effect)}."
-    left = " and ".join(f"{left_percent(share)} of {name}" for name, share in diagnosis.left.items())
-    strongest = [f"at {one.site} {one.words}" for one in diagnosis.remaining[:2]]
-    follows = "; ".join(strongest) if strongest else "it follows no signal"
-    yield f"What is left (rms, where the model was fitted): {left}; {follows}."
-    for test in diagnosis.test:
-        parts = [
-            f"{one.signal} {one.nominal / one.noise:.3g} -> {one.final / one.noise:.3g} times its noise"
-            for one in test.signals
-        ]
-        rows = f"{test.rows} rows that nothing was fitted to"
-        yield f"Test data of {test.source} ({rows}), rms of runs: {'; '.join(parts)}."
-    yield from next_steps(diagnosis)
 
 
 def draw_signals(path: Path, problem: FmuProblem, stages: Mapping[str, Array], test: int) -> None:
