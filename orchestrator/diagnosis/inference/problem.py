@@ -66,14 +66,28 @@ class FitProblem:
     @cached_property
     def blocks(self) -> NDArray[np.int64]:
         """(rows,) block of each whitened residual: contiguous in time, none reaches over two records."""
-        counts = [whitening.rows.size for whitening in self.whitenings]
-        wanted = min(self.settings.blocks, max(sum(counts) // self.settings.rows_per_block, 4))
-        each = [max(round(wanted * count / sum(counts)), 1) for count in counts]
-        found, first = [], 0
-        for whitening, count, number in zip(self.whitenings, counts, each, strict=True):
-            found.append(np.tile(first + np.arange(count) * number // count, len(whitening.active)))
-            first += number
-        return np.concatenate(found)
+        return self.blocks_after([0.0] * len(self.models))[0]
+
+    def blocks_after(self, shares: Sequence[float]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the blocks of the whitened residuals after a share of each record, and their places (rows,) among all.
+
+        Returns:
+            Block of each such residual, contiguous in time and within one record, and its place.
+        """
+        late = [
+            whitening.rows >= share * model.size
+            for whitening, share, model in zip(self.whitenings, shares, self.models, strict=True)
+        ]
+        total = sum(int(rows.sum()) for rows in late)
+        wanted = min(self.settings.blocks, max(total // self.settings.rows_per_block, 4))
+        blocks, places, first, offset = [], [], 0, 0
+        for whitening, rows in zip(self.whitenings, late, strict=True):
+            count, channels = int(rows.sum()), len(whitening.active)
+            number = max(round(wanted * count / total), 1) if count else 0
+            blocks.append(np.tile(first + np.arange(count) * number // max(count, 1), channels))
+            places.append(offset + np.flatnonzero(np.tile(rows, channels)))
+            first, offset = first + number, offset + whitening.size
+        return np.concatenate(blocks), np.concatenate(places)
 
     @property
     def block_count(self) -> int:

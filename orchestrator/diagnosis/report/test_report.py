@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.inference.fitting import ScoreComparison, compare_residuals
-from orchestrator.diagnosis.inference.problem import fit_problem
-from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.model.interface import ModelPoint, ResidualModel
 from orchestrator.diagnosis.model.plant_effects import in_metres
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.free_run import FreeRun, free_run
 from orchestrator.diagnosis.report.open_test_data import open_test_data
 from orchestrator.diagnosis.report.simulation import RunSignals, run_signals
 from orchestrator.diagnosis.result import Diagnosis, SignalMisfit, TestMisfit, Workings
+from orchestrator.diagnosis.selection.outcome import SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings, ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.effects import rms
@@ -25,6 +25,7 @@ from orchestrator.shared.cores import spread
 
 Array = NDArray[np.float64]
 LEAST_TORQUE_ROWS = 200
+LEAST_TEST_ROWS = 16  # whitened, about independent: four in each of four blocks
 
 
 def test_signals(workings: Workings) -> list[tuple[Record, RunSignals, int]]:
@@ -99,32 +100,46 @@ def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> 
 def torque_comparison(
     workings: Workings, test: Sequence[TestMisfit], model: Model, settings: DiagnosisSettings
 ) -> Callable[[ModelPoint], ScoreComparison | None]:
-    """Return what compares models with the final one by the whitened torque that they leave of test data.
+    """Return what compares models with the final one by the torque that they leave of test data."""
+    moving = [
+        (balance_of(record, model, settings), first / record.size)
+        for (record, first), misfit in zip(open_test_data(workings.test_data), test, strict=True)
+        if not misfit.still
+    ]
+    return residual_comparison(workings.search, moving)
+
+
+def residual_comparison(
+    found: SearchResult, records: Sequence[tuple[ResidualModel, float]]
+) -> Callable[[ModelPoint], ScoreComparison | None]:
+    """Return what compares models with the final one by the whitened residuals that they leave of test data.
+
+    Whitened residuals count what drifts as unknown torques: unlike free runs they forget what lies long ago.
+
+    Args:
+        records: model beside each whole record, and the share of it that was fitted; 0.0: it is another record.
 
     Returns:
-        A model's values -> how much less the final one leaves; None: the test part is too short to tell.
+        A model's values -> how much less the final one leaves, block by block; None: there are too few rows to tell.
     """
-    parts = [
-        record.part(first, record.size)
-        for (record, first), misfit in zip(open_test_data(workings.test_data), test, strict=True)
-        if record.size - first >= LEAST_TORQUE_ROWS and not misfit.still
-    ]
-    if not parts:
+    if not records:
         return lambda point: None
-    found = workings.search
-    problem = fit_problem([balance_of(part, model, settings) for part in parts], settings.fit)
+    models, fitted = zip(*records, strict=True)
+    problem = replace(found.problem, models=models)
 
     def seen(point: ModelPoint) -> ModelPoint:
-        count = len(problem.shared)
-        return ModelPoint((*point.parameters[:count], *problem.start.parameters[count:]), point.effects)
+        local: list[float] = []
+        for model, own, share in zip(models, found.problem.record_points(point), fitted, strict=False):
+            count = sum(entry.local for entry in model.parameters)
+            local += own.parameters[len(own.parameters) - count :] if share else (0.0,) * count
+        return ModelPoint((*point.parameters[: len(problem.shared)], *local), point.effects)
 
     problem = problem.reweighted(seen(found.final.point))
-    (final,) = problem.whitened([seen(found.final.point)])
-
-    def compared(point: ModelPoint) -> ScoreComparison:
-        return compare_residuals(problem.whitened([seen(point)])[0], final, problem.blocks)
-
-    return compared
+    blocks, rows = problem.blocks_after(fitted)
+    if rows.size < LEAST_TEST_ROWS:
+        return lambda point: None
+    final = problem.whitened([seen(found.final.point)])[0][rows]
+    return lambda point: compare_residuals(problem.whitened([seen(point)])[0][rows], final, blocks)
 
 
 LEAST_TRAVEL = 20.0  # in deviations of the noise, from which a test part moves
