@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.report.simulation import RunSignals, Simulation
+from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import moving
 from orchestrator.shared.cores import spread
@@ -175,3 +176,43 @@ def _steps(plant: Plant, start: Array, signals: RunSignals, free: tuple[int, ...
         sizes[body.angle] = float(signals.noise[min(channel, signals.channels - 1)])
         sizes[body.speed] = RELATIVE_SIZE * abs(start[body.speed]) + LEAST_SPEED
     return [NUDGE * float(sizes[place]) for place in free]
+
+
+def run_parts(first: int, size: int, settings: ReportSettings) -> list[slice]:
+    """Return the parts of a record over which free runs go: from a row to its end, of one length."""
+    rows = size - first
+    count = max(settings.runs, round(rows / (settings.longest_run * size)))
+    count = max(min(count, rows // settings.least_rows), 1)
+    length = rows // count
+    return [slice(first + n * length, first + (n + 1) * length) for n in range(count)]
+
+
+def free_runs(
+    plant: Plant, p: Array, signals: RunSignals, parts: Sequence[slice], history: bool = True
+) -> list[FreeRun]:
+    """Return a free run over each part, from the initial state that lies closest."""
+
+    def run(part: slice) -> FreeRun:
+        guesses = start_guesses(plant, p, signals, part.start)
+        runs = [free_run(plant, p, guess, signals, part, history) for guess in guesses]
+        return min(runs, key=lambda one: float(np.sum((one.rms / signals.noise) ** 2)))
+
+    return spread(run, list(parts))
+
+
+def start_guesses(plant: Plant, p: Array, signals: RunSignals, row: int) -> list[Array]:
+    """Return first guesses of the state at a row: one, or three where a load that is not measured lies in a gap.
+
+    Returns:
+        States (8,): in mid-gap, and at either flank.
+    """
+    guess = signals.guess_state(plant, p, row)
+    gap = plant.value(p, plant.shaft.gap) if plant.shaft and plant.shaft.gap else 0.0
+    if gap <= 0.0 or signals.channels == len(plant.bodies):
+        return [guess]
+    found = [guess]
+    for side in (-1.0, 1.0):
+        moved = guess.copy()
+        moved[plant.bodies[1].angle] += side * gap
+        found.append(moved)
+    return found

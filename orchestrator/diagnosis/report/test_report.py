@@ -8,34 +8,22 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.inference.fitting import ScoreComparison, compare_residuals
-from orchestrator.diagnosis.model.interface import ModelPoint, ResidualModel
+from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.plant_effects import in_metres
 from orchestrator.diagnosis.model.torque_balance import balance_of
-from orchestrator.diagnosis.report.free_run import FreeRun, free_run
-from orchestrator.diagnosis.report.open_test_data import open_test_data
-from orchestrator.diagnosis.report.simulation import RunSignals, run_signals
+from orchestrator.diagnosis.report.free_run import free_runs, run_parts
+from orchestrator.diagnosis.report.open_test_data import open_test_data, signals_for_runs, test_signals
+from orchestrator.diagnosis.report.simulation import RunSignals
 from orchestrator.diagnosis.result import Diagnosis, SignalMisfit, TestMisfit, Workings
-from orchestrator.diagnosis.selection.outcome import SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings, ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.effects import rms
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-from orchestrator.shared.cores import spread
 
 Array = NDArray[np.float64]
 LEAST_TORQUE_ROWS = 200
 LEAST_TEST_ROWS = 16  # whitened, about independent: four in each of four blocks
-
-
-def test_signals(workings: Workings) -> list[tuple[Record, RunSignals, int]]:
-    """Return the records that hold test data, their signals for free runs, and the first row of the test part."""
-    return [(record, _signals_of(workings, record), first) for record, first in open_test_data(workings.test_data)]
-
-
-def _signals_of(workings: Workings, record: Record) -> RunSignals:
-    balance = workings.balances[0]
-    return run_signals(record, len(balance.channels), 3.0 * max(balance.cutoffs))
 
 
 def torque_left(part: Record, workings: Workings, model: Model, settings: DiagnosisSettings) -> tuple[float, ...]:
@@ -66,7 +54,7 @@ def misfit_on_test_data(workings: Workings, model: Model, settings: DiagnosisSet
 
 def _misfit(workings: Workings, model: Model, record: Record, first: int, settings: DiagnosisSettings) -> TestMisfit:
     models = (workings.nominal, workings.base, workings.final)
-    unit, signals = "m" if in_metres(model) else "rad", _signals_of(workings, record)
+    unit, signals = "m" if in_metres(model) else "rad", signals_for_runs(record, workings.balances[0])
     found = motion_misfit(model.plant, models, signals, first, record.source, unit, settings.report)
     if found.still:
         return found
@@ -85,7 +73,7 @@ def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> 
     Returns:
         A model's values -> the sum of squares over the encoders, in units of their noise.
     """
-    parts = test_signals(workings)
+    parts = test_signals(workings.test_data, workings.balances[0])
 
     def missed(point: ModelPoint) -> float:
         p = workings.balances[0].physical_values(workings.search.problem.record_points(point)[0])
@@ -100,37 +88,28 @@ def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> 
 def torque_comparison(
     workings: Workings, test: Sequence[TestMisfit], model: Model, settings: DiagnosisSettings
 ) -> Callable[[ModelPoint], ScoreComparison | None]:
-    """Return what compares models with the final one by the torque that they leave of test data."""
-    moving = [
-        (balance_of(record, model, settings), first / record.size)
-        for (record, first), misfit in zip(open_test_data(workings.test_data), test, strict=True)
-        if not misfit.still
-    ]
-    return residual_comparison(workings.search, moving)
+    """Return what compares models with the final one by the whitened torque that they leave of test data.
 
-
-def residual_comparison(
-    found: SearchResult, records: Sequence[tuple[ResidualModel, float]]
-) -> Callable[[ModelPoint], ScoreComparison | None]:
-    """Return what compares models with the final one by the whitened residuals that they leave of test data.
-
-    Whitened residuals count what drifts as unknown torques: unlike free runs they forget what lies long ago.
-
-    Args:
-        records: model beside each whole record, and the share of it that was fitted; 0.0: it is another record.
+    It counts what drifts as unknown torques: unlike free runs it forgets what lies long ago.
 
     Returns:
         A model's values -> how much less the final one leaves, block by block; None: there are too few rows to tell.
     """
+    records = [
+        (balance_of(record, model, settings), first / record.size)
+        for (record, first), misfit in zip(open_test_data(workings.test_data), test, strict=True)
+        if not misfit.still
+    ]
     if not records:
         return lambda point: None
     models, fitted = zip(*records, strict=True)
+    found = workings.search
     problem = replace(found.problem, models=models)
 
     def seen(point: ModelPoint) -> ModelPoint:
         local: list[float] = []
-        for model, own, share in zip(models, found.problem.record_points(point), fitted, strict=False):
-            count = sum(entry.local for entry in model.parameters)
+        for balance, own, share in zip(models, found.problem.record_points(point), fitted, strict=False):
+            count = sum(entry.local for entry in balance.parameters)
             local += own.parameters[len(own.parameters) - count :] if share else (0.0,) * count
         return ModelPoint((*point.parameters[: len(problem.shared)], *local), point.effects)
 
@@ -143,46 +122,6 @@ def residual_comparison(
 
 
 LEAST_TRAVEL = 20.0  # in deviations of the noise, from which a test part moves
-
-
-def run_parts(first: int, size: int, settings: ReportSettings) -> list[slice]:
-    """Return the parts of a record over which free runs go: from a row to its end, of one length."""
-    rows = size - first
-    count = max(settings.runs, round(rows / (settings.longest_run * size)))
-    count = max(min(count, rows // settings.least_rows), 1)
-    length = rows // count
-    return [slice(first + n * length, first + (n + 1) * length) for n in range(count)]
-
-
-def free_runs(
-    plant: Plant, p: Array, signals: RunSignals, parts: Sequence[slice], history: bool = True
-) -> list[FreeRun]:
-    """Return a free run over each part, from the initial state that lies closest."""
-
-    def run(part: slice) -> FreeRun:
-        guesses = start_guesses(plant, p, signals, part.start)
-        runs = [free_run(plant, p, guess, signals, part, history) for guess in guesses]
-        return min(runs, key=lambda one: float(np.sum((one.rms / signals.noise) ** 2)))
-
-    return spread(run, list(parts))
-
-
-def start_guesses(plant: Plant, p: Array, signals: RunSignals, row: int) -> list[Array]:
-    """Return first guesses of the state at a row: one, or three where a load that is not measured lies in a gap.
-
-    Returns:
-        States (8,): in mid-gap, and at either flank.
-    """
-    guess = signals.guess_state(plant, p, row)
-    gap = plant.value(p, plant.shaft.gap) if plant.shaft and plant.shaft.gap else 0.0
-    if gap <= 0.0 or signals.channels == len(plant.bodies):
-        return [guess]
-    found = [guess]
-    for side in (-1.0, 1.0):
-        moved = guess.copy()
-        moved[plant.bodies[1].angle] += side * gap
-        found.append(moved)
-    return found
 
 
 def run_misfit(plant: Plant, p: Array, signals: RunSignals, first: int, settings: ReportSettings) -> Array:
