@@ -27,11 +27,15 @@ from orchestrator.diagnosis.report.hidden_gap import HiddenGap, find_hidden_gap,
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.test_report import misfit_on_test_data, misses_of, torque_comparison
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
-from orchestrator.diagnosis.selection.evidence import effect_evidence, record_evidence, torque_shares
-from orchestrator.diagnosis.selection.grading import possible_effects
+from orchestrator.diagnosis.selection.evidence import (
+    effect_evidence,
+    leave_out_possible,
+    record_evidence,
+    torque_shares,
+)
 from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
-from orchestrator.diagnosis.selection.search import leave_out, search_effects
+from orchestrator.diagnosis.selection.search import search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -104,7 +108,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     searched = workings.search
     record = record_evidence(searched)
     evidence = [effect_evidence(searched, label) for label in searched.final.labels]
-    found = leave_out(searched, possible_effects(evidence, record, settings))
+    found, evidence = leave_out_possible(searched, evidence, record, settings)
     final = workings.balances[0].physical_values(found.problem.record_points(found.final.point)[0])
     workings = replace(workings, search=found, final=final)
     test = misfit_on_test_data(workings, model, settings)

@@ -27,10 +27,14 @@ from orchestrator.diagnosis.report.estimates import (
     value_covariance,
 )
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
-from orchestrator.diagnosis.selection.evidence import effect_evidence, record_evidence, torque_shares
-from orchestrator.diagnosis.selection.grading import possible_effects
+from orchestrator.diagnosis.selection.evidence import (
+    effect_evidence,
+    leave_out_possible,
+    record_evidence,
+    torque_shares,
+)
 from orchestrator.diagnosis.selection.remaining import find_dependences
-from orchestrator.diagnosis.selection.search import fit_base, leave_out, search_effects
+from orchestrator.diagnosis.selection.search import fit_base, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings, FitSettings
 from orchestrator.errors import ScenarioError
 
@@ -122,7 +126,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     searched, problem = workings.search, workings.problem
     record = record_evidence(searched)
     evidence = [effect_evidence(searched, label) for label in searched.final.labels]
-    found = leave_out(searched, possible_effects(evidence, record, settings))
+    found, evidence = leave_out_possible(searched, evidence, record, settings)
     workings = replace(workings, search=found)
     test = misfit_on_test_data(workings)
     graded = []

@@ -1,5 +1,6 @@
 """Evidence for the effects of a final model: what leaves with each, and what the record says of the whole model."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,10 @@ from orchestrator.diagnosis.inference.fitting import FittedModel, fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint
-from orchestrator.diagnosis.selection.outcome import EffectEvidence, RecordEvidence, SearchResult
+from orchestrator.diagnosis.selection.grading import grade_effect
+from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence, SearchResult
+from orchestrator.diagnosis.selection.search import leave_out
+from orchestrator.diagnosis.settings import DiagnosisSettings
 
 Array = NDArray[np.float64]
 FREE_SPREAD = 30.0  # of a parameter whose prior is off
@@ -111,3 +115,25 @@ def recorded_inertia(problem: FitProblem, fitted: FittedModel) -> tuple[float, f
     variance = max(float(weights @ covariance @ weights) for covariance in (free.jackknife, free.covariance))
     spread = max((entry.spread for entry in problem.shared if entry.name in shares), default=0.0)
     return total, float(np.sqrt(variance)), spread
+
+
+def leave_out_possible(
+    searched: SearchResult, evidence: Sequence[EffectEvidence], record: RecordEvidence, settings: DiagnosisSettings
+) -> tuple[SearchResult, list[EffectEvidence]]:
+    """Return the result without effects that are not even likely: a model that had them might predict worse.
+
+    What leaves may take what another effect rests on: sizes count as they are in what remains.
+
+    Returns:
+        The result, and the evidence with the sizes there.
+    """
+    found = searched
+    while labels := [
+        one.label
+        for one in evidence
+        if one.label in found.final.labels and grade_effect(one, record, settings)[0] is Grade.POSSIBLE
+    ]:
+        found = leave_out(found, labels)
+        sizes = {label: size_over_error(found.problem, found.final, label) for label in found.final.labels}
+        evidence = [replace(one, size_t=min(one.size_t, sizes.get(one.label, np.inf))) for one in evidence]
+    return found, list(evidence)

@@ -2,16 +2,12 @@
 possible.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings, GradeSettings
 
-Array = NDArray[np.float64]
 FOLLOWING = ("wave", "limit", "timing", "constant")  # kinds that follow whatever another law leaves
 
 
@@ -133,10 +129,3 @@ def grade_effect(
 def highest_grade(broken: Collection[str]) -> Grade:
     """Return the grade that an effect has at most where some rules do not hold."""
     return min((rule.highest for rule in GRADE_RULES if rule.name in broken), default=Grade.CERTAIN)
-
-
-def possible_effects(
-    evidence: Sequence[EffectEvidence], record: RecordEvidence, settings: DiagnosisSettings
-) -> list[str]:
-    """Return the effects that are not even likely: a corrected model that had them might predict worse."""
-    return [one.label for one in evidence if grade_effect(one, record, settings)[0] is Grade.POSSIBLE]
