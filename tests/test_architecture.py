@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ NEEDED = {
     "report": ["results"],
 }
 MOST_LINES = 400
+LONGEST_CHAIN = 8  # of modules of the diagnosis that import one another
 MOST_FUNCTION_LINES = 60
 
 # Lower layers first; a module may import from its own layer's package and from the layers below. A room within a room
@@ -129,6 +131,19 @@ def test_no_circle_of_imports():
         left = {name: needs for name, needs in left.items() if name not in free}
     users = {name for needs in left.values() for name in needs}
     assert not {name: sorted(needs & left.keys()) for name, needs in left.items() if name in users}
+
+
+def test_the_diagnosis_has_short_chains_of_imports():
+    known = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in SOURCES if "diagnosis" in path.parts
+    }
+    needs = {name: set(sources_of(path, known)) - {name} for name, path in known.items()}
+
+    @cache
+    def chain(name):
+        return 1 + max(map(chain, needs[name]), default=0)
+
+    assert max(map(chain, known)) <= LONGEST_CHAIN
 
 
 def test_only_commands_print():

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from orchestrator.diagnosis.inference.fitting import ScoreComparison
 from orchestrator.diagnosis.selection.grading import GRADE_RULES, grade_effect, highest_grade
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -47,3 +48,17 @@ def test_thresholds_of_rules_are_settings():
     names = {name for name, _, _ in described(DiagnosisSettings)}
     assert {rule.setting for rule in GRADE_RULES if rule.setting} <= names
     assert all(rule.reason and rule.statistic for rule in GRADE_RULES)
+
+
+@pytest.mark.parametrize(
+    ("torque", "lowered"),
+    [
+        (None, {"confirmed", "not refuted"}),
+        (ScoreComparison(0.5, 8.0), set()),
+        (ScoreComparison(0.5, 2.0), {"confirmed", "not refuted"}),
+        (ScoreComparison(0.05, 8.0), {"confirmed", "not refuted"}),
+    ],
+)
+def test_the_torque_of_test_data_confirms_what_free_runs_lose(torque, lowered):
+    effect = replace(EFFECT, motion_share=-0.5, test_torque=torque)
+    assert set(grade_effect(effect, RECORD, SETTINGS)[1]) == lowered

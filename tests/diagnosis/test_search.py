@@ -1,12 +1,16 @@
 """The search on a model of known columns: effects that are there are found, and what does as well is their family."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from orchestrator.diagnosis.inference.problem import fit_problem
+from orchestrator.diagnosis.selection.evidence import effect_evidence, leave_out_possible, size_over_error
+from orchestrator.diagnosis.selection.outcome import RecordEvidence
 from orchestrator.diagnosis.selection.screening import products_with_waves
 from orchestrator.diagnosis.selection.search import search_effects
-from orchestrator.diagnosis.settings import FitSettings, SelectionSettings
+from orchestrator.diagnosis.settings import DiagnosisSettings, FitSettings, SelectionSettings
 from tests.support.linear_model import LinearModel, linear_problem
 
 SETTINGS = SelectionSettings()
@@ -31,7 +35,8 @@ def test_two_columns_that_are_alike_are_a_family():
     problem = linear_problem({"a@motor": 0.4, "b@motor": 0.0}, alike={"b@motor": "a@motor"})
     found = search_effects(problem, SETTINGS)
     assert len(found.final.labels) == 1
-    assert set(found.steps[0].family) | set(found.final.labels) == {"a@motor", "b@motor"}
+    (label,) = found.final.labels
+    assert {label, *found.reviews[label].family} == {"a@motor", "b@motor"}
 
 
 def test_no_more_effects_than_the_settings_allow():
@@ -46,6 +51,30 @@ def test_time_that_runs_out_is_said():
     found = search_effects(problem, SETTINGS, out_of_time=lambda: True)
     assert not found.complete
     assert found.final.labels == ()
+
+
+def test_families_are_those_of_the_final_model():
+    problem = linear_problem({name: (0.4 if n in (1, 4) else 0.0) for n, name in enumerate(NAMES)}, seed=3)
+    found = search_effects(problem, SETTINGS)
+    assert set(found.reviews) == set(found.final.labels)
+    for label, review in found.reviews.items():
+        assert label not in review.before.labels
+        assert set(review.before.labels) == set(found.final.labels) - {label}
+        assert not review.family
+
+
+def test_sizes_count_as_they_are_in_what_remains():
+    problem = linear_problem({"a@motor": 0.4, "b@motor": 0.4})
+    found = search_effects(problem, SETTINGS)
+    evidence = [effect_evidence(found, label) for label in found.final.labels]
+    one, other = (replace(each, share=1.0, possible=True) for each in evidence)
+    record = RecordEvidence(0.0, 1.0, 0.0, np.inf)
+    left, same = leave_out_possible(found, [one, other], record, DiagnosisSettings())
+    assert left is found
+    assert same == [one, other]
+    left, evidence = leave_out_possible(found, [replace(one, possible=False), other], record, DiagnosisSettings())
+    assert left.final.labels == (other.label,)
+    assert evidence[1].size_t == min(other.size_t, size_over_error(left.problem, left.final, other.label))
 
 
 def test_several_records_share_sizes():

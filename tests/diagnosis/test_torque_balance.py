@@ -116,3 +116,20 @@ def test_values_of_effects_reach_the_plants_table():
     place = DRIVETRAIN.index("presliding.motor")
     assert balance.values_at(friction)[place] == -5.0
     assert balance.physical_values(friction)[place] == balance.nominal[place]
+
+
+def test_the_first_effect_that_has_a_value_sets_it():
+    record, _ = exact_record({"effects.coulomb_friction.motor.torque": 1.0})
+    balance = TorqueBalance(MODEL, prepare_signals(record, None, SETTINGS.band), SETTINGS.balance)
+    loaded = ModelPoint.nominal(balance.parameters).with_effect("load_dependent_friction@motor", (0.1, -6.0))
+    both = loaded.with_effect("coulomb_friction@motor", (0.0, -9.0))
+    alone, beside = balance.residuals([loaded, both])
+    np.testing.assert_array_equal(alone, beside)
+
+
+def test_only_what_makes_the_drive_late_is_alone():
+    record, _ = exact_record({})
+    effects = TorqueBalance(MODEL, prepare_signals(record, None, SETTINGS.band), SETTINGS.balance).effects
+    assert "drive_filter@actuator" in effects["input_delay@actuator"].excludes
+    assert "late_load@log" not in effects["input_delay@actuator"].excludes
+    assert not effects["late_load@log"].excludes
