@@ -116,6 +116,8 @@ PAGES: dict[str, tuple[str, dict[str, Any], dict[str, Any], dict[str, str]]] = {
                        {"simulate.csv": LOOPS}),
     "scenario": ("simulate", {}, {"signals": SIGNALS, "steps": 1, "events": {}}, {"simulate.csv": SCENARIO}),
     "ssp": ("ssp", {"file": "in/a.ssp"}, {"signals": SIGNALS, "steps": 1}, {"ssp.csv": SCENARIO}),
+    "ssp without arguments": ("ssp", {}, {"file": "in/b.ssp", "signals": SIGNALS[:1], "steps": 0},
+                              {"ssp.csv": SCENARIO}),
     "sweep": ("sweep", {"sizes": "3"}, {
         "cases": 3, "failed": 0, "columns": [
             {"name": name, "unit": "rad"} for name in SWEEP.split("\n")[0].split(",")[5:11]],

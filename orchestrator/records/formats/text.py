@@ -171,10 +171,9 @@ def _decode(path: Path) -> tuple[str, str]:
 
 def _without_bom(head: bytes) -> str:
     """Return UTF-16 where every other byte is zero, else UTF-8."""
-    if len(head) >= 8:
-        for name, zeros in (("utf-16-le", head[1::2]), ("utf-16-be", head[0::2])):
-            if zeros.count(0) > 0.8 * len(zeros) and head.count(0) < 0.6 * len(head):
-                return name
+    for name, zeros in (("utf-16-le", head[1::2]), ("utf-16-be", head[0::2])):
+        if zeros.count(0) > 0.8 * len(zeros) and head.count(0) < 0.6 * len(head):
+            return name
     return "utf-8"
 
 
