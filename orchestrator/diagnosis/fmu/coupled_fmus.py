@@ -189,6 +189,9 @@ class CoupledFmus:
     """One FMU, or several that hand values to one another, behind one list of inputs and one of what is read."""
 
     def __init__(self, request: LoadRequest) -> None:
+        from orchestrator.diagnosis.fmu import loop  # finds its machine code only once it is told where
+
+        self._loop = loop
         members, self._request = request.members, request
         owners = {n: split_name(n, members) for n in (*request.inputs, *request.tunables, *request.reads)}
 
@@ -213,8 +216,6 @@ class CoupledFmus:
 
     def run(self, job: Run, batch: Batch) -> Array:
         """Return what is read (steps + 1, reads): the initial values, then what follows each step."""
-        from orchestrator.diagnosis.fmu.loop import AWAY, run_loop  # finds its machine code only once it is told where
-
         values, start, step = np.ascontiguousarray(job.table), batch.start, batch.step
         self._begin(job, values, batch)
         calls, counts, where = self._tables(values.shape[1] > len(self._request.inputs))
@@ -224,7 +225,7 @@ class CoupledFmus:
         passing = np.array([[t.wire, t.by] for t in batch.feedthrough], dtype=np.int64).reshape(-1, 2)
         gains = np.array([t.gain for t in batch.feedthrough], dtype=float)
         warned, astray = np.zeros((len(self._members), 3), dtype=np.int64), np.zeros((len(self._members), 3))
-        status, call, k, n = run_loop(
+        status, call, k, n = self._loop.run_loop(
             calls, counts, where, self._sent, self._read, self._into[: values.shape[1]], self._outof, values,
             np.array([start, step]), self._wires, self._gains, passing, gains, ports, laws, warned, astray, out,
         )  # fmt: skip
@@ -236,12 +237,12 @@ class CoupledFmus:
             if number:
                 assert isinstance(member.slave, Fmu3Slave)
                 member.slave.came_elsewhere(int(number), start + begin * step, off)
-        if status > 1 and call != AWAY:
+        if status > 1 and call != self._loop.AWAY:
             reached = start + k * step
             members[n].slave.failed(int(status), members[n].name_of_call(call), reached, reached)
         for member in members:
             member.broken = False
-        if call == AWAY:
+        if call == self._loop.AWAY:
             raise SlaveError(
                 f"efforts at ports must stay within those of the drive, but run away at {start + k * step:g} s"
             )

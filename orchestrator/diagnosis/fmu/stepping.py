@@ -85,6 +85,7 @@ def _choose_steps(problem: FmuProblem, progress: Progress) -> None:
         if not len(moving) or float(np.mean(~moving)) < STUCK:
             break
         problem.m //= 2
+    runner.step_cost = 0.0  # of a few steps alone: a new instance for each run was most of it
     for _ in range(3):  # the first answer of a child is not timed
         if runner.step_cost == 0.0:
             problem.read_driven([problem.plain_table(min(problem.n, 100))])

@@ -50,7 +50,7 @@ def box_of(path: Path, read: str = "time") -> CoupledFmus:
     ("macros", "expected"),
     [
         (("ENDS_AT=0.1",), r"box: fmi3DoStep at t = 0\.1 s asked for the end of the run"),
-        (("RETURNS_EARLY",), "box: fmi3DoStep at t = 0 s must do whole steps"),
+        (("RETURNS_EARLY",), "box: fmi3DoStep at t = 0 s must do a whole step, for no events are taken"),
         (("FAILS_AT=0.1", "FAILS_WITH=fmi3Error"), r"box: fmi3DoStep at t = 0\.1 s returned Error: the solver failed"),
     ],
 )
