@@ -8,11 +8,12 @@ from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.building.arrays import Array, arrays
 from orchestrator.building.translation.slave import has_states
+from orchestrator.fmi.clocks import SELF_SAMPLING
 from pyfmu_sources.fmu_variables import FmuVariable, unit_exponents
 from pyfmu_sources.model_xml import AUTHOR, DATE, ENUMERATIONS, LICENSE, LOG_CATEGORIES, VERSION
 
 TYPES = {"Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration"}
-INDICATOR = "indicator"
+INDICATOR, CLOCK = "indicator", "sample"
 
 
 def fmi3_description(cls: Any, name: str, native: bool) -> Element:
@@ -46,7 +47,7 @@ def fmi3_description(cls: Any, name: str, native: bool) -> Element:
         providesIntermediateUpdate=plant,
         mightReturnEarlyFromDoStep=plant,
         canReturnEarlyAfterIntermediateUpdate=plant,
-        hasEventMode=plant,
+        hasEventMode=plant or is_sampled(cls),
     )
     SubElement(root, "CoSimulation", shared | step | {"maxOutputDerivativeOrder": str(int(plant))})
     _units(root, cls.table)
@@ -59,6 +60,11 @@ def fmi3_description(cls: Any, name: str, native: bool) -> Element:
     _variables(root, cls)
     _structure(root, cls)
     return root
+
+
+def is_sampled(cls: Any) -> bool:
+    """Tell whether a slave has a sample clock."""
+    return cls.sample_time_reference is not None
 
 
 def _flags(**flags: bool) -> dict[str, str]:
@@ -94,9 +100,33 @@ def _variables(root: Element, cls: Any) -> None:
     variables = SubElement(root, "ModelVariables")
     references = {variable.name: n for n, variable in enumerate(cls.table)}
     for array in arrays(cls.table):
-        variables.append(_variable(array, references, has_states(cls)))
+        variable = _variable(array, references, has_states(cls))
+        if is_sampled(cls) and array.variables[0].causality in ("input", "output"):
+            variable.attrib |= {"variability": "discrete", "clocks": _clock_reference(cls)}
+        variables.append(variable)
     time = {"name": "time", "valueReference": str(len(cls.table)), "description": "Time", "causality": "independent"}
     SubElement(variables, "Float64", time | {"variability": "continuous", "unit": "s"})
+    if is_sampled(cls):
+        _clock(variables, cls)
+
+
+def _clock_reference(cls: Any) -> str:
+    return str(len(cls.table) + 1)
+
+
+def _clock(variables: Element, cls: Any) -> None:
+    """Add the clock of a sampled slave, with the annotation that without event mode the slave samples by itself."""
+    interval = cls.table[cls.sample_time_reference].start
+    attributes = {
+        "name": CLOCK,
+        "valueReference": _clock_reference(cls),
+        "description": "Sample clock; its interval is sample_time",
+        "causality": "input",
+        "intervalVariability": "fixed",
+        "intervalDecimal": repr(float(interval)),
+    }
+    annotations = SubElement(SubElement(variables, "Clock", attributes), "Annotations")
+    SubElement(annotations, "Annotation", {"type": SELF_SAMPLING})
 
 
 def _variable(array: Array, references: dict[str, int], plant: bool) -> Element:
@@ -150,16 +180,20 @@ def _structure(root: Element, cls: Any) -> None:
     at_once = getattr(cls, "exchange_depends_on", {})
     structure = SubElement(root, "ModelStructure")
 
+    if is_sampled(cls):
+        place[CLOCK] = int(_clock_reference(cls))
+    clock = [CLOCK] if is_sampled(cls) else []
+
     def add(tag: str, name: str, depends_on: Iterable[str]) -> None:
         words = " ".join(map(str, sorted({place[other] for other in depends_on})))
         SubElement(structure, tag, {"valueReference": str(place[name]), "dependencies": words})
 
     outputs = [variable for variable in table if variable.causality == "output"]
     for variable in outputs:
-        add("Output", variable.name, (*variable.depends_on, *at_once.get(variable.name, ()), *states))
+        add("Output", variable.name, (*variable.depends_on, *at_once.get(variable.name, ()), *states, *clock))
     for name in rates:
         add("ContinuousStateDerivative", name, (*inputs, *states))
-    for variable in outputs:
+    for variable in () if is_sampled(cls) else outputs:  # those of clocks need no place there
         add("InitialUnknown", variable.name, variable.starts_from)
     for name in (*states, *rates):
         add("InitialUnknown", name, (*inputs, *parameters))

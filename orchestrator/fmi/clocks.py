@@ -1,13 +1,16 @@
 """Clocks of FMI 3.0, from a model description: ticked by the master, timed by the FMU, or ticked by nobody."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from lxml import etree
 
 from orchestrator.fmi.variables3 import Variables3
 from orchestrator.master.protocol import PeriodicClock
+
+SELF_SAMPLING = "backlash-cosim.samples-itself"
+"""Type of the annotation of a clock whose FMU samples by itself where event mode is not used."""
 
 
 class UnusableError(Exception):
@@ -24,6 +27,7 @@ class EventFeatures:
         timed: input clocks whose next tick the FMU says while it runs: value reference and kind by name.
         told: periodic clocks whose interval the FMU is told, by name.
         triggered: value references of output clocks.
+        self_sampling: without event mode the FMU ticks all its input clocks itself.
     """
 
     inside: frozenset[str] = frozenset()
@@ -31,6 +35,7 @@ class EventFeatures:
     timed: Mapping[str, tuple[int, str]] = field(default_factory=dict)
     told: tuple[str, ...] = ()
     triggered: frozenset[int] = frozenset()
+    self_sampling: bool = False
 
 
 def read_clocks(variables: Variables3) -> tuple[dict[str, PeriodicClock], EventFeatures, list[str]]:
@@ -56,10 +61,20 @@ def read_clocks(variables: Variables3) -> tuple[dict[str, PeriodicClock], EventF
             timed[name] = (reference, kind)
         else:
             raise ValueError(f"its clock {name!r} has the intervalVariability {kind!r}, but no interval")
+    inputs = [clock for clock in variables.clocks.values() if clock.get("causality") == "input"]
     features = EventFeatures(
-        frozenset(variables.inside), dict(variables.clocked), timed, tuple(told), frozenset(triggered)
+        frozenset(variables.inside),
+        dict(variables.clocked),
+        timed,
+        tuple(told),
+        frozenset(triggered),
+        bool(inputs) and all(_samples_itself(clock) for clock in inputs),
     )
     return periodic, features, left_out
+
+
+def _samples_itself(clock: etree._Element) -> bool:
+    return any(note.get("type") == SELF_SAMPLING for note in clock.iterfind("Annotations/Annotation"))
 
 
 def _interval(clock: etree._Element) -> Fraction | None:
@@ -83,6 +98,39 @@ def _seconds(clock: etree._Element, what: str) -> Fraction | None:
     if counter is not None and resolution is not None:
         return Fraction(int(counter), int(resolution))
     return None if decimal is None else Fraction(decimal)
+
+
+@dataclass(frozen=True)
+class ClockTimes:
+    """Times of a clock that are wanted in place of the FMU's own.
+
+    Attributes:
+        interval: [s]; None: as the FMU has it.
+        shift: of the first tick [s]; None: as the FMU has it.
+    """
+
+    interval: Fraction | None = None
+    shift: Fraction | None = None
+
+    def of(self, clock: PeriodicClock) -> PeriodicClock:
+        """Return the clock with these times."""
+        return replace(
+            clock,
+            interval=clock.interval if self.interval is None else self.interval,
+            shift=clock.shift if self.shift is None else self.shift,
+        )
+
+
+def times_problem(name: str, clocks: Mapping[str, PeriodicClock], features: EventFeatures) -> str | None:
+    """Return what keeps the times of a clock from being set, in words; None: nothing."""
+    if name in features.told:
+        return None
+    if name in clocks:
+        return "must be left out, but is given: the interval of the clock is constant"
+    if name in features.timed:
+        return "must be left out, but is given: the FMU itself says when the clock ticks"
+    known = ", ".join(features.told)
+    return f"must be a clock whose interval can be set ({known or 'there is none'}), but is {name!r}"
 
 
 def clock_names(names: Sequence[str]) -> str:

@@ -1,9 +1,11 @@
 """FMUs as instances of a system."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from orchestrator.errors import FmuError
+from orchestrator.errors import FmuError, ScenarioError
+from orchestrator.fmi.clocks import ClockTimes, times_problem
 from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.slave import FmuSlave
@@ -33,11 +35,34 @@ class FmuFactory:
         return make_slave(name, self.path, self.description)
 
 
+def _with_times(description: FmuDescription, times: Mapping[str, ClockTimes]) -> FmuDescription:
+    clocks = dict(description.model.clocks)
+    for name, wanted in times.items():
+        text = times_problem(name, clocks, description.events)
+        if text is not None:
+            raise ScenarioError(f"clocks.{name}: {text}")
+        clocks[name] = wanted.of(clocks[name])
+    return replace(description, model=replace(description.model, clocks=clocks))
+
+
 def fmu_instance(
-    name: str, path: Path, start: Start | None = None, solver_tolerance: float | None = None, events: bool = False
+    name: str,
+    path: Path,
+    start: Start | None = None,
+    solver_tolerance: float | None = None,
+    events: bool = False,
+    clocks: Mapping[str, ClockTimes] | None = None,
 ) -> Instance:
-    """Return an instance of the FMU at ``path``, with parameters and start values by variable name."""
+    """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
+
+    Args:
+        solver_tolerance: relative, for the FMU's own solver.
+        events: whether event mode is used where the FMU has it.
+        clocks: times of clocks, by name; see ``times_problem``.
+    """
     description, rest = read_configured(path, start or {}, events)
+    if clocks:
+        description = _with_times(description, clocks)
     return Instance(name, description.model, FmuFactory(path, description), rest, solver_tolerance)
 
 

@@ -66,7 +66,8 @@ def read_description(path: Path, events: bool = True, configured: Mapping[str, V
     description = parse_description(content, str(path), python, configured)
     if events or not description.model.has_events:
         return description
-    if clocks := [*description.model.clocks, *description.events.timed]:
+    clocks = [*description.model.clocks, *description.events.timed]
+    if clocks and not description.events.self_sampling:
         raise FmuError(f"{path}: its clocks ({clock_names(clocks)}) tick in event mode, which is not used here")
     model = replace(
         description.model, has_events=False, output_derivatives=0, inputs_inside_steps=frozenset(), clocks={}

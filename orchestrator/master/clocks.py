@@ -2,9 +2,17 @@
 
 import heapq
 import math
+from collections.abc import Mapping
 from fractions import Fraction
 
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.master.event_stage import slack
+from orchestrator.master.layout import Layout
 from orchestrator.master.problems import Problem
+from orchestrator.master.protocol import PeriodicClock
+from orchestrator.master.signals import Signal
 from orchestrator.master.system import System
 
 
@@ -56,3 +64,47 @@ class ClockSchedule:
             instance, name = self._names[k]
             due.setdefault(instance, []).append(name)
         return due
+
+
+class TickSamples:
+    """What sources add to inputs of periodic clocks: their values at the ticks, wherever those are in a step.
+
+    Args:
+        replaced: signals in place of those of ``System.sources``, by index.
+        times: communication points [s]; a tick within rounding of one has its time.
+    """
+
+    def __init__(self, layout: Layout, replaced: Mapping[int, Signal], times: NDArray[np.float64]) -> None:
+        self._rows: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]] = []
+        for block in layout.blocks:
+            instance = layout.system.instance(block.name)
+            clocks = {} if instance is None else instance.model.clocks
+            for name, feed in zip(block.inputs, block.feeds, strict=True):
+                own = [clock for clock in clocks.values() if name in clock.variables]
+                if own and feed.signal >= 0:
+                    ticks = _on_grid(np.unique(np.concatenate([_tick_times(clock, times) for clock in own])), times)
+                    self._rows.append((feed.signal, ticks, layout.signal_values(feed.signal, ticks, replaced)))
+
+    def put(self, time: float, table: NDArray[np.float64], column: int) -> None:
+        """Put the values at ``time`` [s] into a column of the table of signals; see ``Layout.signal_table``."""
+        for row, ticks, values in self._rows:
+            k = int(np.searchsorted(ticks, time - slack(time)))
+            if k < len(ticks) and ticks[k] <= time + slack(time):
+                table[row, column] = values[k]
+
+
+def _tick_times(clock: PeriodicClock, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the times at which a clock ticks [s], each rounded once."""
+    assert clock.interval is not None
+    first, interval = Fraction(repr(float(times[0]))) + clock.shift, clock.interval
+    unit = math.lcm(first.denominator, interval.denominator)
+    start, step = int(first * unit), int(interval * unit)
+    count = max(0, int((Fraction(float(times[-1])) - first) / interval) + 2)
+    return np.array([(start + n * step) / unit for n in range(count)])
+
+
+def _on_grid(ticks: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ticks with those within rounding of a communication point at its very time."""
+    nearest = times[np.clip(np.searchsorted(times, ticks - 0.5 * (times[1] - times[0])), 0, len(times) - 1)]
+    near = np.abs(nearest - ticks) <= 1e-12 * np.maximum(1.0, np.abs(ticks))
+    return np.unique(np.where(near, nearest, ticks))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import ChatteringError, ConvergenceError
 from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi
+from orchestrator.master.clocks import TickSamples
 from orchestrator.master.event_stage import EventStage, slack
 from orchestrator.master.events import MOST_EVENTS, EventIteration
 from orchestrator.master.fixed_point import fixed_point
@@ -90,7 +91,8 @@ class FixedSteps:
     Args:
         events: the slaves and their event mode.
         algorithm: with a fixed step.
-        table: what the sources add to inputs, see ``Layout.signal_table``.
+        table: what the sources add to inputs, see ``Layout.signal_table``; those of clocks are put in at each tick.
+        ticks: what they add to those.
         start: [s].
 
     Attributes:
@@ -99,9 +101,14 @@ class FixedSteps:
     """
 
     def __init__(
-        self, events: EventIteration, algorithm: GaussSeidel | Jacobi | Iterated, table: Array, start: float
+        self,
+        events: EventIteration,
+        algorithm: GaussSeidel | Jacobi | Iterated,
+        table: Array,
+        ticks: TickSamples,
+        start: float,
     ) -> None:
-        self.events, self.algorithm, self.table, self.start = events, algorithm, table, start
+        self.events, self.algorithm, self.table, self._ticks, self.start = events, algorithm, table, ticks, start
         self.values, self.view = events.wiring.values, events.wiring.view
         self.passes = self.undone = 0
         self._column, self._late = 0, False
@@ -146,6 +153,7 @@ class FixedSteps:
                     due = self.events.next_time()
                     time, event = self._cross(time, due if due < end - slack(end) else end)
                     self.events.raise_end(time)
+                    self._ticks.put(time, self.table, self._column)
                     if self._late and not event:
                         self.events.jump(time, self.gather)
                     self._late = False

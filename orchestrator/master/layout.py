@@ -5,7 +5,7 @@ neighbours, and so are its inputs: a slave reads and writes its slots in place, 
 to slot within one array.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,12 +108,28 @@ class Layout:
             Shape (steps + 1,), in the unit of the input.
         """
         found = np.zeros(len(times))
-        for index, factor, offset, at_end in self.signals[row]:
-            signal = replaced.get(index, self.system.sources[index].signal)
-            values = factor * signal.sample(times) + offset
+        for values, at_end in self._sampled(row, times, replaced):
             found[0] += values[0]
             found[1:] += values[1:] if at_end else values[:-1]
         return found
+
+    def signal_values(self, row: int, times: Signals, replaced: Mapping[int, Signal]) -> NDArray[np.float64]:
+        """Return what the sources of a row add at any times.
+
+        Args:
+            times: [s], shape (n,).
+
+        Returns:
+            Shape (n,), in the unit of the input.
+        """
+        return np.sum([values for values, _ in self._sampled(row, times, replaced)], axis=0)
+
+    def _sampled(
+        self, row: int, times: Signals, replaced: Mapping[int, Signal]
+    ) -> Iterator[tuple[NDArray[np.float64], bool]]:
+        for index, factor, offset, at_end in self.signals[row]:
+            signal = replaced.get(index, self.system.sources[index].signal)
+            yield factor * signal.sample(times) + offset, at_end
 
 
 def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: bool = False) -> Layout:

@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.errors import FmuError, ScenarioError, SimulationError, SlaveError
 from orchestrator.master.adaptive import run_adaptive
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Jacobi, step_count
-from orchestrator.master.clocks import clock_problems
+from orchestrator.master.clocks import TickSamples, clock_problems
 from orchestrator.master.event_steps import FixedSteps
 from orchestrator.master.event_windows import EventWindows
 from orchestrator.master.events import EventIteration
@@ -238,7 +238,8 @@ class Session:
             if not isinstance(algorithm, (GaussSeidel, Jacobi, Iterated)):
                 kind = type(algorithm).__name__
                 raise ScenarioError(f"`events` must be false with `{kind}`, which has no event mode, but is true")
-            run = FixedSteps(self._events, algorithm, table, self.start)
+            ticks = TickSamples(self.layout, signals, self._times)
+            run = FixedSteps(self._events, algorithm, table, ticks, self.start)
             run.run(steps, rows, record)
             return Statistics(steps, run.undone, self._calls(), run.passes, events=self._events.statistics())
         match algorithm:

@@ -9,6 +9,7 @@ import os
 import tomllib
 from collections.abc import Callable
 from dataclasses import fields
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import msgspec
 from orchestrator.building.build import ensure_built
 from orchestrator.building.sources import catalogue
 from orchestrator.errors import FmuError, ScenarioError
+from orchestrator.fmi.clocks import ClockTimes
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master import signals
 from orchestrator.master.algorithms import ALGORITHMS, Algorithm, step_count
@@ -53,9 +55,15 @@ class _Quantity(_Strict, frozen=True, kw_only=True):
     unit: str
 
 
+class _Clock(_Strict, frozen=True, kw_only=True):
+    interval: float | str | None = None
+    shift: float | str | None = None
+
+
 class _Instance(_Strict, frozen=True, kw_only=True):
     fmu: str
     parameters: dict[str, Any] = {}
+    clocks: dict[str, _Clock] = {}
     solver_tolerance: float | None = None
 
 
@@ -246,12 +254,34 @@ class _Reader:
                 if parameter is not None:
                     start[key] = parameter
             self._check_bound(instance, "solver_tolerance", path, lambda x: 0.0 < x < 1.0, "above 0 and below 1")
+            clocks = {key: self._clock(clock, f"{path}.clocks.{key}") for key, clock in instance.clocks.items()}
             try:
                 fmu = self._fmu(instance.fmu)
-                found.append(fmu_instance(name, fmu, start, instance.solver_tolerance, self._events))
+                found.append(fmu_instance(name, fmu, start, instance.solver_tolerance, self._events, clocks))
+            except ScenarioError as error:
+                self.problems.append(Problem(path, str(error)))
             except FmuError as error:
                 raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
         return tuple(found)
+
+    def _clock(self, clock: _Clock, path: str) -> ClockTimes:
+        return ClockTimes(
+            self._seconds(clock.interval, f"{path}.interval", 1), self._seconds(clock.shift, f"{path}.shift", 0)
+        )
+
+    def _seconds(self, value: float | str | None, path: str, signum: int) -> Fraction | None:
+        """Return an exact time: the decimal number that is written, or the quotient in a text such as "1/3000"."""
+        if value is None:
+            return None
+        try:
+            seconds = Fraction(str(value))
+        except (ValueError, ZeroDivisionError):
+            seconds = Fraction(-1)
+        if seconds < 0 or (signum and not seconds):
+            sign = "positive" if signum else "not negative"
+            text = f'must be a number of seconds or a quotient such as "1/3000", {sign}, but is {value!r}'
+            self.problems.append(Problem(path, text))
+        return seconds
 
     def _parameter(self, value: Any, path: str) -> Value | Quantity | None:
         if isinstance(value, dict):

@@ -10,6 +10,7 @@ import numpy as np
 from orchestrator.engine import Case, DesignCases, ResultColumn, Work
 from orchestrator.engine.cases import Value
 from orchestrator.errors import ScenarioError
+from orchestrator.fmi.clocks import ClockTimes
 from orchestrator.fmi.instances import FmuFactory, fmu_instance
 from orchestrator.master.compiled import prepare
 from orchestrator.master.problems import Problem, raise_problems
@@ -52,16 +53,32 @@ def scenario_work(scenario: Scenario, cases: DesignCases, trust: bool = False) -
     summaries = (ResultColumn(f"{name}.{what}", units[name]) for name in scenario.record for what in SUMMARIES)
     columns = (*summaries, ResultColumn(REMARKS, "", str))
     bare = replace(scenario.system, instances=())
-    starts = {i.name: dict(i.start) for i in scenario.system.instances}
-    payload = _Payload(replace(scenario, system=bare), starts)
+    payload = _Payload(replace(scenario, system=bare), {i.name: _Made.of(i) for i in scenario.system.instances})
     walls = not trust and bool(foreign_fmus(scenario.system))
     return Work(_prepare, _run, columns, payload, files, {"scenario": repr(payload)}, unpacked=True, walls=walls)
 
 
 @dataclass(frozen=True)
+class _Made:
+    """What an instance is made with, beside its FMU."""
+
+    start: Mapping[str, Any]
+    solver_tolerance: float | None
+    events: bool
+    clocks: Mapping[str, ClockTimes]
+
+    @classmethod
+    def of(cls, instance: Instance) -> "_Made":
+        assert isinstance(instance.create, FmuFactory)
+        told = {name: instance.model.clocks[name] for name in instance.create.description.events.told}
+        clocks = {name: ClockTimes(clock.interval, clock.shift) for name, clock in told.items()}
+        return cls(dict(instance.start), instance.solver_tolerance, instance.model.has_events, clocks)
+
+
+@dataclass(frozen=True)
 class _Payload:
     scenario: Scenario
-    starts: Mapping[str, Mapping[str, Any]]
+    instances: Mapping[str, _Made]
 
 
 def _path(instance: Instance) -> Path:
@@ -71,7 +88,10 @@ def _path(instance: Instance) -> Path:
 
 
 def _prepare(payload: _Payload, files: Mapping[str, Path]) -> Session:
-    instances = tuple(fmu_instance(name, files[name], start) for name, start in payload.starts.items())
+    instances = tuple(
+        fmu_instance(name, files[name], made.start, made.solver_tolerance, made.events, made.clocks)
+        for name, made in payload.instances.items()
+    )
     scenario = replace(payload.scenario, system=replace(payload.scenario.system, instances=instances))
     return scenario.session()
 

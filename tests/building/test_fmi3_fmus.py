@@ -40,7 +40,8 @@ def trajectory(path: Path) -> np.ndarray:
     """Return all outputs of an FMU in FMPy under inputs that jump; gaps and friction make events."""
     description = fmpy.read_model_description(path)
     kinds = ("input", "output", "parameter")
-    names = {c: [v.name for v in description.modelVariables if v.causality == c] for c in kinds}
+    variables = [v for v in description.modelVariables if v.type != "Clock"]
+    names = {c: [v.name for v in variables if v.causality == c] for c in kinds}
     time = np.arange(0.0, STOP + 5e-4, 1e-3)
     rng = np.random.default_rng(0)
     signals = np.zeros(len(time), dtype=[(name, float) for name in ("time", *names["input"])])

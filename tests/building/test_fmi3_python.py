@@ -43,7 +43,8 @@ def test_fmpy_finds_nothing(both: dict[str, dict[str, Path]], name: str) -> None
 def test_steps_have_the_bits_of_the_native_fmu(both: dict[str, dict[str, Path]], name: str) -> None:
     rng = np.random.default_rng(2)
     slaves = [Slave3(both[kind][name]) for kind in both]
-    kinds = {c: [n for n, v in slaves[0].variables.items() if v.causality == c] for c in ("input", "output")}
+    signals = [v for v in slaves[0].variables.values() if v.type != "Clock"]
+    kinds = {c: [v.name for v in signals if v.causality == c] for c in ("input", "output")}
     for slave in slaves:
         slave.start({})
     moved = 0

@@ -79,7 +79,10 @@ def test_names_and_capabilities_are_those_of_2_0(built: dict[str, dict[str, Path
         assert two.model.named(kind) == three.model.named(kind)
     for variable in ("causality", "type", "variability", "start"):
         mine = {n: getattr(v, variable) for n, v in two.model.variables.items()}
+        if three.model.clocks and variable == "variability":  # what is sampled is discrete
+            mine |= dict.fromkeys(two.model.named("input"), "discrete")
         assert mine == {n: getattr(three.model.variables[n], variable) for n in mine}
+    assert set(three.model.clocks) == ({"sample"} if "sample_time" in two.model.variables else set())
     assert read_description(built["3 python"][name]).python
     assert not three.python
 

@@ -2,14 +2,16 @@
 
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.master.algorithms import GaussSeidel
+from orchestrator.master.algorithms import GaussSeidel, Jacobi
 from orchestrator.master.clocks import ClockSchedule
-from orchestrator.master.protocol import PeriodicClock
+from orchestrator.master.protocol import EventUpdate, PeriodicClock
 from orchestrator.master.session import Session
-from orchestrator.master.system import System
+from orchestrator.master.signals import Table
+from orchestrator.master.system import SignalSource, System
 from tests.support.mock_event_slave import event_instance
 from tests.support.mock_slave import instance, model, variable
 
@@ -69,3 +71,24 @@ def test_a_clock_of_a_slave_without_events_is_refused() -> None:
     system = System((instance("one", kind, lambda v, time, step: None),))
     with pytest.raises(ScenarioError, match="clock beat must be ticked in event mode"):
         Session(system, ["one.y"], GaussSeidel(0.1), 1.0)
+
+
+@pytest.mark.parametrize("algorithm", [GaussSeidel(0.1), GaussSeidel(0.3), Jacobi(0.1)])
+def test_sources_are_those_at_the_tick_wherever_it_is_in_a_step(algorithm) -> None:
+    """A clock of 0.07 s samples a ramp: each value is that of its tick."""
+    seen = []
+
+    def update(values):
+        if values["active"]:
+            seen.append((values["time"], values["x"]))
+        return EventUpdate()
+
+    clock = PeriodicClock(Fraction(7, 100), Fraction(2, 100), ("x",))
+    kind = model("one", variable("x", "input", variability="discrete"), variable("y", "output"), has_events=True,
+                 clocks={"beat": clock})  # fmt: skip
+    ramp = SignalSource("one.x", Table((0.0, 10.0), (1.0, 21.0)))
+    system = System((event_instance("one", kind, update=update),), (), (ramp,))
+    with Session(system, ["one.y"], algorithm, 0.6) as session:
+        session.run()
+    times = 0.02 + 0.07 * np.arange(9)
+    np.testing.assert_allclose(seen, np.transpose([times, 1.0 + 2.0 * times]), rtol=1e-12)

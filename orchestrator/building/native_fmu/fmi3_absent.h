@@ -48,18 +48,6 @@ EXPORT Status FMI(fmi3SetBinary)(Component c, const Reference r[], size_t n, con
     return refuse_types(s, r, n);
 }
 
-EXPORT Status FMI(fmi3GetClock)(Component c, const Reference r[], size_t n, bool v[])
-{
-    ENTER(fmi3GetClock, n == 0 || r)
-    return refuse_types(s, r, n);
-}
-
-EXPORT Status FMI(fmi3SetClock)(Component c, const Reference r[], size_t n, const bool v[])
-{
-    ENTER(fmi3SetClock, n == 0 || r)
-    return refuse_types(s, r, n);
-}
-
 UNSUPPORTED(fmi3GetNumberOfVariableDependencies, (Component c, Reference r, size_t *n))
 UNSUPPORTED(fmi3GetVariableDependencies, (Component c, Reference r, size_t of[], Reference by[], size_t elements[],
                                           int kinds[], size_t n))
@@ -71,19 +59,32 @@ UNSUPPORTED(fmi3GetAdjointDerivative, (Component c, const Reference u[], size_t 
                                        const double dk[], size_t ndk, double du[], size_t ndu))
 UNSUPPORTED(fmi3EnterConfigurationMode, (Component c))
 UNSUPPORTED(fmi3ExitConfigurationMode, (Component c))
-UNSUPPORTED(fmi3GetIntervalDecimal, (Component c, const Reference r[], size_t n, double v[], IntervalQualifier q[]))
 UNSUPPORTED(fmi3GetIntervalFraction, (Component c, const Reference r[], size_t n, uint64_t counters[],
                                       uint64_t resolutions[], IntervalQualifier q[]))
-UNSUPPORTED(fmi3GetShiftDecimal, (Component c, const Reference r[], size_t n, double v[]))
 UNSUPPORTED(fmi3GetShiftFraction, (Component c, const Reference r[], size_t n, uint64_t counters[], uint64_t resolutions[]))
-UNSUPPORTED(fmi3SetIntervalDecimal, (Component c, const Reference r[], size_t n, const double v[]))
 UNSUPPORTED(fmi3SetIntervalFraction, (Component c, const Reference r[], size_t n, const uint64_t counters[],
                                       const uint64_t resolutions[]))
-UNSUPPORTED(fmi3SetShiftDecimal, (Component c, const Reference r[], size_t n, const double v[]))
 UNSUPPORTED(fmi3SetShiftFraction, (Component c, const Reference r[], size_t n, const uint64_t counters[],
                                    const uint64_t resolutions[]))
 UNSUPPORTED(fmi3EvaluateDiscreteStates, (Component c))
 UNSUPPORTED(fmi3ActivateModelPartition, (Component c, Reference clock, double time))
+#ifndef SAMPLE_TIME
+EXPORT Status FMI(fmi3GetClock)(Component c, const Reference r[], size_t n, bool v[])
+{
+    ENTER(fmi3GetClock, n == 0 || r)
+    return refuse_types(s, r, n);
+}
+
+EXPORT Status FMI(fmi3SetClock)(Component c, const Reference r[], size_t n, const bool v[])
+{
+    ENTER(fmi3SetClock, n == 0 || r)
+    return refuse_types(s, r, n);
+}
+UNSUPPORTED(fmi3GetIntervalDecimal, (Component c, const Reference r[], size_t n, double v[], IntervalQualifier q[]))
+UNSUPPORTED(fmi3GetShiftDecimal, (Component c, const Reference r[], size_t n, double v[]))
+UNSUPPORTED(fmi3SetIntervalDecimal, (Component c, const Reference r[], size_t n, const double v[]))
+UNSUPPORTED(fmi3SetShiftDecimal, (Component c, const Reference r[], size_t n, const double v[]))
+#endif
 #ifndef CONTINUOUS_STATES
 UNSUPPORTED(fmi3GetOutputDerivatives, (Component c, const Reference r[], size_t n, const int32_t orders[], double v[],
                                        size_t total))

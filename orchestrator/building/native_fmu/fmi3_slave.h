@@ -15,6 +15,16 @@ static void deliver(const Instance *s, Status status, const char *category, cons
         s->host.log(s->host.environment, status, category, text);
 }
 
+#ifdef SAMPLE_TIME
+#include "fmi3_clock.h"
+#else
+#define misses_tick(s, time, sign) false
+#define agrees_with_clock(s) true
+#define await_first_tick(s) ((void)0)
+#define may_set_clocked(s, r, n) true
+#define end_tick(s) ((void)0)
+#endif
+
 /* --- Instances ------------------------------------------------------------------------------------------------------- */
 
 EXPORT const char *FMI(fmi3GetVersion)(void) { return "3.0"; }
@@ -23,7 +33,7 @@ EXPORT Component FMI(fmi3InstantiateCoSimulation)(String name, String token, Str
                                                   bool events, bool early_return, const Reference required[], size_t n,
                                                   void *environment, LogMessage log, IntermediateUpdate update)
 {
-    const Host host = {log, environment, update, events, early_return};
+    const Host host = {log, environment, update, events, early_return, 0.0, 0.0};
     (void)visible;
     (void)required;
     (void)n;
@@ -33,7 +43,7 @@ EXPORT Component FMI(fmi3InstantiateCoSimulation)(String name, String token, Str
 EXPORT Component FMI(fmi3InstantiateModelExchange)(String name, String token, String resources, bool visible, bool logging,
                                                    void *environment, LogMessage log)
 {
-    const Host host = {log, environment, NULL, true, false};
+    const Host host = {log, environment, NULL, true, false, 0.0, 0.0};
     const char *problem = "this FMU has no model exchange";
     (void)visible;
     (void)resources;
@@ -47,7 +57,7 @@ EXPORT Component FMI(fmi3InstantiateScheduledExecution)(String name, String toke
                                                         bool logging, void *environment, LogMessage log,
                                                         void (*update)(void *), void (*lock)(void), void (*unlock)(void))
 {
-    const Host host = {log, environment, NULL, false, false};
+    const Host host = {log, environment, NULL, false, false, 0.0, 0.0};
     (void)resources;
     (void)visible;
     (void)update;
@@ -84,8 +94,10 @@ EXPORT Status FMI(fmi3EnterInitializationMode)(Component c, bool has_tolerance, 
 EXPORT Status FMI(fmi3ExitInitializationMode)(Component c)
 {
     ENTER(fmi3ExitInitializationMode, 1)
-    if (exit_initialization(s) <= WARNING)
+    if (agrees_with_clock(s) && exit_initialization(s) <= WARNING) {
         s->course.in_event_mode = s->host.events;
+        await_first_tick(s);
+    }
     return s->worst;
 }
 
@@ -99,6 +111,7 @@ EXPORT Status FMI(fmi3Reset)(Component c)
 {
     ENTER(fmi3Reset, 1)
     begin_anew(s);
+    s->host.interval = s->host.shift = 0.0;
     return OK;
 }
 
@@ -203,6 +216,8 @@ EXPORT Status FMI(fmi3SetFloat64)(Component c, const Reference r[], size_t n, co
 {
     size_t k = 0;
     ENTER(fmi3SetFloat64, VALUES_GIVEN)
+    if (!may_set_clocked(s, r, n))
+        return s->worst;
     const int kinds = s->course.phase < STEPPING ? IS_INPUT | IS_PARAMETER : s->course.phase == STEPPING ? IS_INPUT : 0;
     s->fresh = false;
     if (n == total)

@@ -43,10 +43,9 @@ EXPORT Status FMI(fmi3UpdateDiscreteStates)(Component c, bool *again, bool *end,
 #ifdef CONTINUOUS_STATES
     if (update_slave(s, jumped) <= WARNING)
         s->course.event_due = false;
-    return s->worst;
-#else
-    return s->worst;
 #endif
+    end_tick(s);
+    return s->worst;
 }
 
 static Status leave_event_mode(Instance *s, Type type)
@@ -84,6 +83,10 @@ static double advance_piece(Instance *s, double time, double step, Fault *fault)
         return taken;
     }
 #endif
+#ifdef SAMPLE_TIME
+    if (s->host.events)
+        return step;
+#endif
     advance_slave(s, time, step, fault);
     return step;
 }
@@ -110,6 +113,8 @@ EXPORT Status FMI(fmi3DoStep)(Component c, double time, double step, bool no_ret
         say(s, ERROR, "%s must not be called before the event has been handled in event mode", s->function);
         return s->worst;
     }
+    if (misses_tick(s, time + step, 1.0))
+        return s->worst;
 #ifdef CONTINUOUS_STATES
     if (s->host.update)
         taken = advance_with_updates(s, time, step, &fault);

@@ -16,13 +16,15 @@ typedef void (*LogMessage)(void *environment, Status status, String category, St
 typedef void (*IntermediateUpdate)(void *environment, double time, bool set_requested, bool get_allowed, bool finished,
                                    bool can_return_early, bool *return_requested, double *return_time);
 
-/* What an instance was made with. */
+/* What an instance was made with, and what has been set for its clock. */
 typedef struct {
     LogMessage log;
     void *environment;
     IntermediateUpdate update;
     bool events;
     bool early_return;
+    double interval; /* [s]; 0: as described */
+    double shift;    /* [s] */
 } Host;
 
 #endif

@@ -28,7 +28,8 @@ class EventDriver(Driver):
     """A driver with event mode and clocks.
 
     ``memory`` holds "next" (time of the next event that the FMU knows [s]), "ticks" (time of the next tick by reference
-    of the clock), "periods" (interval by reference) and "held" (values of clocked variables at their last tick).
+    of the clock), "periods" (interval by reference), "held" (values of clocked variables at their last tick) and
+    "given" (values that clocked inputs get at ticks, by reference; else their start values).
     """
 
     def start_clocks(self) -> None:
@@ -164,8 +165,9 @@ class EventDriver(Driver):
         """Set and read the variables of the clocks that are active."""
         clocked = [v for v in self.job.variables if v.clocks and active & set(v.clocks) and v.base != "Clock"]
         for v in clocked:
-            if v.causality == "input" and v.start is not None:
-                self.set([v], v.start, when)
+            value = self.memory.get("given", {}).get(v.reference, v.start)
+            if v.causality == "input" and value is not None:
+                self.set([v], value, when)
         held = dict(self.memory.get("held", {}))
         for v in clocked:
             if v.causality == "output":

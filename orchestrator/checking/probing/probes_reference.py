@@ -71,9 +71,9 @@ def _simulate(context: Context, rows: Sequence[Row], parameters: Columns, inputs
     variables = list(dict.fromkeys(v for _, v in tube.columns))
     budget = Stopwatch(_PATIENCE * job.budget)
     with bench.instance(initialised=False) as driver:
-        _set(driver, parameters, rows[0])
+        _set(driver, parameters, rows[0], initial=True)
         driver.enter_initialisation(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]))
-        _set(driver, inputs, rows[0])
+        _set(driver, inputs, rows[0], initial=True)
         driver.exit_initialisation()
         tube.compare(driver.read(variables, "after initialisation"), rows[0])
         for row, following in pairwise(rows):
@@ -100,10 +100,16 @@ def _advance(driver: Driver, t: float, end: float, step: float) -> None:
         driver.advance(a, b - a, f"at t = {a:g}")
 
 
-def _set(driver: Driver, columns: Columns, row: Row) -> None:
+def _set(driver: Driver, columns: Columns, row: Row, initial: bool = False) -> None:
+    """Set the values of a row; those of clocks at the ticks until the next row, and in initialisation mode."""
+    given = dict(driver.memory.get("given", {}))
     for v in dict.fromkeys(v for _, v in columns):
         values = [row[i] if v.real else int(row[i]) for i, other in columns if other is v]
-        driver.set([v], values, f"at t = {row[0]:g}")
+        if v.clocks:
+            given[v.reference] = values
+        if initial or not v.clocks:
+            driver.set([v], values, f"at t = {row[0]:g}")
+    driver.memory["given"] = given
 
 
 def _half_width(column: list[float], v: ProbedVariable) -> float:
