@@ -77,10 +77,10 @@ def diagnose(
         settings.selection if search and gap is None else msgspec.structs.replace(settings.selection, most_effects=0)
     )
     problem = fit_problem(models, settings.fit)
-    found = search_effects(problem, chosen, progress, lambda: bool(time.monotonic() > until))
-    points = (found.problem.start, found.base.point, found.final.point)
+    result = search_effects(problem, chosen, progress, lambda: bool(time.monotonic() > until))
+    points = (result.problem.start, result.base.point, result.final.point)
     nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
-    workings = Workings(fitted, test_data, found, tuple(models), nominal, base, final)
+    workings = Workings(fitted, test_data, result, tuple(models), nominal, base, final)
     if gap is not None:
         values = model.plant.extended(gap.values.tolist())
         return _report_hidden_gap(replace(workings, final=values), gap, model, settings)
@@ -108,42 +108,42 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     searched = workings.search
     record = record_evidence(searched)
     evidence = [effect_evidence(searched, label) for label in searched.final.labels]
-    found, evidence = leave_out_possible(searched, evidence, record, settings)
-    final = workings.balances[0].physical_values(found.problem.record_points(found.final.point)[0])
-    workings = replace(workings, search=found, final=final)
+    result, evidence = leave_out_possible(searched, evidence, record, settings)
+    final = workings.balances[0].physical_values(result.problem.record_points(result.final.point)[0])
+    workings = replace(workings, search=result, final=final)
     test = misfit_on_test_data(workings, model, settings)
     compared = torque_comparison(workings, test, model, settings)
-    labels = found.final.labels
+    labels = result.final.labels
     graded = tuple(
-        _graded(found if one.label in labels else searched, one, record, model, settings, one.label in labels)
-        for one in add_test_evidence(evidence, found, test, misses_of(workings, model, settings), compared)
+        _graded(result if one.label in labels else searched, one, record, model, settings, one.label in labels)
+        for one in add_test_evidence(evidence, result, test, misses_of(workings, model, settings), compared)
     )
     graded = share_values(graded, labels, model.plant)
-    effects = tuple(sorted((one for one in graded if not one.of_log), key=lambda one: -one.grade))
-    parameters = parameter_estimates(found.problem, found.final, settings.report.level)
+    effects = tuple(sorted((effect for effect in graded if not effect.of_log), key=lambda effect: -effect.grade))
+    parameters = parameter_estimates(result.problem, result.final, settings.report.level)
     parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}
     arguments = law_arguments(
-        workings.balances, found.problem.record_points(found.final.point), metric=in_metres(model)
+        workings.balances, result.problem.record_points(result.final.point), metric=in_metres(model)
     )
-    remaining = find_dependences(found, arguments, settings.selection)
-    verdict = form_verdict(found, graded, remaining, record, settings)
+    remaining = find_dependences(result, arguments, settings.selection)
+    verdict = form_verdict(result, graded, remaining, record, settings)
     trust = judge_trust(verdict, graded, bool(searched.steps), record, test, parameters, model.uncertain, settings)
-    left = torque_shares(found.problem, found.final.point)
+    left = torque_shares(result.problem, result.final.point)
     return Diagnosis(
-        verdict=verdict, effects=effects, nuisances=_nuisances(found, graded, parameters, model, settings),
+        verdict=verdict, effects=effects, nuisances=_nuisances(result, graded, parameters, model, settings),
         parameters=parameters, left=dict(zip(workings.balances[0].channels, map(float, left), strict=True)),
         remaining=remaining, law=_law(verdict, remaining, settings), test=test, record=record, trust=trust,
-        notes=_notes(found, record, test), settings=settings, searched=bool(searched.steps),
+        notes=_notes(result, record, test), settings=settings, searched=bool(searched.steps),
         model=model, workings=workings,
     )  # fmt: skip
 
 
 def _graded(
-    found: SearchResult, evidence: EffectEvidence, record: RecordEvidence, model: Model, settings: DiagnosisSettings,
+    result: SearchResult, evidence: EffectEvidence, record: RecordEvidence, model: Model, settings: DiagnosisSettings,
     in_model: bool,
 ) -> GradedEffect:  # fmt: skip
     plant = model.plant
-    effect = found.problem.effects[evidence.label]
+    effect = result.problem.effects[evidence.label]
     row = next(row for row in plant.bank if row.label == evidence.label)
 
     def named(values: Values) -> Mapping[str, float]:
@@ -151,15 +151,15 @@ def _graded(
         return {short: full[name] for short, name in row.parameters.items()}
 
     units = {short: unit_in(plant.entry(place).unit, model, short) for short, place in row.places(plant).items()}
-    return replace(report_effect(found, evidence, named, units, record, settings, in_model), of_log=row.measurement)
+    return replace(report_effect(result, evidence, named, units, record, settings, in_model), of_log=row.measurement)
 
 
 def _nuisances(
-    found: SearchResult, graded: Sequence[GradedEffect], parameters: Mapping[str, ParameterEstimate], model: Model,
+    result: SearchResult, graded: Sequence[GradedEffect], parameters: Mapping[str, ParameterEstimate], model: Model,
     settings: DiagnosisSettings,
 ) -> tuple[Nuisance, ...]:  # fmt: skip
     nuisances = [Nuisance(one.name, one.grade, one.parameters, one.lowered_by) for one in graded if one.of_log]
-    width = interval_width(found.problem, settings.report.level)
+    width = interval_width(result.problem, settings.report.level)
     gain = find_drive_gain(model, {name: one.value for name, one in parameters.items()}, width)
     if gain is not None:
         nuisances.append(Nuisance("drive_gain", Grade.LIKELY, {"gain": gain}))
@@ -175,13 +175,13 @@ def _law(verdict: str, remaining: Sequence[Dependence], settings: DiagnosisSetti
     return best if strong and best.code else None
 
 
-def _notes(found: SearchResult, record: RecordEvidence, test: Sequence[TestMisfit]) -> tuple[str, ...]:
+def _notes(result: SearchResult, record: RecordEvidence, test: Sequence[TestMisfit]) -> tuple[str, ...]:
     notes = [
         f"nothing moves in the last {one.rows} rows of {one.source}, which are its test part: the test says nothing"
         for one in test
         if one.still
     ]
-    if not found.complete:
+    if not result.complete:
         notes.append("the time limit ended the search: effects that were not tried may be missing")
     if record.inertia_error > record.inertia:
         notes.append("the record does not show its inertia: it needs accelerations, or a torque in its true unit")

@@ -39,7 +39,6 @@ class Terminal:
     Attributes:
         rule: how members are matched: ``plug``, ``bus``, ``sequence``, ``none`` or one of the FMU's own.
         kind: what others it fits; empty: any.
-        members: in their order.
         parts: terminals within it, by name.
     """
 
@@ -94,7 +93,6 @@ class TerminalEnd:
 
     Attributes:
         address: ``instance.terminal``, for messages.
-        instance: its name.
     """
 
     address: str
@@ -162,10 +160,10 @@ def _matched(first: TerminalEnd, second: TerminalEnd) -> tuple[list[tuple[Member
     return [(m, by_name[m.name]) for m in first.terminal.members if m.name in by_name], problems
 
 
-def _joined(first: TerminalEnd, one: Member, second: TerminalEnd, other: Member) -> tuple[list[Joint], list[str]]:
+def _joined(first: TerminalEnd, left: Member, second: TerminalEnd, right: Member) -> tuple[list[Joint], list[str]]:
     """Return the connections of two members, several where they are arrays, and what is wrong with them."""
-    name = one.name or one.variable
-    ends = [(first, one), (second, other)]
+    name = left.name or left.variable
+    ends = [(first, left), (second, right)]
     shown = [f"{end.instance}.{member.variable}" for end, member in ends]
     found = [_variables(end.model, member.variable) for end, member in ends]
     for (end, _), variables, address in zip(ends, found, shown, strict=True):
@@ -177,9 +175,9 @@ def _joined(first: TerminalEnd, one: Member, second: TerminalEnd, other: Member)
         sizes = [f"{address} has {len(variables)}" for variables, address in zip(found, shown, strict=True)]
         return [], [f"member {name} must have as many elements in both, but {' and '.join(sizes)}"]
     flows = [member.kind in FLOWS for _, member in ends]
-    if flows[0] != flows[1] or (not flows[0] and one.kind != other.kind):
-        return [], [f"member {name} must be of one kind, but {shown[0]} is {one.kind} and {shown[1]} is {other.kind}"]
-    factor = -1.0 if flows[0] and one.kind == other.kind else 1.0  # flows into all terminals add up to zero
+    if flows[0] != flows[1] or (not flows[0] and left.kind != right.kind):
+        return [], [f"member {name} must be of one kind, but {shown[0]} is {left.kind} and {shown[1]} is {right.kind}"]
+    factor = -1.0 if flows[0] and left.kind == right.kind else 1.0  # flows into all terminals add up to zero
     causalities = [variables[0].causality for variables in found]
     if sorted(causalities) != ["input", "output"]:
         text = f"member {name} must be an output of one and an input of the other"

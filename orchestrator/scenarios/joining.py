@@ -16,7 +16,6 @@ def joined(
 
     Args:
         joints: for each pair the place where it is asked for, and the terminals, ``instance.terminal``.
-        problems: is added to.
     """
     found = []
     used: dict[str, str] = {}

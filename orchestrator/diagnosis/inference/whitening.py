@@ -180,7 +180,7 @@ def _most_likely_levels(
     process = common * ones
     for n in range(scale.size if scale.size > 1 else 0):  # torques at one body need not be those at another
         trials = [np.where(np.arange(scale.size) == n, part, process) for part in shares]
-        process = min(trials, key=lambda one: cost(measurement, one))
+        process = min(trials, key=lambda trial: cost(measurement, trial))
     return measurement * sources.levels, np.maximum(process * scale, sources.floors)
 
 

@@ -18,10 +18,8 @@ class UncertainParameter:
     """A parameter that is fitted with every model.
 
     Attributes:
-        name: of the parameter.
         nominal: value before the record; the fit moves in shares of it.
         spread: how far it may be off, as a share: the prior is log-normal with standard deviation ``log(1 + spread)``.
-        unit: of the value.
         local: it belongs to one record alone, may have any value, and ``nominal`` is only its scale; the prior is
             normal
             about zero.
@@ -117,15 +115,7 @@ class CandidateEffect:
         return self.label.partition("@")[2]
 
     def bounded(self, place: int, value: float) -> float:
-        """Return a value within its bounds.
-
-        Args:
-            place: of the value.
-            value: to bound.
-
-        Returns:
-            The bounded value.
-        """
+        """Return a value within its bounds."""
         low = self.lower[place] if self.lower else -np.inf
         high = self.upper[place] if self.upper else np.inf
         return min(max(value, low), high)
@@ -140,37 +130,15 @@ class ModelPoint:
 
     @staticmethod
     def nominal(parameters: Sequence["UncertainParameter"]) -> "ModelPoint":
-        """Return the nominal values of parameters, those of a record alone at zero, without effects.
-
-        Args:
-            parameters: of the model.
-
-        Returns:
-            The point.
-        """
+        """Return the nominal values of parameters, those of a record alone at zero, without effects."""
         return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in parameters))
 
     def with_effect(self, label: str, values: Values) -> "ModelPoint":
-        """Return the point with an effect added or moved.
-
-        Args:
-            label: of the effect.
-            values: of it.
-
-        Returns:
-            The new point.
-        """
+        """Return the point with an effect added or moved."""
         return ModelPoint(self.parameters, {**self.effects, label: values})
 
     def without_effects(self, labels: Sequence[str]) -> "ModelPoint":
-        """Return the point without some effects.
-
-        Args:
-            labels: of the effects.
-
-        Returns:
-            The new point.
-        """
+        """Return the point without some effects."""
         return ModelPoint(self.parameters, {name: v for name, v in self.effects.items() if name not in labels})
 
 
@@ -196,7 +164,6 @@ class LawArgument:
     """A signal that a torque which no effect explains may follow.
 
     Attributes:
-        name: in words.
         site: where the torque then acts.
         unit, torque_unit: of the signal and of the torque.
         values: (n,) of each record.
@@ -219,7 +186,6 @@ class ResidualModel(Protocol):
     Attributes:
         channels: names of the residuals.
         step: sample time [s] of the residuals.
-        size: rows of them.
         cutoffs: (channels,) highest frequency [Hz] at which each residual says something.
         parameters: uncertain parameters; local ones last.
         effects: by label, in the order in which they are tried.
@@ -271,8 +237,6 @@ class ResidualModel(Protocol):
         """Tell whether a machine can have an effect of such values, and the record can show it.
 
         Args:
-            label: of the effect.
-            values: of it.
 
         Returns:
             False for sizes that no machine has, or that act nowhere in the record.
@@ -283,9 +247,6 @@ class ResidualModel(Protocol):
 
         Args:
             point: values of the model.
-
-        Returns:
-            The signals.
         """
 
     def inertia_shares(self) -> Mapping[str, float]:
@@ -300,7 +261,4 @@ class ResidualModel(Protocol):
 
         Args:
             spread: of every parameter, as a share.
-
-        Returns:
-            A copy.
         """

@@ -28,13 +28,13 @@ Array = NDArray[np.float64]
 def parameter_estimates(problem: FitProblem, fitted: FittedModel, level: float) -> dict[str, ParameterEstimate]:
     """Return the estimates of the model's own parameters."""
     covariance, width = value_covariance(fitted), interval_width(problem, level)
-    found = {}
+    result = {}
     for n, entry in enumerate(problem.shared):
         value = fitted.point.parameters[n]
         error = abs(entry.nominal) * float(np.sqrt(covariance[n, n]))
         interval = (value - width * error, value + width * error)
-        found[entry.name] = ParameterEstimate(value, error, interval, entry.unit, entry.nominal)
-    return found
+        result[entry.name] = ParameterEstimate(value, error, interval, entry.unit, entry.nominal)
+    return result
 
 
 def effect_estimates(
@@ -57,11 +57,11 @@ def effect_estimates(
         step = 1e-4 * effect.scales[place]
         moved = names((*values[:place], values[place] + step, *values[place + 1 :]))
         slopes[:, n] = [(_wrapped(name, moved[name] - centre[name])) / 1e-4 for name in centre]
-    found = {}
+    result = {}
     variances = np.einsum("pc,cd,pd->p", slopes, covariance, slopes)
     for error, (name, value) in zip(np.sqrt(np.maximum(variances, 0.0)).tolist(), centre.items(), strict=True):
-        found[name] = ValueEstimate(value, error, (value - width * error, value + width * error), units[name])
-    return found
+        result[name] = ValueEstimate(value, error, (value - width * error, value + width * error), units[name])
+    return result
 
 
 def block_values(
@@ -107,7 +107,7 @@ def _wrapped(name: str, difference: float) -> float:
 
 
 def report_effect(
-    found: SearchResult, evidence: EffectEvidence, names: Callable[[Values], Mapping[str, float]],
+    result: SearchResult, evidence: EffectEvidence, names: Callable[[Values], Mapping[str, float]],
     units: Mapping[str, str], record: RecordEvidence, settings: DiagnosisSettings, in_model: bool,
 ) -> GradedEffect:  # fmt: skip
     """Return an effect as it is reported.
@@ -118,8 +118,8 @@ def report_effect(
     label = evidence.label
     name, _, site = label.partition("@")
     grade, lowered = grade_effect(evidence, record, settings)
-    estimates = effect_estimates(found.problem, found.final, label, names, units, settings.report.level)
-    blocks = block_values(found.problem, found.final, label, names)
+    estimates = effect_estimates(result.problem, result.final, label, names, units, settings.report.level)
+    blocks = block_values(result.problem, result.final, label, names)
     return GradedEffect(name, site, grade, lowered, estimates, evidence, blocks, in_model=in_model)
 
 
@@ -143,7 +143,7 @@ def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: 
 
 
 def add_test_evidence(
-    evidence: Sequence[EffectEvidence], found: SearchResult, test: Sequence[TestMisfit],
+    evidence: Sequence[EffectEvidence], result: SearchResult, test: Sequence[TestMisfit],
     missed: Callable[[ModelPoint], float],
     compared: Callable[[ModelPoint], ScoreComparison | None] = lambda point: None,
 ) -> list[EffectEvidence]:  # fmt: skip
@@ -155,14 +155,14 @@ def add_test_evidence(
     """
     final = sum((one.final / one.noise) ** 2 for record in test for one in record.signals)
 
-    def tested(one: EffectEvidence) -> EffectEvidence:
-        if one.label not in found.final.labels:
-            return one
-        without = fit_model(found.problem, found.final.point.without_effects([one.label]), 3).point
+    def tested(effect: EffectEvidence) -> EffectEvidence:
+        if effect.label not in result.final.labels:
+            return effect
+        without = fit_model(result.problem, result.final.point.without_effects([effect.label]), 3).point
         misses = missed(without)
         astray = not math.isfinite(misses)  # which the final model is not: the effect explains all of it
         share = 1.0 if astray else 1.0 - final / max(misses, 1e-300)
-        return replace(one, motion_share=share if math.isfinite(final) else math.nan, test_torque=compared(without))
+        return replace(effect, motion_share=share if math.isfinite(final) else math.nan, test_torque=compared(without))
 
     return list(map(tested, evidence))
 

@@ -68,7 +68,6 @@ def free_run(
 
     Args:
         guess: (8,) first guess of the state at the part's first sample.
-        part: samples to simulate.
     """
     model = Simulation(plant, p, signals, history)
     first = _closest(model, guess, part)
@@ -195,7 +194,7 @@ def free_runs(
     def run(part: slice) -> FreeRun:
         guesses = start_guesses(plant, p, signals, part.start)
         runs = [free_run(plant, p, guess, signals, part, history) for guess in guesses]
-        return min(runs, key=lambda one: float(np.sum((one.rms / signals.noise) ** 2)))
+        return min(runs, key=lambda run: float(np.sum((run.rms / signals.noise) ** 2)))
 
     return spread(run, list(parts))
 

@@ -99,11 +99,16 @@ def _values(parameters: Mapping[str, ValueEstimate]) -> dict[str, ValueFound]:
     }
 
 
-def dependence_found(one: Dependence) -> DependenceFound:
+def dependence_found(dependence: Dependence) -> DependenceFound:
     """Return what is left and follows a signal as results have it."""
-    comparison = one.comparison
+    comparison = dependence.comparison
     return DependenceFound(
-        one.site, one.argument, _finite(one.share), _finite(comparison.gain), _finite(comparison.t), one.formula
+        dependence.site,
+        dependence.argument,
+        _finite(dependence.share),
+        _finite(comparison.gain),
+        _finite(comparison.t),
+        dependence.formula,
     )
 
 

@@ -13,7 +13,7 @@ from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 
 def form_verdict(
-    found: SearchResult, effects: Sequence[GradedEffect], dependences: Sequence[Dependence], record: RecordEvidence,
+    search: SearchResult, effects: Sequence[GradedEffect], dependences: Sequence[Dependence], record: RecordEvidence,
     settings: DiagnosisSettings,
 ) -> str:  # fmt: skip
     """Return the verdict.
@@ -29,20 +29,20 @@ def form_verdict(
         one.comparison.t >= settings.grades.likely_t and one.comparison.gain >= settings.report.law_gain
         for one in dependences
     )
-    if effects or strong or not found.complete or record.left > settings.grades.timing_left:
+    if effects or strong or not search.complete or record.left > settings.grades.timing_left:
         return "unknown"
-    return "none" if _nominal_explains(found) else "parameters"
+    return "none" if _nominal_explains(search) else "parameters"
 
 
-def _nominal_explains(found: SearchResult) -> bool:
+def _nominal_explains(search: SearchResult) -> bool:
     """Tell whether the nominal model explains the record as well as re-fitted parameters do: by three for each of them.
 
     What a record begins with is no property of the model, and stays as it was fitted.
     """
-    problem, count = found.problem, len(found.problem.shared)
-    start = ModelPoint((*problem.start.parameters[:count], *found.final.point.parameters[count:]))
+    problem, count = search.problem, len(search.problem.shared)
+    start = ModelPoint((*problem.start.parameters[:count], *search.final.point.parameters[count:]))
     (nominal,) = problem.whitened([start])
-    return float(nominal @ nominal) - found.final.cost < 3.0 * count
+    return float(nominal @ nominal) - search.final.cost < 3.0 * count
 
 
 def judge_trust(

@@ -157,7 +157,6 @@ class Simulation:
 
         Args:
             start: (8,) state at the part's first sample.
-            part: samples to simulate.
 
         Returns:
             The angles [rad].
@@ -225,7 +224,6 @@ def simulate(plant: Plant, p: Array, start: Array, signals: RunSignals, part: sl
 
     Args:
         start: (8,) state at the part's first sample.
-        part: samples to simulate.
 
     Returns:
         The angles [rad].

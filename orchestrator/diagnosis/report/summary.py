@@ -56,42 +56,42 @@ NOTABLE_CHANGE = 0.005  # of a value that is worth a word
 REPEAT = "the same torque twice: what comes again is the machine, what does not is a disturbance"
 
 
-def summarise(found: Diagnosis) -> Iterator[str]:
+def summarise(diagnosis: Diagnosis) -> Iterator[str]:
     """Yield the answer of a diagnosis, a sentence or two a line."""
-    yield headline(found)
-    for effect in found.effects:
-        yield from _effect(effect, found)
-    for nuisance in found.nuisances:
+    yield headline(diagnosis)
+    for effect in diagnosis.effects:
+        yield from _effect(effect, diagnosis)
+    for nuisance in diagnosis.nuisances:
         yield f"  In the log: {nuisance_words(nuisance)}"
-    yield from _values(found)
-    yield _left(found)
-    yield from _motion(found)
-    yield from next_steps(found)
+    yield from _values(diagnosis)
+    yield _left(diagnosis)
+    yield from _motion(diagnosis)
+    yield from next_steps(diagnosis)
 
 
-def summarise_fmu(found: DiagnosisOutcome) -> Iterator[str]:
+def summarise_fmu(diagnosis: DiagnosisOutcome) -> Iterator[str]:
     """Yield the answer of a diagnosis of any FMU, a sentence or two a line.
 
     Yields:
         The verdict; for each effect its size and how sure it is; what is left; the misfit on test data.
     """
-    yield headline(found, "FMU")
-    for effect in found.effects:
+    yield headline(diagnosis, "FMU")
+    for effect in diagnosis.effects:
         yield sizes_line(effect)
         yield f"    {sureness(effect)}"
         yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{test_words(effect)}."
-    left = " and ".join(f"{left_percent(share)} of {name}" for name, share in found.left.items())
-    strongest = [f"at {one.site} {one.words}" for one in found.remaining[:2]]
+    left = " and ".join(f"{left_percent(share)} of {name}" for name, share in diagnosis.left.items())
+    strongest = [f"at {one.site} {one.words}" for one in diagnosis.remaining[:2]]
     follows = "; ".join(strongest) if strongest else "it follows no signal"
     yield f"What is left (rms, where the model was fitted): {left}; {follows}."
-    for test in found.test:
+    for test in diagnosis.test:
         parts = [
             f"{one.signal} {one.nominal / one.noise:.3g} -> {one.final / one.noise:.3g} times its noise"
             for one in test.signals
         ]
         rows = f"{test.rows} rows that nothing was fitted to"
         yield f"Test data of {test.source} ({rows}), rms of runs: {'; '.join(parts)}."
-    yield from next_steps(found)
+    yield from next_steps(diagnosis)
 
 
 def effect_words(label: str) -> str:
@@ -108,44 +108,45 @@ def listed(labels: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
 
-def headline(found: DiagnosisOutcome, subject: str = "model") -> str:
+def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
     """Return the verdict in one sentence."""
-    if found.verdict in ("none", "parameters") and found.misses_test_data:
+    if diagnosis.verdict in ("none", "parameters") and diagnosis.misses_test_data:
         return (
-            f"Verdict: {found.verdict}. No effect of the library is missing, yet the {subject} misses the test data by "
-            f"{found.largest_miss:.3g} times the noise: a disturbance, or an effect outside the library."
+            f"Verdict: {diagnosis.verdict}. No effect of the library is missing, yet the {compared} misses the test "
+            f"data by {diagnosis.largest_miss:.3g} times the noise: a disturbance, or an effect outside the library."
         )
-    if found.verdict == "none":
-        return f"Verdict: none. Nothing is missing: the {subject} explains the record."
-    if found.verdict == "parameters":
+    if diagnosis.verdict == "none":
+        return f"Verdict: none. Nothing is missing: the {compared} explains the record."
+    if diagnosis.verdict == "parameters":
         return (
-            f"Verdict: parameters. Nothing is missing: the {subject} explains the record once its values are re-fitted."
+            f"Verdict: parameters. Nothing is missing: the {compared} explains the record once its values are "
+            "re-fitted."
         )
-    if found.verdict == "effects":
-        named = [effect.label for effect in found.graded(Grade.LIKELY)]
+    if diagnosis.verdict == "effects":
+        named = [effect.label for effect in diagnosis.graded(Grade.LIKELY)]
         return (
-            f"Verdict: effects. The {subject} lacks {listed(named)}."
+            f"Verdict: effects. The {compared} lacks {listed(named)}."
             if named
             else "Verdict: effects, in the log alone."
         )
-    near = [effect.label for effect in found.effects]
-    why = "no effect of the library is likely" if found.searched else "no search was made"
-    text = f"Verdict: unknown. The {subject} misses something, and {why}."
+    near = [effect.label for effect in diagnosis.effects]
+    why = "no effect of the library is likely" if diagnosis.searched else "no search was made"
+    text = f"Verdict: unknown. The {compared} misses something, and {why}."
     return text + (f" Possible: {listed(near)}." if near else "")
 
 
-def play_of(found: Diagnosis) -> Play | None:
+def play_of(diagnosis: Diagnosis) -> Play | None:
     """Return the size of the backlash that was named; None: none is likely."""
-    gap = next((effect for effect in found.graded(Grade.LIKELY) if effect.name == "backlash"), None)
+    gap = next((effect for effect in diagnosis.graded(Grade.LIKELY) if effect.name == "backlash"), None)
     if gap is None:
         return None
-    plant: Plant = found.model.plant
-    return Play(gap.parameters["alpha"].value, plant.ratio(found.workings.final))
+    plant: Plant = diagnosis.model.plant
+    return Play(gap.parameters["alpha"].value, plant.ratio(diagnosis.workings.final))
 
 
-def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
+def _effect(effect: GradedEffect, diagnosis: Diagnosis) -> Iterator[str]:
     yield sizes_line(effect)
-    play = play_of(found)
+    play = play_of(diagnosis)
     if effect.name == "backlash" and play is not None:
         yield f"    {play}"
     yield f"    {sureness(effect)}"
@@ -227,11 +228,11 @@ def nuisance_words(nuisance: Nuisance) -> str:
     return f"`theta_l` is stamped {size} {'later' if e.value > 0.0 else 'earlier'} than `theta_m`{sure}"
 
 
-def _values(found: Diagnosis) -> Iterator[str]:
+def _values(diagnosis: Diagnosis) -> Iterator[str]:
     changed = []
-    for name, e in found.parameters.items():
+    for name, e in diagnosis.parameters.items():
         if e.nominal and abs(e.value / e.nominal - 1.0) >= NOTABLE_CHANGE:
-            stated = found.model.parameters[name].uncertainty
+            stated = diagnosis.model.parameters[name].uncertainty
             unit = "" if e.unit == "1" else f" {e.unit}"
             outside = f", stated within {100.0 * stated / abs(e.nominal):.3g} %" if stated else ""
             changed.append(f"{name} {e.value:.4g}{unit} ({100.0 * (e.value / e.nominal - 1.0):+.3g} %{outside})")
@@ -239,12 +240,14 @@ def _values(found: Diagnosis) -> Iterator[str]:
         yield f"Values of the model that were re-fitted: {', '.join(changed)}."
 
 
-def _left(found: Diagnosis) -> str:
-    if not found.left:
+def _left(diagnosis: Diagnosis) -> str:
+    if not diagnosis.left:
         return "What is left is noise."
-    parts = [f"{left_percent(share)} of the torque at {BODIES.get(name, name)}" for name, share in found.left.items()]
+    parts = [
+        f"{left_percent(share)} of the torque at {BODIES.get(name, name)}" for name, share in diagnosis.left.items()
+    ]
     text = f"What is left (rms, where the model was fitted): {' and '.join(parts)}"
-    strongest = [f"at {BODIES.get(one.site, one.site)} {one.words}" for one in found.remaining[:2]]
+    strongest = [f"at {BODIES.get(one.site, one.site)} {one.words}" for one in diagnosis.remaining[:2]]
     return f"{text}; {'; '.join(strongest)}." if strongest else f"{text}; it follows no signal."
 
 
@@ -253,8 +256,8 @@ def left_percent(power: float) -> str:
     return f"{100.0 * math.sqrt(power):.2g} %"
 
 
-def _motion(found: Diagnosis) -> Iterator[str]:
-    for test in found.test:
+def _motion(diagnosis: Diagnosis) -> Iterator[str]:
+    for test in diagnosis.test:
         parts = [
             f"{SIGNALS.get(one.signal, one.signal)} {one.nominal:.3g} -> {one.final:.3g} {one.unit} "
             f"(noise {one.noise:.2g})"
@@ -264,20 +267,20 @@ def _motion(found: Diagnosis) -> Iterator[str]:
         yield f"Test data of {test.source} ({rows}), rms of free runs: {'; '.join(parts)}."
 
 
-def next_steps(found: DiagnosisOutcome) -> Iterator[str]:
+def next_steps(diagnosis: DiagnosisOutcome) -> Iterator[str]:
     """Yield which record would settle what is open.
 
     Yields:
         A sentence each; one at least.
     """
     open_questions: dict[str, list[str]] = {}
-    for effect in found.effects:
+    for effect in diagnosis.effects:
         if effect.grade is not Grade.CERTAIN or effect.evidence.family:
             experiment = EXPERIMENTS.get(effect.evidence.kind, REPEAT)
             open_questions.setdefault(experiment, []).append(effect.label)
-    if found.misses_test_data or found.verdict == "unknown":
+    if diagnosis.misses_test_data or diagnosis.verdict == "unknown":
         yield f"Next: record {REPEAT}."
     for experiment, labels in open_questions.items():
         yield f"Next, to settle {listed(labels)}: record {experiment}."
-    if not open_questions and found.verdict == "effects":
+    if not open_questions and diagnosis.verdict == "effects":
         yield "Next: judge the corrected model on another record of the machine, without a search."

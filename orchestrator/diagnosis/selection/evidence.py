@@ -19,25 +19,25 @@ Array = NDArray[np.float64]
 FREE_SPREAD = 30.0  # of a parameter whose prior is off
 
 
-def record_evidence(found: SearchResult) -> RecordEvidence:
+def record_evidence(result: SearchResult) -> RecordEvidence:
     """Return what the record says of the final model as a whole."""
-    problem = found.problem
-    left = torque_shares(problem, found.final.point)
-    inertia, error, spread = recorded_inertia(problem, found.final)
+    problem = result.problem
+    left = torque_shares(problem, result.final.point)
+    inertia, error, spread = recorded_inertia(problem, result.final)
     if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
         spread = np.inf
     return RecordEvidence(float(left.max()), inertia, error, spread)
 
 
-def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
+def effect_evidence(result: SearchResult, label: str) -> EffectEvidence:
     """Return what speaks for one effect of the final model."""
-    problem, final, review = found.problem, found.final, found.reviews[label]
+    problem, final, review = result.problem, result.final, result.reviews[label]
     effect = problem.effects[label]
-    step = next((step for step in found.steps if step.taken == label), review)
+    step = next((step for step in result.steps if step.taken == label), review)
     leaving, entry = review.entry, step.entry
     assert leaving is not None
     assert entry is not None
-    base = missing_torque(problem, found.base.point)
+    base = missing_torque(problem, result.base.point)
     shares = [
         (missing_torque(problem, before.point) - missing_torque(problem, after.point)) / base
         for before, after in ((review.before, final), (step.before, entry.fitted))
@@ -127,13 +127,13 @@ def leave_out_possible(
     Returns:
         The result, and the evidence with the sizes there.
     """
-    found = searched
+    result = searched
     while labels := [
         one.label
         for one in evidence
-        if one.label in found.final.labels and grade_effect(one, record, settings)[0] is Grade.POSSIBLE
+        if one.label in result.final.labels and grade_effect(one, record, settings)[0] is Grade.POSSIBLE
     ]:
-        found = leave_out(found, labels)
-        sizes = {label: size_over_error(found.problem, found.final, label) for label in found.final.labels}
+        result = leave_out(result, labels)
+        sizes = {label: size_over_error(result.problem, result.final, label) for label in result.final.labels}
         evidence = [replace(one, size_t=min(one.size_t, sizes.get(one.label, np.inf))) for one in evidence]
-    return found, list(evidence)
+    return result, list(evidence)

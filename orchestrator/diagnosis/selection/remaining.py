@@ -1,7 +1,7 @@
 """What a final model leaves, and which signals that follows: curves between knots, judged on blocks left out.
 
 A torque that depends on one signal is a sum of straight lines between knots. The values at the knots enter the balances
-linearly: they are found beside the model's own values by one set of normal equations, and judged by the score of every
+linearly: they are result beside the model's own values by one set of normal equations, and judged by the score of every
 effect. The strongest of these dependences is the law that is learned where no effect of the bank explains the record.
 """
 
@@ -28,15 +28,15 @@ RIDGE = 1e-9  # of the trace: knots that no row reaches stay where their neighbo
 
 
 def find_dependences(
-    found: SearchResult, arguments: Sequence[LawArgument], settings: SelectionSettings
+    result: SearchResult, arguments: Sequence[LawArgument], settings: SelectionSettings
 ) -> tuple[Dependence, ...]:
     """Return what the final model leaves and which signals it follows, strongest first."""
-    tried = [_fit_curve(found, argument) for argument in arguments]
+    tried = [_fit_curve(result, argument) for argument in arguments]
     kept = [
         one for one in tried
         if one is not None and one.comparison.t >= settings.least_t and one.comparison.gain >= settings.least_gain
     ]  # fmt: skip
-    return tuple(sorted(kept, key=lambda one: -one.comparison.gain))
+    return tuple(sorted(kept, key=lambda curve: -curve.comparison.gain))
 
 
 def knots_of(values: Array) -> Array | None:
@@ -62,15 +62,15 @@ def hats(knots: Array, values: Array) -> Array:
     """
     place = np.clip(np.searchsorted(knots, values), 1, knots.size - 1)
     share = (values - knots[place - 1]) / (knots[place] - knots[place - 1])
-    found = np.zeros((values.size, knots.size))
+    result = np.zeros((values.size, knots.size))
     rows = np.arange(values.size)
-    found[rows, place - 1] = 1.0 - share
-    found[rows, place] = share
-    return found
+    result[rows, place - 1] = 1.0 - share
+    result[rows, place] = share
+    return result
 
 
-def _fit_curve(found: SearchResult, argument: LawArgument) -> Dependence | None:
-    problem, final = found.problem, found.final
+def _fit_curve(result: SearchResult, argument: LawArgument) -> Dependence | None:
+    problem, final = result.problem, result.final
     knots = knots_of(np.concatenate(argument.values))
     if knots is None:
         return None

@@ -47,7 +47,7 @@ class Screening:
             if found is not None and (effect.label not in best or found.gain > best[effect.label].gain):
                 best[effect.label] = found
         combed = [self._combed(effect, best[effect.label]) for effect in effects if effect.label in best]
-        return sorted(combed, key=lambda one: -one.gain)
+        return sorted(combed, key=lambda effect: -effect.gain)
 
     def _combed(self, effect: CandidateEffect, best: ScreenedEffect) -> ScreenedEffect:
         """Return the best start of an effect between the neighbours of one, where its residuals have many minima."""
@@ -62,7 +62,7 @@ class Screening:
             trials = [(effect, (*best.values[:place], float(n), *best.values[place + 1 :])) for n in teeth]
             pairs = zip(trials, self._changes(trials), strict=True)
             gains = [self._gain(effect, values, columns) for (_, values), columns in pairs]
-            best = max([best, *(one for one in gains if one is not None)], key=lambda one: one.gain)
+            best = max([best, *(one for one in gains if one is not None)], key=lambda start: start.gain)
             width = 1.5 * (high - low) / (TEETH - 1)
             low, high = max(best.values[place] - width, low), min(best.values[place] + width, high)
         return best

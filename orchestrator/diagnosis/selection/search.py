@@ -38,7 +38,7 @@ def search_effects(
 def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
     """Return the model with re-fitted parameters, and the problem whitened by what it leaves."""
     starts = [problem.start] if problem.first is None else [problem.first, problem.start]
-    fitted = min((fit_model(problem, start) for start in starts), key=lambda one: one.cost)
+    fitted = min((fit_model(problem, start) for start in starts), key=lambda fit: fit.cost)
     for number in range(SETTLINGS):
         score = fitted.score
         problem, fitted = settle(problem, fitted)
@@ -48,15 +48,7 @@ def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
 
 
 def settle(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, FittedModel]:
-    """Return the problem with the whitening and the prior's weight that a model asks for, and the model fitted in it.
-
-    Args:
-        problem: of the fit.
-        fitted: the model.
-
-    Returns:
-        Problem and model.
-    """
+    """Return the problem with the whitening and the prior's weight that a model asks for, and the model fitted there."""
     problem = weigh_prior(problem.reweighted(fitted.point), fitted)
     return problem, fit_model(problem, fitted.point)
 
@@ -70,13 +62,13 @@ def settle_anew(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, F
     return settle(problem, again if again.cost < fitted.cost else fitted)
 
 
-def leave_out(found: SearchResult, labels: Sequence[str]) -> SearchResult:
+def leave_out(result: SearchResult, labels: Sequence[str]) -> SearchResult:
     """Return the result with a final model that lacks some effects, the rest fitted anew."""
     if not labels:
-        return found
-    fitted = fit_model(found.problem, found.final.point.without_effects(labels))
-    problem, final = settle(found.problem, fitted)
-    return replace(found, problem=problem, final=final)
+        return result
+    fitted = fit_model(result.problem, result.final.point.without_effects(labels))
+    problem, final = settle(result.problem, fitted)
+    return replace(result, problem=problem, final=final)
 
 
 @dataclass(frozen=True)
@@ -85,52 +77,52 @@ class _Search:
     progress: Progress
     out_of_time: Callable[[], bool]
 
-    def run(self, found: SearchResult) -> SearchResult:
+    def run(self, result: SearchResult) -> SearchResult:
         """Go forward and backward until nothing more pays."""
         most = self.settings.most_effects
         for number in range(most + 3 if most else 0):
-            if len(found.final.labels) >= most:
+            if len(result.final.labels) >= most:
                 break
             if self.out_of_time():
-                found = replace(found, complete=False)
+                result = replace(result, complete=False)
                 break
-            problem, step = self._step(found, number == 0)
-            found = replace(found, steps=(*found.steps, step))
+            problem, step = self._step(result, number == 0)
+            result = replace(result, steps=(*result.steps, step))
             if step.entry is None:
                 break
             pruned = self._pruned(problem, step.entry.fitted)
             gone = set(step.entry.fitted.labels) - set(pruned.labels)
             problem, final = settle_anew(problem, pruned)
-            found = replace(found, problem=problem, final=final, refused=found.refused | gone)
-        return self._reviewed(found)
+            result = replace(result, problem=problem, final=final, refused=result.refused | gone)
+        return self._reviewed(result)
 
-    def _reviewed(self, found: SearchResult) -> SearchResult:
+    def _reviewed(self, result: SearchResult) -> SearchResult:
         """Return the result with the family of each effect as the final model has it, and its simplest one in place.
 
         While others were missing, an effect may have stood for part of them, or have looked different from its like.
         """
-        for label in found.final.labels:
-            problem, model = found.problem, found.final
+        for label in result.final.labels:
+            problem, model = result.problem, result.final
             without = fit_model(problem, model.point.without_effects([label]), 3)
             reviewed = TriedEffect(label, compare(without, model), model)
             tried = self._tried(problem, without, frozenset((label,)), self.settings.refined)
             step = self._simplest(problem, without, reviewed, (reviewed, *tried))
-            found = replace(found, reviews={**found.reviews, step.taken: step})
+            result = replace(result, reviews={**result.reviews, step.taken: step})
             if step.taken != label:
                 assert step.entry is not None
-                found = replace(found, final=step.entry.fitted, steps=(*found.steps, step))
-        return found
+                result = replace(result, final=step.entry.fitted, steps=(*result.steps, step))
+        return result
 
-    def _step(self, found: SearchResult, first: bool) -> tuple[FitProblem, SearchStep]:
-        problem, model = found.problem, found.final
-        tried = self._tried(problem, model, found.refused, self.settings.refined)
-        step = self._chosen(problem, model, tried, found.refused, first)
+    def _step(self, result: SearchResult, first: bool) -> tuple[FitProblem, SearchStep]:
+        problem, model = result.problem, result.final
+        tried = self._tried(problem, model, result.refused, self.settings.refined)
+        step = self._chosen(problem, model, tried, result.refused, first)
         if step.taken:
             return problem, step
-        second = self._under_own_noise(problem, model, tried, found.refused)
+        second = self._under_own_noise(problem, model, tried, result.refused)
         if second is None:
             second = self._under_own_noise(
-                problem, model, self._tried_quietly(problem, model, found.refused), found.refused
+                problem, model, self._tried_quietly(problem, model, result.refused), result.refused
             )
         return second or (problem, step)
 
@@ -161,7 +153,7 @@ class _Search:
         model = fit_model(problem, model.point)
         fits = [fit_model(problem, one.fitted.point) for one in tried]
         again = [TriedEffect(one.label, compare(model, fit), fit) for one, fit in zip(tried, fits, strict=True)]
-        return model, sorted(again, key=lambda one: -one.comparison.gain)
+        return model, sorted(again, key=lambda trial: -trial.comparison.gain)
 
     def _quieter_problem(
         self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect]
@@ -174,9 +166,9 @@ class _Search:
         rising: list[tuple[float, FitProblem, list[TriedEffect]]] = []
         for one in tried[: self.settings.look_ahead]:
             own, fitted = settle(problem, one.fitted)
-            _, found = self._compared(own, model, [replace(one, fitted=fitted)])
-            if found[0].comparison.gain > one.comparison.gain:
-                rising.append((found[0].comparison.gain, own, found))
+            _, result = self._compared(own, model, [replace(one, fitted=fitted)])
+            if result[0].comparison.gain > one.comparison.gain:
+                rising.append((result[0].comparison.gain, own, result))
         if not rising:
             return None
         gain, own, leading = max(rising, key=lambda entry: entry[0])
@@ -210,7 +202,7 @@ class _Search:
     ) -> SearchStep:
         """Return the step with the simplest of the effects over which the best one gains nothing."""
         family = [one for one in tried if one is best or self._is_alike(problem, model, best, one)]
-        chosen = min(family, key=lambda one: (problem.effects[one.label].law_values, -one.comparison.gain))
+        chosen = min(family, key=lambda trial: (problem.effects[trial.label].law_values, -trial.comparison.gain))
         return SearchStep(model, tuple(tried), chosen.label, tuple(one.label for one in family if one is not chosen))
 
     def _tried(self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int) -> list[TriedEffect]:
@@ -220,7 +212,7 @@ class _Search:
             fitted = fit_model(problem, screened_point(model, screened))
             tried.append(TriedEffect(screened.label, compare(model, fitted), fitted))
             self.progress(" + ".join((*model.labels, screened.label)))
-        return sorted(tried, key=lambda one: -one.comparison.gain)
+        return sorted(tried, key=lambda trial: -trial.comparison.gain)
 
     @staticmethod
     def _candidates(problem: FitProblem, model: FittedModel, refused: frozenset[str]) -> Sequence[CandidateEffect]:
