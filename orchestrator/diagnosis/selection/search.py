@@ -48,7 +48,7 @@ def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
 
 
 def settle(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, FittedModel]:
-    """Return the problem with the whitening and the prior's weight that a model asks for, and the model fitted there."""
+    """Return the problem with the whitening and the prior weight that a model asks for, and the model fitted there."""
     problem = weigh_prior(problem.reweighted(fitted.point), fitted)
     return problem, fit_model(problem, fitted.point)
 
