@@ -136,6 +136,7 @@ def simulate(
     step: float | None = None,
     inputs: Mapping[str, float] | None = None,
     jacobi: bool = False,
+    events: bool = True,
     safety: Safety | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> SimulationResult:
@@ -147,6 +148,7 @@ def simulate(
         step: communication step of an SSP file [s] (default: the file's own).
         inputs: constant values of an SSP file's outer inputs, by name.
         jacobi: run all FMUs of an SSP file side by side, as most SSP tools do.
+        events: use event mode in an SSP file where an FMU of FMI 3.0 has it.
         safety: how far FMUs are trusted, and limits of time and memory (default: not at all).
         tell: called with a line when FMUs that are not ours run on a system without walls.
 
@@ -166,8 +168,11 @@ def simulate(
         return _run(scenario, scenario.name, "simulate", stop, safety, tell, {})
     path = Path(scenario)
     if path.suffix.lower() == ".ssp":
-        return run_ssp(path, stop=stop, step=step, inputs=inputs or {}, jacobi=jacobi, safety=safety, tell=tell)
-    for name, given in (("step", step is not None), ("inputs", bool(inputs)), ("jacobi", jacobi)):
+        return run_ssp(
+            path, stop=stop, step=step, inputs=inputs or {}, jacobi=jacobi, events=events, safety=safety, tell=tell
+        )
+    others = (("step", step is not None), ("inputs", bool(inputs)), ("jacobi", jacobi), ("events", not events))
+    for name, given in others:
         if given:
             raise ScenarioError(f"`{name}` must be left out with a TOML scenario, which says it itself", name)
     return _run(load_scenario(path), path.name, "simulate", stop, safety, tell, {"scenario": str(path)})
@@ -197,6 +202,7 @@ def run_ssp(
     step: float | None = None,
     inputs: Mapping[str, float],
     jacobi: bool = False,
+    events: bool = True,
     safety: Safety | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> SimulationResult:
@@ -209,6 +215,6 @@ def run_ssp(
     if step is not None and not 0.0 < step < float("inf"):
         raise ScenarioError(f"`step` must be finite and positive, but is {step!r}", "step")
     constants = {name: Constant(float(value)) for name, value in inputs.items()}
-    given = {"action": "run", "file": str(path), "step": step, "stop": stop, "jacobi": jacobi}
-    with opened_ssp(path, constants, step, jacobi) as scenario:
+    given = {"action": "run", "file": str(path), "step": step, "stop": stop, "jacobi": jacobi, "events": events}
+    with opened_ssp(path, constants, step, jacobi, events) as scenario:
         return _run(scenario, path.name, "ssp", stop, safety, tell, given)

@@ -1,4 +1,4 @@
-"""Systems as SSP 1.0 files."""
+"""Systems as SSP files."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,11 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.building.build import ensure_built
+from orchestrator.errors import ScenarioError
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.scenario import scenario_of_pair
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.write import write_ssp
+
+VERSIONS = ("1.0", "2.0")
 
 
 @dataclass(frozen=True)
@@ -50,14 +53,16 @@ def export_ssp(
     *,
     alpha: float = 0.02,
     reference: float = 0.5,
+    version: str = "1.0",
 ) -> ExportedSsp:
-    """Write a system of FMUs as an SSP 1.0 file.
+    """Write a system of FMUs as an SSP file.
 
     Args:
         path: the file to write.
         scenario: a ``Scenario`` or a TOML scenario file (default: the paired loops).
         alpha: half-gap of the paired loops [rad].
         reference: load angle to which the paired loops are led [rad].
+        version: of SSP, "1.0" or "2.0", which knows the types and arrays of FMI 3.0.
 
     Returns:
         The path, and what is in the file.
@@ -70,9 +75,11 @@ def export_ssp(
         >>> print(oc.export_ssp("paired.ssp", alpha=0.02))
         paired.ssp: 6 FMUs, 20 connections
     """
+    if version not in VERSIONS:
+        raise ScenarioError(f"`version` must be one of {', '.join(VERSIONS)}, but is {version!r}", "version")
     if scenario is None:
         chosen = scenario_of_pair(Experiment(), ensure_built(FMUS), alpha, reference)
     else:
         chosen = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
-    write_ssp(Path(path), chosen)
+    write_ssp(Path(path), chosen, version)
     return ExportedSsp(Path(path), chosen)

@@ -1,11 +1,11 @@
-"""``ssp export``: systems as SSP 1.0 files. ``ssp run``: any SSP of co-simulation FMUs under our master."""
+"""``ssp export``: systems as SSP files. ``ssp run``: any SSP of co-simulation FMUs under our master."""
 
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
 
 from orchestrator.api.simulate import run_ssp
-from orchestrator.api.ssp import export_ssp
+from orchestrator.api.ssp import VERSIONS, export_ssp
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._safety import add_safety_arguments, safety_of
 from orchestrator.commands._trust import note
@@ -30,9 +30,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--reference", type=float, default=0.5, metavar="RAD", help="export: wanted load angle (default: %(default)s)"
     )
+    parser.add_argument(
+        "--ssp-version", dest="version", choices=VERSIONS, default="1.0", help="export: of SSP (default: %(default)s)"
+    )
     parser.add_argument("--step", type=float, metavar="S", help="run: communication step (default: the file's own)")
     parser.add_argument("--stop", type=float, metavar="S", help="run: stop time (default: the file's own)")
     parser.add_argument("--jacobi", action="store_true", help="run: all FMUs side by side, as most SSP tools do")
+    parser.add_argument(
+        "--no-events", dest="events", action="store_false", help="run: without event mode of FMUs of FMI 3.0"
+    )
     parser.add_argument(
         "--input", action="append", default=[], metavar="NAME=VALUE", help="run: constant value of an outer input"
     )
@@ -47,12 +53,18 @@ def run(arguments: argparse.Namespace) -> int:
 def _export(arguments: argparse.Namespace) -> int:
     if arguments.file is not None:
         raise ScenarioError(f"`ssp export` must be given a scenario by --scenario, but is given {arguments.file}")
-    _refuse(arguments, "`ssp export`", {"step": None, "stop": None, "jacobi": False, "input": []})
+    _refuse(arguments, "`ssp export`", {"step": None, "stop": None, "jacobi": False, "events": True, "input": []})
     if arguments.scenario is not None:
         _refuse(arguments, "`ssp export --scenario`", PAIR)
     name = "paired.ssp" if arguments.scenario is None else f"{arguments.scenario.stem}.ssp"
     with stage_output(arguments.out) as folder:
-        written = export_ssp(folder / name, arguments.scenario, alpha=arguments.alpha, reference=arguments.reference)
+        written = export_ssp(
+            folder / name,
+            arguments.scenario,
+            alpha=arguments.alpha,
+            reference=arguments.reference,
+            version=arguments.version,
+        )
         write_result(folder, "ssp", _words(arguments), None, written.results())
         write_report(folder, "ssp")
     system = written.scenario.system
@@ -64,7 +76,7 @@ def _export(arguments: argparse.Namespace) -> int:
 def _run(arguments: argparse.Namespace) -> int:
     if arguments.scenario is not None:
         raise ScenarioError("`--scenario` must be left out of `ssp run`; `simulate --scenario` runs scenarios")
-    _refuse(arguments, "`ssp run`", PAIR)
+    _refuse(arguments, "`ssp run`", {**PAIR, "version": "1.0"})
     if arguments.file is None:
         raise ScenarioError("`ssp run` must be given an SSP file, but is given none")
     with stage_output(arguments.out) as folder:
@@ -74,6 +86,7 @@ def _run(arguments: argparse.Namespace) -> int:
             step=arguments.step,
             inputs=_inputs(arguments.input),
             jacobi=arguments.jacobi,
+            events=arguments.events,
             safety=safety_of(arguments),
             tell=note,
         )
@@ -86,7 +99,8 @@ def _run(arguments: argparse.Namespace) -> int:
 def _refuse(arguments: argparse.Namespace, action: str, defaults: Mapping[str, object]) -> None:
     for name, default in defaults.items():
         if getattr(arguments, name) != default:
-            raise ScenarioError(f"`--{name}` must be left out of {action}, which it does not change")
+            flag = {"version": "ssp-version", "events": "no-events"}.get(name, name)
+            raise ScenarioError(f"`--{flag}` must be left out of {action}, which it does not change")
 
 
 def _inputs(words: list[str]) -> dict[str, float]:
@@ -101,7 +115,7 @@ def _inputs(words: list[str]) -> dict[str, float]:
 
 
 def _words(arguments: argparse.Namespace) -> dict[str, object]:
-    names = ("action", "file", "scenario", "alpha", "reference", "step", "stop", "jacobi")
+    names = ("action", "file", "scenario", "alpha", "reference", "version", "step", "stop", "jacobi", "events")
     return {
         name: str(value) if isinstance(value, Path) else value
         for name, value in vars(arguments).items()

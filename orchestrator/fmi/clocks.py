@@ -53,7 +53,7 @@ def read_clocks(variables: Variables3) -> tuple[dict[str, PeriodicClock], EventF
         elif kind == "triggered":
             text = "must have times of its own, but is to be triggered by another clock, which nothing here would do"
             raise UnusableError(f"the input clock {name!r} {text}")
-        elif kind in {"constant", "fixed", "tunable"} and (interval := _interval(clock)) is not None:
+        elif kind in {"constant", "fixed", "tunable"} and (interval := clock_interval(clock)) is not None:
             members = [v for v, clocks in variables.clocked.items() if reference in clocks]
             periodic[name] = PeriodicClock(interval, _shift(clock), tuple(members), reference)
             told += [] if kind == "constant" else [name]
@@ -77,7 +77,7 @@ def _samples_itself(clock: etree._Element) -> bool:
     return any(note.get("type") == SELF_SAMPLING for note in clock.iterfind("Annotations/Annotation"))
 
 
-def _interval(clock: etree._Element) -> Fraction | None:
+def clock_interval(clock: etree._Element) -> Fraction | None:
     """Return a clock's interval in seconds, where it is declared."""
     interval = _seconds(clock, "interval")
     if interval is not None and interval <= 0:

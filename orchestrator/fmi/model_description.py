@@ -35,6 +35,7 @@ class FmuDescription:
         once: only one instance per process is allowed.
         access: where the value of each variable is, by its name.
         events: what event mode needs to know.
+        arrays: sizes of the dimensions of the arrays, by name.
         structural: names of the structural parameters.
         configured: values that these are given before an instance is initialised, where they are not the FMU's own.
         resized: names of the elements of arrays that have no start value, for that is for another size.
@@ -49,6 +50,7 @@ class FmuDescription:
     once: bool
     access: Mapping[str, Access]
     events: EventFeatures = field(default_factory=EventFeatures)
+    arrays: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     structural: frozenset[str] = frozenset()
     configured: Mapping[str, Value] = field(default_factory=dict)
     resized: frozenset[str] = frozenset()
@@ -195,6 +197,7 @@ def _description3(
         once=_flag(cosimulation, "canBeInstantiatedOnlyOncePerProcess"),
         access=dict(zip(names, found.accesses, strict=True)),
         events=events,
+        arrays=found.arrays,
         structural=frozenset(found.structural),
         configured=configured,
         resized=frozenset(found.resized),

@@ -35,6 +35,7 @@ class Variables3:
         clocked: the value references of the clocks that a scalar belongs to, by its name.
         inside: names of the inputs that may be set in intermediate updates.
         binaries: names of the variables of type Binary.
+        arrays: sizes of the dimensions of the arrays, by name.
         structural: names of the structural parameters.
         resized: names of the elements of arrays whose start values are for another size.
     """
@@ -46,6 +47,7 @@ class Variables3:
     clocked: dict[str, tuple[int, ...]] = field(default_factory=dict)
     inside: list[str] = field(default_factory=list)
     binaries: list[str] = field(default_factory=list)
+    arrays: dict[str, tuple[int, ...]] = field(default_factory=dict)
     structural: list[str] = field(default_factory=list)
     resized: list[str] = field(default_factory=list)
 
@@ -75,6 +77,8 @@ def read_variables(root: etree._Element, configured: Mapping[str, Value] | None 
             if element.get("causality") == "structuralParameter":
                 found.structural.append(name)
             shape = _shape(element, lengths)
+            if shape:
+                found.arrays[name] = shape
             starts = [given[name]] if name in given else _starts(element, math.prod(shape), resized=bool(given))
             _add(found, element, types.get(element.get("declaredType", "")), shape, starts)
         else:
@@ -98,6 +102,12 @@ def _shape(element: etree._Element, lengths: Mapping[str, str]) -> tuple[int, ..
     return tuple(shape)
 
 
+def element_places(shape: tuple[int, ...]) -> list[str]:
+    """Return what follows the name of an array in the names of its elements, by rows."""
+    indices = itertools.product(*(range(1, size + 1) for size in shape))
+    return [f"[{','.join(map(str, index))}]" if index else "" for index in indices]
+
+
 def _add(
     found: Variables3,
     element: etree._Element,
@@ -111,8 +121,7 @@ def _add(
     make = _maker(element, declared)
     clocks = tuple(int(clock) for clock in element.get("clocks", "").split())
     aliases = [(a.attrib["name"], a.get("description")) for a in element.iterfind("Alias")]
-    for number_, index in enumerate(itertools.product(*(range(1, size + 1) for size in shape))):
-        place = f"[{','.join(map(str, index))}]" if index else ""
+    for number_, place in enumerate(element_places(shape)):
         access = Access("Int64" if kind == "Enumeration" else kind, reference, number_, count)
         scalar = make(f"{name}{place}", starts[number_] if starts else None)
         if starts is None:

@@ -1,4 +1,4 @@
-"""The grammar of FMI 2.0's modelDescription.xml; see ``checking.grammar`` for the notation."""
+"""The grammar of FMI 2.0's modelDescription.xml; see ``shared.xml_grammar`` for the notation."""
 
 FMI2 = r"""
 fmiModelDescription | ModelExchange? CoSimulation? UnitDefinitions? TypeDefinitions? LogCategories? DefaultExperiment? VendorAnnotations:Annotations2? ModelVariables ModelStructure | fmiVersion! modelName! guid! description author version copyright license generationTool generationDateAndTime:date variableNamingConvention:flat/structured numberOfEventIndicators:uint32

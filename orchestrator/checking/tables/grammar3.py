@@ -1,4 +1,4 @@
-"""The grammars of FMI 3.0: modelDescription, buildDescription, terminalsAndIcons; see ``checking.grammar``."""
+"""The grammars of FMI 3.0: modelDescription, buildDescription, terminalsAndIcons; see ``shared.xml_grammar``."""
 
 FMI3 = r"""
 fmiModelDescription | ModelExchange? CoSimulation? ScheduledExecution? UnitDefinitions? TypeDefinitions? LogCategories? DefaultExperiment? ModelVariables ModelStructure Annotations? | fmiVersion:version3! modelName! instantiationToken! description author version copyright license generationTool generationDateAndTime:date variableNamingConvention:flat/structured

@@ -9,6 +9,8 @@ from urllib.parse import unquote
 from lxml import etree
 
 from orchestrator.errors import ScenarioError
+from orchestrator.scenarios.ssp.grammar import SSP2
+from orchestrator.shared.xml_grammar import grammar_faults
 
 BASE = "http://ssp-standard.org/SSP1/"
 SPACES = {
@@ -24,6 +26,8 @@ SCHEMAS = {
     "ssv": "SystemStructureParameterValues.xsd",
     "ssm": "SystemStructureParameterMapping.xsd",
 }
+ROOTS = {"ssd": "SystemStructureDescription", "ssv": "ParameterSet", "ssm": "ParameterMapping"}
+_PREFIXES = {space: prefix for prefix, space in SPACES.items()}
 OSP = "com.opensimulationplatform"
 """Type of the annotation in which libcosim looks for the communication step; others pass over it."""
 
@@ -74,17 +78,20 @@ def parse(content: bytes, kind: str, origin: str) -> etree._Element:
 
 
 def require_valid(root: etree._Element, kind: str, origin: str) -> None:
-    """Raise a ScenarioError unless ``root`` follows the schema of its kind."""
+    """Raise a ScenarioError unless ``root`` follows the schema of its kind, and of its version of SSP."""
+    if (root.get("version") or "").startswith("2"):
+        _require_grammar(root, kind, origin)
+        return
     rules = schema(kind)
     if not rules.validate(root):
         first = rules.error_log[0]
         raise ScenarioError(f"{origin}: must follow {SCHEMAS[kind]}, but does not: line {first.line}: {first.message}")
 
 
-def new_document(kind: str, element: str, name: str) -> etree._Element:
-    """Return the root of an ``ssd`` or ``ssv`` file."""
+def new_document(kind: str, element: str, name: str, version: str = "1.0") -> etree._Element:
+    """Return the root of an ``ssd`` or ``ssv`` file of a version of SSP."""
     spaces = {key: SPACES[key] for key in (kind, "ssc", *FURTHER[kind])}
-    root = etree.Element(tag(kind, element), nsmap=spaces, version="1.0", name=name)
+    root = etree.Element(tag(kind, element), nsmap=spaces, version=version, name=name)
     root.set("generationTool", "backlash-cosim")
     root.set("generationDateAndTime", DATE)
     return root
@@ -94,6 +101,23 @@ def document_bytes(root: etree._Element, kind: str, origin: str) -> bytes:
     """Return the text of a file that follows the schema of its kind."""
     require_valid(root, kind, origin)
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+
+
+def _require_grammar(root: etree._Element, kind: str, origin: str) -> None:
+    """Raise a ScenarioError unless ``root`` follows the grammar of SSP 2.0."""
+    expected = tag(kind, ROOTS[kind])
+    if root.tag != expected:
+        raise ScenarioError(f"{origin}: must be <{kind}:{ROOTS[kind]}>, but is <{root.tag}>")
+    if faults := grammar_faults(root, SSP2, _short_name):
+        first, more = faults[0], len(faults) - 1
+        text = f"{origin}: must follow SSP 2.0, but does not: line {first.element.sourceline}: {first.message}"
+        raise ScenarioError(f"{text} (and {more} more)" if more else text)
+
+
+def _short_name(name: str) -> str:
+    """Return what the grammar calls a tag: its space's usual prefix, a dot and its name."""
+    space, _, local = name.lstrip("{").rpartition("}")
+    return f"{_PREFIXES[space]}.{local}" if space in _PREFIXES else name
 
 
 def add_master(system: etree._Element, step: float, solver_tolerance: float | None) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 
 from orchestrator.master import units
@@ -26,6 +27,9 @@ class Structure:
         components: file of each component.
         kinds: kind of each connector.
         connector_units: of those that state one.
+        sizes: of the dimensions of those that are arrays; None where the file does not say.
+        without_number: ``Clock`` or ``Binary``, for connectors of these types.
+        intervals: of the connectors of type ``Clock`` that state one [s].
         drivers: for each connector that is fed: what feeds it, factor and offset.
         given: values of parameter bindings.
     """
@@ -36,6 +40,9 @@ class Structure:
     components: dict[str, Path] = field(default_factory=dict)
     kinds: dict[Node, str] = field(default_factory=dict)
     connector_units: dict[Node, Unit] = field(default_factory=dict)
+    sizes: dict[Node, tuple[int | None, ...]] = field(default_factory=dict)
+    without_number: dict[Node, str] = field(default_factory=dict)
+    intervals: dict[Node, Fraction] = field(default_factory=dict)
     drivers: dict[Node, tuple[Node, float, float]] = field(default_factory=dict)
     given: dict[Node, Given] = field(default_factory=dict)
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lxml import etree
@@ -14,7 +14,13 @@ from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.master.values import nearest
 from orchestrator.scenarios.ssp.common import EXPONENTS, file_of_uri, parse, tag
 
-TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
+WHOLE = ("Integer", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
+TYPES = {
+    **dict.fromkeys(("Real", "Float64", "Float32"), "Real"),
+    **dict.fromkeys(WHOLE, "Integer"),
+    **{kind: kind for kind in ("Boolean", "String", "Enumeration")},
+}
+"""The type that a master knows, by the element of SSP."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +31,7 @@ class Given:
         type: ``Real``, ``Integer``, ``Boolean``, ``String`` or ``Enumeration``.
         unit: its unit, if it has one.
         units: units declared beside it.
+        texts: the values of an array's elements; empty for a scalar.
     """
 
     type: str
@@ -33,6 +40,7 @@ class Given:
     units: Mapping[str, Unit]
     factor: float = 1.0
     offset: float = 0.0
+    texts: tuple[str, ...] = ()
 
 
 def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
@@ -97,11 +105,18 @@ def _values(values: etree._Element) -> list[tuple[str, Given]]:
     declared = read_units(values, "ssv")
     found = []
     for parameter in values.findall(f"{tag('ssv', 'Parameters')}/{tag('ssv', 'Parameter')}"):
-        for kind in TYPES:
-            element = parameter.find(tag("ssv", kind))
-            if element is not None:
-                given = Given(kind, element.get("value", ""), element.get("unit"), declared)
-                found.append((str(parameter.get("name")), given))
+        for element in parameter:
+            kind = TYPES.get(etree.QName(element).localname) if isinstance(element.tag, str) else None
+            if kind is None:
+                continue
+            text, texts = (
+                element.get("value", ""),
+                tuple(str(v.get("value")) for v in element.iterfind(tag("ssv", "Value"))),
+            )
+            if kind not in ("String", "Enumeration") and parameter.find(tag("ssc", "Dimension")) is not None:
+                texts = tuple(text.split())
+            given = Given(kind, text or " ".join(texts), element.get("unit"), declared, texts=texts)
+            found.append((str(parameter.get("name")), given))
     return found
 
 
@@ -115,7 +130,7 @@ def _map_values(values: list[tuple[str, Given]], rules: etree._Element) -> list[
         linear = entry.find(tag("ssc", "LinearTransformation"))
         if linear is not None:
             factor, offset = float(linear.get("factor", "1")), float(linear.get("offset", "0"))
-            given = Given(given.type, given.text, None, given.units, factor, offset)
+            given = replace(given, unit=None, factor=factor, offset=offset)
         found.append((str(entry.get("target")), given))
     return found
 

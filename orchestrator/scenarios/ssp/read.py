@@ -1,4 +1,4 @@
-"""Scenarios from SSP files: any SSP 1.0 of co-simulation FMUs, with nested systems and parameter bindings."""
+"""Scenarios from SSP files: any SSP 1.0 or 2.0 of co-simulation FMUs, with nested systems and parameter bindings."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -8,7 +8,8 @@ from pathlib import Path
 from lxml import etree
 
 from orchestrator.errors import FmuError, ScenarioError
-from orchestrator.fmi.instances import FmuFactory
+from orchestrator.fmi.clocks import clock_interval
+from orchestrator.fmi.instances import FmuFactory, read_configured
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.master.algorithms import GaussSeidel, Jacobi
 from orchestrator.master.problems import Problem, raise_problems
@@ -17,6 +18,7 @@ from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, System
 from orchestrator.master.units import resolve
 from orchestrator.scenarios.scenario import Scenario
+from orchestrator.scenarios.ssp.arrays import expand_arrays
 from orchestrator.scenarios.ssp.common import (
     OSP,
     SPACES,
@@ -35,11 +37,17 @@ from orchestrator.shared.isolation.scratch import Scratch
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 DEFAULT_STOP = 1.0
 DEFAULT_STEPS = 1000
+_REALS = tuple(tag("ssc", kind) for kind in ("Real", "Float64", "Float32"))
+_GIVERS = ("output", "calculatedParameter", "constant", "local")
 
 
 @contextmanager
 def opened_ssp(
-    path: Path, inputs: Mapping[str, Signal] | None = None, step: float | None = None, simultaneous: bool = False
+    path: Path,
+    inputs: Mapping[str, Signal] | None = None,
+    step: float | None = None,
+    simultaneous: bool = False,
+    events: bool = True,
 ) -> Iterator[Scenario]:
     """Yield the scenario that an SSP file describes; its FMUs lie in a private folder until the block ends.
 
@@ -47,6 +55,7 @@ def opened_ssp(
 
     Args:
         step: communication step [s]; default: the file's own annotation, else a thousandth of the stop time.
+        events: event mode is used where an FMU of FMI 3.0 has it.
     """
     if os.path.isdir(path):
         raise ScenarioError(f"`ssp` must be an archive, but {path} is a directory; zip what is in it")
@@ -55,11 +64,11 @@ def opened_ssp(
             unpack(path, scratch.path / "content")
         except FmuError as error:
             raise ScenarioError(str(error).replace("`fmu`", "`ssp`")) from None
-        yield _scenario(path, scratch.path / "content", inputs or {}, step, simultaneous)
+        yield _scenario(path, scratch.path / "content", inputs or {}, step, simultaneous, events)
 
 
 def _scenario(
-    path: Path, folder: Path, inputs: Mapping[str, Signal], step: float | None, simultaneous: bool
+    path: Path, folder: Path, inputs: Mapping[str, Signal], step: float | None, simultaneous: bool, events: bool
 ) -> Scenario:
     file = folder / STRUCTURE
     if not file.is_file():
@@ -70,8 +79,11 @@ def _scenario(
     assert system is not None
     _walk(system, "", structure)
     raise_problems(structure.problems, f"{path}: {STRUCTURE}")
-    descriptions = _descriptions(structure, path)
+    descriptions = _descriptions(structure, path, events)
     names = instance_names(structure.components)
+    descriptions = _configured(structure, descriptions, names, inputs, path, events)
+    expand_arrays(structure, descriptions)
+    _check_names(structure, descriptions)
     flow = Flow(structure, {name: d.model for name, d in descriptions.items()}, names)
     instances = _instances(structure, descriptions, names, flow.starts(inputs), solver_tolerance(system))
     connections, sources = flow.connections(inputs)
@@ -112,10 +124,23 @@ def _walk(system: etree._Element, path: str, structure: Structure) -> None:
 def _connectors(element: etree._Element, path: str, structure: Structure) -> None:
     for connector in element.findall(f"{tag('ssd', 'Connectors')}/{tag('ssd', 'Connector')}"):
         node = (path, str(connector.get("name")))
+        kind = next((k for k in ("Clock", "Binary") if connector.find(tag("ssc", k)) is not None), None)
+        if kind is not None:
+            structure.without_number[node] = kind
+            try:
+                interval = clock_interval(connector.find(tag("ssc", kind)))
+            except ValueError as error:
+                structure.problems.append(Problem(f"$.{'.'.join(filter(None, node))}", f"must be a clock, but {error}"))
+                continue
+            structure.intervals |= {} if interval is None else {node: interval}
+            continue
         structure.kinds[node] = str(connector.get("kind"))
-        real = connector.find(tag("ssc", "Real"))
+        real = next((r for r in map(connector.find, _REALS) if r is not None), None)
         if real is not None and real.get("unit"):
             structure.connector_units[node] = resolve(str(real.get("unit")), structure.units)
+        dimensions = connector.findall(tag("ssc", "Dimension"))
+        if dimensions:
+            structure.sizes[node] = tuple(int(size) if (size := d.get("size")) else None for d in dimensions)
 
 
 def _component(element: etree._Element, name: str, structure: Structure) -> None:
@@ -123,8 +148,11 @@ def _component(element: etree._Element, name: str, structure: Structure) -> None
     file = file_of_uri(structure.folder, source)
     if kind != FMU_TYPE:
         structure.problems.append(Problem(f"$.{name}.type", f"must be {FMU_TYPE}, but is {kind!r}"))
-    elif element.get("implementation") == "ModelExchange":
-        structure.problems.append(Problem(f"$.{name}.implementation", "must be CoSimulation, but is ModelExchange"))
+    elif element.get("source") is None:
+        structure.problems.append(Problem(f"$.{name}.source", "must be a file of the archive, but there is none"))
+    elif (implementation := element.get("implementation", "any")) not in ("any", "CoSimulation"):
+        text = f"must be CoSimulation, but is {implementation}"
+        structure.problems.append(Problem(f"$.{name}.implementation", text))
     elif file is None:
         structure.problems.append(Problem(f"$.{name}.source", f"must be a file of the archive, but is {source!r}"))
     else:
@@ -159,11 +187,20 @@ def _connection(element: etree._Element, path: str, place: str, structure: Struc
         child, connector = element.get(f"{side}Element"), str(element.get(f"{side}Connector"))
         owner = path if child is None else f"{path}/{child}" if path else child
         kind = structure.kinds.get((owner, connector))
+        if reason := _no_end(structure.without_number.get((owner, connector)), kind):
+            text = (
+                f"must join connectors that carry numbers, but {'.'.join(filter(None, (owner, connector)))} is {reason}"
+            )
+            structure.problems.append(Problem(f"{place}.{side}Connector", text, mismatch=True))
+            return
         if kind is None:
             text = f"must be a connector of {owner or 'the system'}, but {connector!r} is none"
             structure.problems.append(Problem(f"{place}.{side}Connector", text, mismatch=True))
             return
-        gives = kind in ("output", "calculatedParameter") if child is not None else kind in ("input", "parameter")
+        gives = kind in _GIVERS if child is not None else kind in ("input", "parameter", "structuralParameter")
+        if indices := element.get(f"{side}Indices"):
+            connector = f"{connector}[{','.join(indices.split())}]"
+            structure.kinds[owner, connector] = kind
         ends.append(((owner, connector), gives))
     if ends[0][1] == ends[1][1]:
         text = "must join what gives a value and what takes one, but both ends do the same"
@@ -187,13 +224,27 @@ def _connection(element: etree._Element, path: str, place: str, structure: Struc
     structure.drivers[target] = (source, factor, offset)
 
 
-def _descriptions(structure: Structure, path: Path) -> dict[str, FmuDescription]:
+def _no_end(type_: str | None, kind: str | None) -> str:
+    """Return why a connector cannot be joined; empty where it can."""
+    if type_ == "Clock":
+        return "a Clock: the master ticks clocks by their own intervals"
+    if type_ == "Binary":
+        return "Binary, which no connection here carries"
+    return "of the kind unspecified" if kind == "unspecified" else ""
+
+
+def _descriptions(structure: Structure, path: Path, events: bool) -> dict[str, FmuDescription]:
     found = {}
     for name, file in structure.components.items():
         try:
-            found[name] = read_description(file)
+            found[name] = read_description(file, events)
         except FmuError as error:
             raise FmuError(f"{path}: {name}: {str(error).replace(str(file), file.name)}") from None
+    return found
+
+
+def _check_names(structure: Structure, found: Mapping[str, FmuDescription]) -> None:
+    """Add connectors and values that components do not have, and clocks that have other intervals there."""
     for owner, variable in structure.kinds:
         if owner in found and variable not in found[owner].model.variables:
             text = f"must be a variable of {found[owner].model.name}, but {variable!r} is none"
@@ -202,6 +253,39 @@ def _descriptions(structure: Structure, path: Path) -> dict[str, FmuDescription]
         if owner not in found and (owner, variable) not in structure.kinds:
             text = f"must name a component's parameter or a system's connector, but {variable!r} of "
             structure.problems.append(Problem("$.ParameterBindings", f"{text}{owner or 'the system'} is none"))
+    for (owner, clock), interval in structure.intervals.items():
+        own = found[owner].model.clocks.get(clock) if owner in found else None
+        if own is not None and own.interval != interval:
+            text = f"must have the interval of the FMU's clock, {own.interval} s, but has {interval} s"
+            structure.problems.append(Problem(f"$.{owner}.Connectors", f"{clock} {text}", mismatch=True))
+
+
+def _configured(
+    structure: Structure,
+    descriptions: Mapping[str, FmuDescription],
+    names: Mapping[str, str],
+    inputs: Mapping[str, Signal],
+    path: Path,
+    events: bool,
+) -> dict[str, FmuDescription]:
+    """Return the descriptions with the values of structural parameters, which are taken out of the bindings."""
+    flow = Flow(structure, {name: d.model for name, d in descriptions.items()}, names)
+    handed, found = flow.starts(inputs), {}
+    for name, description in descriptions.items():
+        values: dict[str, Value] = {}
+        for parameter in sorted(description.structural):
+            node = (name, parameter)
+            given = handed.get(node, structure.given.get(node))
+            structure.given.pop(node, None)
+            structure.drivers.pop(node, None)
+            if given is not None:
+                value = own_value(description.model, parameter, given, structure.units, f"$.{name}", structure.problems)
+                values |= {} if value is None else {parameter: value}
+        try:
+            file = structure.components[name]
+            found[name] = read_configured(file, values, events)[0] if values else description
+        except FmuError as error:
+            raise FmuError(f"{path}: {name}: {error}") from None
     return found
 
 

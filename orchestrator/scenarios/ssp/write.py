@@ -1,6 +1,6 @@
 """Systems as SSP files: structure, parameter values with units, FMUs."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from lxml import etree
@@ -8,7 +8,7 @@ from lxml import etree
 from orchestrator.building.archive import write_archive
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.fmi.instances import FmuFactory
-from orchestrator.master.protocol import Unit, Value, Variable
+from orchestrator.master.protocol import Unit, Value
 from orchestrator.master.signals import Constant
 from orchestrator.master.system import Connection, Instance, System, split
 from orchestrator.scenarios.scenario import Scenario
@@ -22,22 +22,26 @@ from orchestrator.scenarios.ssp.common import (
     new_document,
     tag,
 )
+from orchestrator.scenarios.ssp.described import Described, connector_of, described, whole_values
 
 
-def write_ssp(path: Path, scenario: Scenario) -> None:
+def write_ssp(path: Path, scenario: Scenario, version: str = "1.0") -> None:
     """Write a scenario of FMUs as an SSP archive, whole or not at all.
 
     Sources that are constant become start values; SSP has no way to say others.
+
+    Args:
+        version: of SSP, "1.0" or "2.0".
     """
     scenario.system.check()
-    members = {STRUCTURE: _structure(scenario)}
+    members = {STRUCTURE: _structure(scenario, version)}
     for instance in scenario.system.instances:
         if not isinstance(instance.create, FmuFactory):
             raise ScenarioError(f"`{instance.name}` must be an FMU, but is not")
         content = instance.create.path.read_bytes()
         if members.setdefault(_source(instance), content) != content:
             raise ScenarioError(f"`{instance.name}` must not be another FMU of the name {instance.create.path.name}")
-        members[_values_file(instance)] = _values(instance, _start_values(scenario.system, instance))
+        members[_values_file(instance)] = _values(instance, _start_values(scenario.system, instance), version)
     try:
         write_archive(path, members)
     except Exception as error:
@@ -71,19 +75,20 @@ def _start_values(system: System, instance: Instance) -> dict[str, Value]:
         if value is None:
             raise ScenarioError(f"$.instances.{instance.name}.parameters.{variable}: {text}")
         values[variable] = value
-    return values
+    assert isinstance(instance.create, FmuFactory)
+    return {**instance.create.description.configured, **values}
 
 
-def _structure(scenario: Scenario) -> bytes:
-    root = new_document("ssd", "SystemStructureDescription", scenario.name)
+def _structure(scenario: Scenario, version: str) -> bytes:
+    root = new_document("ssd", "SystemStructureDescription", scenario.name, version)
     system = etree.SubElement(root, tag("ssd", "System"), name="system")
     elements = etree.SubElement(system, tag("ssd", "Elements"))
     for instance in scenario.system.instances:
-        _component(elements, scenario.system, instance)
+        _component(elements, scenario.system, instance, version)
     if scenario.system.connections:  # the schema knows no empty list
         connections = etree.SubElement(system, tag("ssd", "Connections"))
     for k, connection in enumerate(scenario.system.connections):
-        _connection(connections, connection, k)
+        _connection(connections, scenario.system, connection, k, version)
     stated = [i.solver_tolerance for i in scenario.system.instances if i.solver_tolerance is not None]
     add_master(system, scenario.algorithm.step, min(stated, default=None))
     _units(root, scenario.system.instances)
@@ -91,7 +96,7 @@ def _structure(scenario: Scenario) -> bytes:
     return document_bytes(root, "ssd", STRUCTURE)
 
 
-def _component(elements: etree._Element, system: System, instance: Instance) -> None:
+def _component(elements: etree._Element, system: System, instance: Instance, version: str) -> None:
     component = etree.SubElement(
         elements,
         tag("ssd", "Component"),
@@ -103,12 +108,16 @@ def _component(elements: etree._Element, system: System, instance: Instance) -> 
     connectors = etree.SubElement(component, tag("ssd", "Connectors"))
     # Only inputs that something feeds: some tools set the others to zero, over their start values.
     fed = {c.target for c in system.connections}
-    for variable in instance.model.variables.values():
-        given = variable.causality == "output" or f"{instance.name}.{variable.name}" in fed
-        if given and variable.type != "String":
-            kind = {"name": variable.name, "kind": variable.causality}
-            connector = etree.SubElement(connectors, tag("ssd", "Connector"), kind)
-            _type(connector, "ssc", variable)
+    given = [
+        v.name
+        for v in instance.model.variables.values()
+        if (v.causality == "output" or f"{instance.name}.{v.name}" in fed) and v.type != "String"
+    ]
+    for entry in described(instance, given, version):
+        kind = {"name": entry.name, "kind": entry.first.causality}
+        connector = etree.SubElement(connectors, tag("ssd", "Connector"), kind)
+        _type(connector, "ssc", entry)
+        _dimensions(connector, entry)
     if _start_values(system, instance):
         bindings = etree.SubElement(component, tag("ssd", "ParameterBindings"))
         etree.SubElement(
@@ -119,30 +128,37 @@ def _component(elements: etree._Element, system: System, instance: Instance) -> 
         )
 
 
-def _type(parent: etree._Element, space: str, variable: Variable, value: Value | None = None) -> None:
-    # An enumeration travels as an integer: of the tools tried, none reads the name of an item.
-    kind = "Integer" if variable.type == "Enumeration" else variable.type
-    element = etree.SubElement(parent, tag(space, kind))
-    if value is not None:
-        element.set("value", str(value).lower() if isinstance(value, bool) else str(value))
-    if kind == "Real" and variable.unit:
-        element.set("unit", variable.unit)
+def _type(parent: etree._Element, space: str, entry: Described, values: Sequence[Value] = ()) -> None:
+    element = etree.SubElement(parent, tag(space, entry.type))
+    texts = [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
+    if entry.sizes and entry.type == "String":
+        for text in texts:
+            etree.SubElement(element, tag(space, "Value"), value=text)
+    elif texts:
+        element.set("value", " ".join(texts))
+    if entry.first.type == "Real" and entry.first.unit:
+        element.set("unit", entry.first.unit)
 
 
-def _connection(parent: etree._Element, connection: Connection, k: int) -> None:
+def _dimensions(parent: etree._Element, entry: Described) -> None:
+    for size in entry.sizes:
+        etree.SubElement(parent, tag("ssc", "Dimension"), size=str(size))
+
+
+def _connection(parent: etree._Element, system: System, connection: Connection, k: int, version: str) -> None:
     if connection.quantum:
         raise ScenarioError(
             f"$.connections[{k}].quantum: must be 0 to be written as SSP, but is {connection.quantum!r}"
         )
-    start, end = split(connection.source), split(connection.target)
-    element = etree.SubElement(
-        parent,
-        tag("ssd", "Connection"),
-        startElement=start[0],
-        startConnector=start[1],
-        endElement=end[0],
-        endConnector=end[1],
-    )
+    ends: dict[str, str] = {}
+    for side, address in (("start", connection.source), ("end", connection.target)):
+        name, variable = split(address)
+        instance = system.instance(name)
+        assert instance is not None
+        connector, indices = connector_of(instance, variable, version)
+        ends |= {f"{side}Element": name, f"{side}Connector": connector}
+        ends |= {f"{side}Indices": indices} if indices else {}
+    element = etree.SubElement(parent, tag("ssd", "Connection"), ends)
     if (connection.factor, connection.offset) != (1.0, 0.0):
         linear = {"factor": repr(connection.factor), "offset": repr(connection.offset)}
         etree.SubElement(element, tag("ssc", "LinearTransformation"), linear)
@@ -169,15 +185,15 @@ def _unit(parent: etree._Element, unit: Unit) -> None:
         base.set("offset", repr(unit.offset))
 
 
-def _values(instance: Instance, values: Mapping[str, Value]) -> bytes:
-    root = new_document("ssv", "ParameterSet", VALUES)
+def _values(instance: Instance, values: Mapping[str, Value], version: str) -> bytes:
+    root = new_document("ssv", "ParameterSet", VALUES, version)
     parameters = etree.SubElement(root, tag("ssv", "Parameters"))
     used = set()
-    for name, value in values.items():
-        parameter = etree.SubElement(parameters, tag("ssv", "Parameter"), name=name)
-        variable = instance.model.variables[name]
-        used.add(variable.unit)
-        _type(parameter, "ssv", variable, value)
+    for entry in described(instance, values, version):
+        parameter = etree.SubElement(parameters, tag("ssv", "Parameter"), name=entry.name)
+        used.add(entry.first.unit)
+        _type(parameter, "ssv", entry, whole_values(instance, entry, values))
+        _dimensions(parameter, entry)
     units = [unit for name, unit in sorted(instance.model.units.items()) if name in used]
     if units:
         parent = etree.SubElement(root, tag("ssv", "Units"))
