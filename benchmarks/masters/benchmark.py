@@ -16,6 +16,7 @@ from benchmarks.masters.tools import TOOLS
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.building.build import ensure_built
 from orchestrator.building.native_build import ensure_native
+from orchestrator.building.python_fmi3 import ensure_python_fmi3
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
@@ -25,6 +26,7 @@ from orchestrator.shared.cache import cache_directory
 WATCHED = ("plant.theta_l", "twin_plant.theta_l")
 NUMBERS = ("wall [ms]", "cpu [ms]", "us per step", "wall ratio", "cpu ratio", "deviation [rad]")
 MOST_ROUNDS = 1000
+VERSIONS = (2, 3)
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,6 +61,7 @@ class BenchmarkResult(Result):
         """Return the tables."""
         job = self.job
         kind = "native FMUs" if self.arguments.get("native") else "FMUs"
+        kind += " of FMI 3.0" if job.fmi == 3 else ""
         title = f"{len(job.fmus)} {kind}, {job.steps} steps of {job.step:g} s, medians of {3 * self.rounds} runs"
         head = ("tool", "version", "scheme", *NUMBERS, "note")
         blocks: list[Block] = [table(title, head, [_cells(row, self.base, job.steps) for row in self.rows])]
@@ -86,6 +89,7 @@ def benchmark(
     pythons: Mapping[str, str] | None,
     scaling_too: bool,
     native: bool,
+    fmi: int,
     progress: Callable[[str], None],
 ) -> BenchmarkResult:
     """See ``orchestrator.benchmark``."""
@@ -102,15 +106,23 @@ def benchmark(
         if shutil.which(path) is None:
             text = f"`python` must name an interpreter for {tool}, but there is no program {path!r}"
             raise ScenarioError(text, "python")
-    fmus = ensure_native(FMUS, cache_directory("native"), here=True) if native else ensure_built(FMUS)
+    if fmi not in VERSIONS:
+        raise ScenarioError(f"`fmi` must be one of {', '.join(map(str, VERSIONS))}, but is {fmi!r}", "fmi")
+    fmus = _fmus(native, fmi)
     job = job_of(scenario_of_pair(Experiment(), fmus, 0.02, 0.5), WATCHED)
     rows = tuple(compare(job, chosen, rounds, dict(pythons or {}), progress))
-    given = {"rounds": rounds, "tools": chosen, "native": native}
+    given = {"rounds": rounds, "tools": chosen, "native": native, "fmi": fmi}
     if not scaling_too:
         return BenchmarkResult(rows, job, rounds, arguments=given)
     costs = tuple(scaling(fmus["Drivetrain"], progress=progress))
     sweeps, records = growth(progress)
     return BenchmarkResult(rows, job, rounds, costs, tuple(sweeps), tuple(records), given)
+
+
+def _fmus(native: bool, fmi: int) -> dict[str, Path]:
+    if native:
+        return ensure_native(FMUS, cache_directory(f"native{fmi}" if fmi != 2 else "native"), here=True, fmi=fmi)
+    return ensure_built(FMUS) if fmi == 2 else ensure_python_fmi3(FMUS)
 
 
 def _cells(row: ToolRow, base: ToolRow | None, steps: int) -> list[str]:

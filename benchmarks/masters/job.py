@@ -12,11 +12,12 @@ class BenchJob:
 
     Attributes:
         fmus: path of the FMU by instance, in execution order.
-        starts: ``[instance, variable, type, value]``.
+        starts: ``[instance, variable, type, value]``; the elements of an array in a row.
         connections: ``[instance, output, instance, input]``.
         references: value reference by instance and variable.
         watched: ``[instance, output]`` whose ends show that a tool did the work.
         step: communication step [s].
+        fmi: version of FMI of all FMUs, 2 or 3; the types of ``starts`` are those of it.
     """
 
     fmus: dict[str, str]
@@ -26,6 +27,7 @@ class BenchJob:
     watched: list[list[str]]
     step: float
     steps: int
+    fmi: int = 2
 
     def write(self, path: Path) -> None:
         """Write the job as JSON."""

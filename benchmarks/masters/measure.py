@@ -68,6 +68,9 @@ def compare(
         Times and ends of each tool, in the order of ``tools``.
     """
     found = {name: _Measured() for name in tools}
+    for name, measured in found.items():
+        if job.fmi == 3 and not TOOLS[name].fmi3:
+            measured.note = "takes no FMUs of FMI 3.0 with arrays"
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         path, result = Path(folder) / "job.json", Path(folder) / "result.json"
         job.write(path)

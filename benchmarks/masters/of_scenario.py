@@ -16,10 +16,12 @@ def job_of(scenario: Scenario, watched: Sequence[str]) -> BenchJob:
     fmus: dict[str, str] = {}
     starts: list[list[Any]] = []
     references: dict[str, dict[str, int]] = {}
+    fmi = 2
     for name in system.execution_order():
         instance = system.instance(name)
         assert instance is not None
         assert isinstance(instance.create, FmuFactory)
+        description = instance.create.description
         fmus[name] = str(instance.create.path.absolute())
         variables = instance.model.variables
         references[name] = {v.name: v.reference for v in variables.values()}
@@ -30,9 +32,10 @@ def job_of(scenario: Scenario, watched: Sequence[str]) -> BenchJob:
         for variable, raw in values.items():
             value = system.start_value(f"{name}.{variable}", raw)[0]
             kind = "Integer" if variables[variable].type == "Enumeration" else variables[variable].type
+            if description.version != "2.0":
+                kind, fmi = description.access[variable].kind, 3
             starts.append([name, variable, kind, value])
     connections = [[*split(c.source), *split(c.target)] for c in system.connections]
     steps = round((scenario.stop - scenario.start) / scenario.algorithm.step)
-    return BenchJob(
-        fmus, starts, connections, references, [[*split(w)] for w in watched], scenario.algorithm.step, steps
-    )
+    ends = [[*split(w)] for w in watched]
+    return BenchJob(fmus, starts, connections, references, ends, scenario.algorithm.step, steps, fmi)

@@ -40,6 +40,7 @@ class Tool:
         needs: import name of the package, or ``program:NAME``; empty for what is always there.
         again: what it returns may be run more than once.
         scheme: order in which values are exchanged: a key of ``reference.SCHEMES``.
+        fmi3: it takes FMUs of FMI 3.0 with arrays.
         package: under which the package is registered, when that is not its import name.
     """
 
@@ -49,6 +50,7 @@ class Tool:
     again: bool
     scheme: str
     package: str = ""
+    fmi3: bool = False
 
     @property
     def installed(self) -> bool:

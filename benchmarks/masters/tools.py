@@ -86,11 +86,11 @@ def _python_slaves(job: BenchJob) -> dict[str, Any]:
 
 
 TOOLS: dict[str, Tool] = {
-    "ours": Tool("this master, compiled loop", "", _ours_compiled, True, GAUSS_SEIDEL),
-    "ours_interpreted": Tool("this master, Python loop", "", ours_interpreted, True, GAUSS_SEIDEL),
+    "ours": Tool("this master, compiled loop", "", _ours_compiled, True, GAUSS_SEIDEL, fmi3=True),
+    "ours_interpreted": Tool("this master, Python loop", "", ours_interpreted, True, GAUSS_SEIDEL, fmi3=True),
     "floor": Tool("floor: the slaves' Python without FMI", "", _slaves_directly, False, GAUSS_SEIDEL),
-    "fmpy_batched": Tool("FMPy, one get and set per FMU", "fmpy", with_fmpy.batched, False, GAUSS_SEIDEL),
-    "fmpy": Tool("FMPy, one call per variable", "fmpy", with_fmpy.per_variable, False, GAUSS_SEIDEL),
+    "fmpy_batched": Tool("FMPy, one get and set per FMU", "fmpy", with_fmpy.batched, False, GAUSS_SEIDEL, fmi3=True),
+    "fmpy": Tool("FMPy, one call per variable", "fmpy", with_fmpy.per_variable, False, GAUSS_SEIDEL, fmi3=True),
     "ecos": Tool("ecos", "ecospy", others.ecos, False, JACOBI_READ_AGAIN),
     "libcosim": Tool("libcosim", "libcosimpy", others.libcosim, False, JACOBI),
     "pyfmi": Tool("PyFMI", "pyfmi", others.pyfmi, False, JACOBI),

@@ -14,12 +14,12 @@ def slaves_of(job: BenchJob) -> dict[str, Any]:
         Slaves, to be freed by the caller.
     """
     import fmpy
-    from fmpy.fmi2 import FMU2Slave
 
+    kind = _slave2() if job.fmi == 2 else _slave3()
     slaves: dict[str, Any] = {}
     for name, path in job.fmus.items():
         description = fmpy.read_model_description(path)
-        slave = FMU2Slave(
+        slave = kind(
             guid=description.guid,
             unzipDirectory=fmpy.extract(path),
             modelIdentifier=description.coSimulation.modelIdentifier,
@@ -27,13 +27,37 @@ def slaves_of(job: BenchJob) -> dict[str, Any]:
         )
         slave.instantiate()
         slaves[name] = slave
-    for name, variable, kind, value in job.starts:
-        getattr(slaves[name], f"set{kind}")([job.references[name][variable]], [value])
+    arrays: dict[tuple[str, str, int], list[Any]] = {}
+    for name, variable, type_, value in job.starts:
+        arrays.setdefault((name, type_, job.references[name][variable]), []).append(value)
+    for (name, type_, reference), values in arrays.items():
+        getattr(slaves[name], f"set{type_}")([reference], values)
     for slave in slaves.values():
-        slave.setupExperiment(startTime=0.0)
+        if job.fmi == 2:
+            slave.setupExperiment(startTime=0.0)
         slave.enterInitializationMode()
         slave.exitInitializationMode()
     return slaves
+
+
+def _slave2() -> Any:
+    from fmpy.fmi2 import FMU2Slave
+
+    return FMU2Slave
+
+
+def _slave3() -> Any:
+    from fmpy.fmi3 import FMU3Slave
+
+    class Slave(FMU3Slave):  # type: ignore[misc]
+        """With the names that FMI 2.0 has for the calls of a loop."""
+
+        setReal = FMU3Slave.setFloat64
+
+        def getReal(self, vr: list[int]) -> list[float]:
+            return list(self.getFloat64(vr, len(vr)))
+
+    return Slave
 
 
 def ends_of(job: BenchJob, slaves: Mapping[str, Any]) -> dict[str, float]:

@@ -13,6 +13,7 @@ def benchmark(
     pythons: Mapping[str, str] | None = None,
     scaling_too: bool = False,
     native: bool = False,
+    fmi: int = 2,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the paired loops under this master and under others, turn by turn; in a clone of the project alone.
@@ -23,6 +24,7 @@ def benchmark(
         pythons: interpreter by tool, for tools that cannot share an environment.
         scaling_too: measure also cost against FMUs, steps and cases, and memory.
         native: the FMUs are native builds for this platform instead of Python FMUs.
+        fmi: version of FMI of the FMUs, 2 or 3; tools that do not take those of FMI 3.0 say so.
         progress: called with a line on what is measured.
 
     Returns:
@@ -37,6 +39,6 @@ def benchmark(
         True
     """
     result: Result = import_masters("benchmark").benchmark(
-        tools, rounds=rounds, pythons=pythons, scaling_too=scaling_too, native=native, progress=progress
+        tools, rounds=rounds, pythons=pythons, scaling_too=scaling_too, native=native, fmi=fmi, progress=progress
     )
     return result

@@ -20,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="run this tool with another interpreter, since some cannot share an environment; may be repeated",
     )
     parser.add_argument("--native", action="store_true", help="native FMUs instead of Python FMUs")
+    parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help="version of FMI (default: %(default)s)")
     parser.add_argument("--scaling", action="store_true", help="also cost against FMUs, steps, cases; memory")
 
 
@@ -32,6 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
             pythons=dict(word.partition("=")[::2] for word in arguments.python),
             scaling_too=arguments.scaling,
             native=arguments.native,
+            fmi=arguments.fmi,
             progress=_say,
         )
         result.write(folder, arguments.out)

@@ -12,6 +12,7 @@ from benchmarks.masters.measure import compare
 from benchmarks.masters.of_scenario import job_of
 from benchmarks.masters.reference import SCHEMES, reference_ends
 from orchestrator.building.build import ensure_built
+from orchestrator.building.compilers import find_compiler
 from orchestrator.cli import main
 from orchestrator.master import session
 from orchestrator.paired.experiment import Experiment
@@ -41,6 +42,16 @@ def test_command(tmp_path: Path, capsys) -> None:
         assert rows["pyfmi"]["note"] == "not installed"
     assert rows["ours"]["cpu"] < 0.7 * rows["fmpy"]["cpu"]
     assert "floor" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
+def test_fmus_of_fmi_3_where_tools_take_them(tmp_path: Path, capsys) -> None:
+    words = ["bench", "--rounds", "1", "--native", "--fmi", "3", "--tools", "ours,fmpy_batched,fmpy,floor"]
+    assert main([*words, "--out", str(tmp_path)]) == 0
+    rows = {row["tool"]: row for row in json.loads((tmp_path / "bench.json").read_text())["results"]["rows"]}
+    assert all(rows[name]["deviation"] == 0.0 for name in ("ours", "fmpy_batched", "fmpy"))
+    assert rows["floor"]["note"] == "takes no FMUs of FMI 3.0 with arrays"
+    assert "native FMUs of FMI 3.0" in capsys.readouterr().out
 
 
 def test_bad_arguments(tmp_path: Path, capsys) -> None:
