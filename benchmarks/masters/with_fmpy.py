@@ -49,7 +49,7 @@ def _slave2() -> Any:
 def _slave3() -> Any:
     from fmpy.fmi3 import FMU3Slave
 
-    class Slave(FMU3Slave):  # type: ignore[misc]
+    class Slave(FMU3Slave):
         """With the names that FMI 2.0 has for the calls of a loop."""
 
         setReal = FMU3Slave.setFloat64
