@@ -70,7 +70,7 @@ def exact(n: int) -> list[dict]:
     record = record_from_columns(columns, "exact")
     row = _row(record, alpha, "maximum_likelihood")
     values = cramer_rao.truth_values(truth["linear"], alpha, truth["states"][0, :5])
-    row["bound"] = cramer_rao.bound(make_problem(record, default_model()), values, (1e-4, 1e-4))
+    row["bound"] = cramer_rao.error_bound(make_problem(record, default_model()), values, (1e-4, 1e-4))
     return [row | {"excitation": excitation}]
 
 
@@ -96,7 +96,7 @@ def joint(n: int) -> list[dict]:
     result = maximum_likelihood.estimate(records[0], default_model(), more=records[1:])
     states = [truth["states"][0, :5] for _, truth in made]
     values = cramer_rao.truth_values(made[0][1]["linear"], alpha, *states)
-    bound = cramer_rao.bound([make_problem(record, default_model()) for record in records], values, (1e-4, 1e-4))
+    bound = cramer_rao.error_bound([make_problem(record, default_model()) for record in records], values, (1e-4, 1e-4))
     low, high = result.interval
     return [
         {

@@ -8,7 +8,7 @@ from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
-from orchestrator.plants.compiled import compiled
+from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.reference import ReferencePlant, linear_solution, reference_solution
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters
 
@@ -28,7 +28,7 @@ def run_fmu(path, torque, **values):
 
 def run_compiled(torque, **values):
     """The same from the compiled source."""
-    plant, p = compiled("drivetrain"), parameters(**values)
+    plant, p = compile_module("drivetrain"), parameters(**values)
     x = plant.consistent_start((0.0,) * 8, p)
     mode, table = plant.initial_mode(x, p), plant.prepare(p, H)
     states = [x[:5]]

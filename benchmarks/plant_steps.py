@@ -12,7 +12,7 @@ from types import ModuleType
 
 import numpy as np
 
-from orchestrator.plants.compiled import compiled
+from orchestrator.plants.compiled import compile_module
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, NAMES, PARAMETERS, with_values
 
 STEPS = (1e-5, 2e-4, 1e-3, 5e-3, 1e-2, 2e-2)
@@ -87,7 +87,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--extreme", action="store_true")
     arguments = parser.parse_args()
-    plant = compiled("drivetrain")
+    plant = compile_module("drivetrain")
     warm_up(plant)
     rng = np.random.default_rng(arguments.seed)
     draw = draw_extreme if arguments.extreme else draw_machine

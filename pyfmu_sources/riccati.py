@@ -33,7 +33,7 @@ def product(a: Square, b: Square) -> Square:
     return made
 
 
-def transposed(a: Square) -> Square:
+def transpose(a: Square) -> Square:
     """Return ``a'``."""
     made: Square = [0.0] * SIZE
     for r in range(ORDER):
@@ -60,7 +60,7 @@ def largest(a: Square) -> float:
     return most
 
 
-def divided_by(w: Square, a: Square) -> Square:
+def left_divide(w: Square, a: Square) -> Square:
     """Return ``w^-1 a`` (Gauss and Jordan, each column's pivot its largest item)."""
     left: Square = list(w)
     right: Square = list(a)
@@ -104,10 +104,10 @@ def regulator_gains(A: Square, B: Column, weights: Column, input_weight: float) 
         W: Square = product(G, H)
         for n in range(ORDER):
             W[n * ORDER + n] += 1.0
-        V = divided_by(W, F)
-        T = transposed(F)
+        V = left_divide(W, F)
+        T = transpose(F)
         gained = product(T, product(H, V))
-        G = symmetric_sum(G, product(F, product(divided_by(W, G), T)))
+        G = symmetric_sum(G, product(F, product(left_divide(W, G), T)))
         H = symmetric_sum(H, gained)
         F = product(F, V)
         if largest(gained) <= SETTLED * largest(H):

@@ -9,7 +9,7 @@ from orchestrator.diagnosis.selection.grading import GRADE_RULES
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.paired.settings import MapSettings
-from orchestrator.shared.settings import Settings, described
+from orchestrator.shared.settings import Settings, describe_settings
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
 WORKFLOWS: tuple[tuple[str, str, type[Settings]], ...] = (
@@ -43,7 +43,7 @@ def page() -> str:
     """Return the page."""
     parts = [HEAD]
     for title, command, kind in WORKFLOWS:
-        rows = [f"| `{name}` | {_shown(default)} | {why} |" for name, default, why in described(kind)]
+        rows = [f"| `{name}` | {_shown(default)} | {why} |" for name, default, why in describe_settings(kind)]
         parts.append(
             "\n".join([f"\n## {title} (`{command}`)\n", "| setting | default | meaning |", "|---|---|---|", *rows, ""])
         )

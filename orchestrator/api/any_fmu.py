@@ -103,7 +103,7 @@ class FmuDiagnosisResult(Result):
         d, report = self.diagnosis, self.diagnosis.settings.report
         return FmuDiagnosisFound(
             verdict=d.verdict,
-            trust=d.trust.found(),
+            trust=d.trust.to_result(),
             effects=tuple(effect_found(effect) for effect in d.effects),
             parameters=parameter_results(d),
             test=tuple(test_found(test, report) for test in d.test),

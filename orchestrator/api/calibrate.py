@@ -81,7 +81,7 @@ class CalibrationResult(Result):
         }
         return FmuCalibrationFound(
             explained=c.explained,
-            trust=self.trust.found(),
+            trust=self.trust.to_result(),
             parameters=parameters,
             not_told_apart=c.confounded,
             test=tuple(test_found(test, d.settings.report) for test in d.test),

@@ -175,7 +175,7 @@ class EstimateResult(Result):
         r, repeats = self.record, self.repeats
         fit = next((e for e in self.estimates if e.method == "maximum_likelihood"), None)
         best = entries[self.best.method] if self.estimates else MethodFound()
-        answer = msgspec.structs.asdict(best) | {"trust": self.trust.found()}
+        answer = msgspec.structs.asdict(best) | {"trust": self.trust.to_result()}
         return EstimateFound(
             **answer,
             record=describe_record(r),
@@ -183,8 +183,8 @@ class EstimateResult(Result):
             more_records=tuple(describe_record(other) for other in self.more) or None,
             repeats=None if repeats is None else RepeatsFound(repeats.sources, repeats.floor),
             method=self.best.method if self.estimates else None,
-            play=self._play().found() if self.estimates and math.isfinite(self.alpha) else None,
-            live=None if fit is None or r.missing or not math.isfinite(fit.alpha) else live_fitted_model(r, fit),
+            play=self._play().to_result() if self.estimates and math.isfinite(self.alpha) else None,
+            live=None if fit is None or r.n_missing or not math.isfinite(fit.alpha) else live_fitted_model(r, fit),
             diagnosis=None if self.diagnosis is None else self.diagnosis.results((place or Path()) / DIAGNOSIS),
             undiagnosed=self.undiagnosed or None,
             settings=as_tables(self.settings),
@@ -288,7 +288,7 @@ def estimate(
             with numeric_errors(f"{measured.source}: `{name}` finds no solution for this record"):
                 progress(name, name.replace("_", " "), 0.0)
                 fitted = _estimate_by(name, measured, more, model, time_limit, chosen, partial(progress, name))
-                bound = _bound(measured, model, [*(m.estimate for m in found if m.estimate is not None), fitted])
+                bound = _error_bound(measured, model, [*(m.estimate for m in found if m.estimate is not None), fitted])
         except NotApplicableError as error:
             found.append(MethodResult(name, None, math.inf, time.perf_counter() - begun, str(error)))
         else:
@@ -365,19 +365,19 @@ def _estimate_by(
         )
     if more:
         raise NotApplicableError("takes one record; several are fitted together by maximum_likelihood")
-    if record.missing and name not in SKIPS_MISSING:
-        raise NotApplicableError(f"takes records without missing samples, but {record.missing} rows have some")
+    if record.n_missing and name not in SKIPS_MISSING:
+        raise NotApplicableError(f"takes records without missing samples, but {record.n_missing} rows have some")
     if name == WITHOUT_TORQUE:
         return two_encoders.estimate(record, model, settings.flanks)
     return estimator(name)(record, model)
 
 
-def _bound(record: Record, model: Model, estimates: Sequence[Estimate]) -> float:
+def _error_bound(record: Record, model: Model, estimates: Sequence[Estimate]) -> float:
     """Return the record's Cramer-Rao bound: at the fit of the likelihood, or else at the newest estimate."""
     for estimate in estimates:
         if "cramer_rao" in estimate.diagnostics:
             return float(estimate.diagnostics["cramer_rao"])
     if not (record.has_torque and estimates[-1].visible):
         return math.inf
-    bound = cramer_rao.bound_at(record, model, estimates[-1].alpha)
+    bound = cramer_rao.error_bound_at(record, model, estimates[-1].alpha)
     return bound if bound < UNSEEN else math.inf

@@ -104,7 +104,7 @@ class InspectResult(Result):
         r = self.record
         read = [f"{r.source}: {'; '.join(r.notes)}"] if r.notes else []
         timing = "" if r.timing is None else f"; {r.timing.describe()}"
-        read.append(f"{r.size} rows, {r.duration:g} s{timing}; {r.missing} rows with missing samples")
+        read.append(f"{r.size} rows, {r.duration:g} s{timing}; {r.n_missing} rows with missing samples")
         channels = table(
             "Channels",
             ("channel", "unit", "least", "most", "rounded to", "noise", "at an end [%]", "missing"),
@@ -152,7 +152,7 @@ class InspectResult(Result):
         """Return what ``inspect.json`` says."""
         r, found, angles = self.record, self.sufficiency, self.two_angles
         return InspectFound(
-            record=RecordFound(r.size, r.step, r.source, r.missing, tuple(r.notes)),
+            record=RecordFound(r.size, r.step, r.source, r.n_missing, tuple(r.notes)),
             channels=tuple(ChannelFound(**vars(c)) for c in self.channels),
             excitation=tuple(BandFound(**vars(b)) for b in self.excitation),
             reversals=ReversalsFound(*self.reversals),

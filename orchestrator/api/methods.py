@@ -33,7 +33,7 @@ class MethodResult:
 
 def describe_record(record: Record) -> RecordFound:
     """Return rows, step, source of a record, and what was detected and assumed when it was read."""
-    return RecordFound(record.size, record.step, record.source, record.missing, tuple(record.notes))
+    return RecordFound(record.size, record.step, record.source, record.n_missing, tuple(record.notes))
 
 
 def method_row(result: MethodResult) -> list[str]:
@@ -70,7 +70,7 @@ def method_entry(result: MethodResult) -> MethodFound:
         unit="rad",
         visible=estimate.visible,
         message=estimate.message,
-        trust=None if result.trust is None else result.trust.found(),
+        trust=None if result.trust is None else result.trust.to_result(),
         seconds=result.seconds,
         diagnostics=dict(estimate.diagnostics),
     )

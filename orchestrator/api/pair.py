@@ -135,8 +135,8 @@ class PairResult(Result):
         return PairFound(
             alpha=self.alpha,
             play={
-                "actual": self._play(self.alpha).found(),
-                "estimated": None if self.estimate is None else self._play(self.estimate.alpha).found(),
+                "actual": self._play(self.alpha).to_result(),
+                "estimated": None if self.estimate is None else self._play(self.estimate.alpha).to_result(),
             },
             S=self.total,
             estimate=None if self.estimate is None else GapFound(**asdict(self.estimate)),

@@ -15,7 +15,7 @@ from orchestrator.master.signals import Constant
 from orchestrator.scenarios import scenario as scenarios
 from orchestrator.scenarios.isolated import Safety, describe_walls
 from orchestrator.scenarios.scenario import Scenario, load_scenario
-from orchestrator.scenarios.ssp.read import opened_ssp
+from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.operating_system import LIMITS
 from orchestrator.shared.results import EventsFound, RemarkFound, SignalFound, SignalsFound, WallsFound
 
@@ -216,5 +216,5 @@ def run_ssp(
         raise ScenarioError(f"`step` must be finite and positive, but is {step!r}", "step")
     constants = {name: Constant(float(value)) for name, value in inputs.items()}
     given = {"action": "run", "file": str(path), "step": step, "stop": stop, "jacobi": jacobi, "events": events}
-    with opened_ssp(path, constants, step, jacobi, events) as scenario:
+    with open_ssp(path, constants, step, jacobi, events) as scenario:
         return _run(scenario, path.name, "ssp", stop, safety, tell, given)

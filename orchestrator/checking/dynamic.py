@@ -202,7 +202,7 @@ class _Watcher:
             self._add(
                 "files.changed", f"the FMU must leave its files alone, but changed {', '.join(changed[:5])}", changed[0]
             )
-        if jail.printed_bytes() >= self.limits.output or any(
+        if jail.output_size() >= self.limits.output or any(
             os.lstat(jail.scratch / name).st_size >= self.limits.output for name in written
         ):
             self._add("limits.output", f"text and files must stay below {self.limits.output >> 20} MiB, but do not")

@@ -73,7 +73,7 @@ class Execution:
     stages: Mapping[str, str]
 
     @property
-    def carried_out(self) -> tuple[str, ...]:
+    def stages_run(self) -> tuple[str, ...]:
         """The stages that were carried out."""
         return tuple(stage for stage, reason in self.stages.items() if not reason)
 
@@ -103,7 +103,7 @@ class FmuFindings:
     @property
     def executed(self) -> bool:
         """Whether the FMU's binary was run."""
-        return any("load" in execution.carried_out for execution in self.executions)
+        return any("load" in execution.stages_run for execution in self.executions)
 
     @property
     def outcomes(self) -> tuple[RuleOutcome, ...]:

@@ -68,13 +68,13 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def severities(self, fmu: str) -> dict[str, Severity]:
         """Return the rules that count for an FMU, each with its severity."""
         special = [entry for entry in self.fmu if entry.fits(fmu)]
-        selected = _matching_rules(self.select) - _matching_rules(self.ignore)
+        selected = _match_rules(self.select) - _match_rules(self.ignore)
         for entry in special:
-            selected = (selected | _matching_rules(entry.select)) - _matching_rules(entry.ignore)
+            selected = (selected | _match_rules(entry.select)) - _match_rules(entry.ignore)
         severities = {name: rule.severity for name, rule in RULES.items() if name in selected}
         for table in (self.severity, *(entry.severity for entry in special)):
             for pattern, severity in table.items():
-                severities |= dict.fromkeys(_matching_rules([pattern]) & severities.keys(), severity)
+                severities |= dict.fromkeys(_match_rules([pattern]) & severities.keys(), severity)
         return severities
 
 
@@ -91,7 +91,7 @@ def read_policy(path: Path) -> Policy:
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise InputError(f"the policy {path} must be a valid policy file, but is not: {error}") from None
     for place, pattern in _patterns(policy):
-        if not _matching_rules([pattern]):
+        if not _match_rules([pattern]):
             raise InputError(f"{path}: `{place}` must name a rule or a group such as `archive.*`, but is {pattern!r}")
     if policy.baseline:
         policy = msgspec.structs.replace(policy, baseline=str(path.parent / policy.baseline))
@@ -105,5 +105,5 @@ def _patterns(policy: Policy) -> Iterable[tuple[str, str]]:
             yield from ((prefix + key, pattern) for pattern in getattr(entry, key))
 
 
-def _matching_rules(patterns: Iterable[str]) -> set[str]:
+def _match_rules(patterns: Iterable[str]) -> set[str]:
     return {name for pattern in patterns for name in fnmatch.filter(RULES, pattern)}

@@ -105,7 +105,7 @@ def _unknowns(d: Description, section: tuple[StructureEntry, ...]) -> Iterator[F
         v = d.variable(u.variable)
         path = u.path(d.dialect.identity)
         if v is None:
-            yield Finding("structure.index", path, f"{_expected_text(d)}, but is {u.variable}")
+            yield Finding("structure.index", path, f"{_index_rule(d)}, but is {u.variable}")
         elif u.variable in seen:
             yield Finding(
                 "structure.duplicate", path, f"a variable must be listed once, but `{v.name}` is listed again"
@@ -118,7 +118,7 @@ def _unknowns(d: Description, section: tuple[StructureEntry, ...]) -> Iterator[F
         yield from _dependencies(d, u, initial)
 
 
-def _expected_text(d: Description) -> str:
+def _index_rule(d: Description) -> str:
     if d.dialect.version == "2.0":
         return f"an index must be from 1 to {len(d.variables)}"
     return "a value reference must be that of a variable"
@@ -145,7 +145,7 @@ def _dependencies(d: Description, u: StructureEntry, initial: bool) -> Iterator[
     for known_number in u.dependencies or ():
         known = d.variable(known_number)
         if known is None:
-            yield Finding("structure.dependencies", path, f"{_expected_text(d)}, but is {known_number}")
+            yield Finding("structure.dependencies", path, f"{_index_rule(d)}, but is {known_number}")
         elif initial and known.causality in ("output", "local", "calculatedParameter") and known.initial != "exact":
             message = "a dependency must be an input, a parameter or have initial exact, but"
             yield Finding("structure.dependencies", path, f"{message} `{known.name}` is none of these")

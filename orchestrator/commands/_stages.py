@@ -57,12 +57,12 @@ class Stages:
         if share > 0.0:
             self._expected = (time.monotonic() - self._begun) / min(share, 1.0)
 
-    def left(self) -> float:
+    def time_left(self) -> float:
         """Return the time that is left of the piece of work."""
         return max(self._expected - (time.monotonic() - self._begun), 0.0)
 
     def _line(self) -> RenderableType:
-        left = self.left()
+        left = self.time_left()
         done = 1.0 - left / self._expected if self._expected > 0.0 else 0.0
         minutes, seconds = divmod(round(left), 60)
         line = Table.grid(padding=(0, 1), expand=True)

@@ -25,8 +25,8 @@ def positive(text: str) -> float:
 
 def note_missing_walls() -> None:
     """Say what this system does not enforce around FMUs that are not ours, where it does not enforce everything."""
-    if support().missing:
-        note(f"FMUs that are not ours run with {LIMITS}, but {support().missing}")
+    if support().not_enforced:
+        note(f"FMUs that are not ours run with {LIMITS}, but {support().not_enforced}")
 
 
 def note(text: str) -> None:

@@ -17,7 +17,7 @@ MODEST_TORQUE_NOISE = 1e-2  # N.m.s^0.5, where no fit has told
 NOISE_PREFIXES = ("log_noise_", "log_torque_")
 
 
-def bound_of_fit(likelihood: Likelihood, fit: GapFit) -> float:
+def error_bound_of_fit(likelihood: Likelihood, fit: GapFit) -> float:
     """Return the bound [rad] on alpha at a fit, noise levels and process noise as fitted.
 
     The Fisher information of the innovations form: for Gaussian one-step errors e with variance s,
@@ -28,7 +28,7 @@ def bound_of_fit(likelihood: Likelihood, fit: GapFit) -> float:
     return math.sqrt(fit.covariance[column, column])
 
 
-def bound(
+def error_bound(
     problem: GapProblem | Sequence[GapProblem],
     values: Mapping[str, float],
     noise: tuple[float, float],
@@ -79,7 +79,7 @@ def truth_values(linear: Mapping[str, float], alpha: float, *states: Array) -> d
     return values
 
 
-def bound_at(record: Record, model: Model, alpha: float) -> float:
+def error_bound_at(record: Record, model: Model, alpha: float) -> float:
     """Return the bound [rad] for a half-gap ``alpha`` on a record, for the nominal plant and modest torque noise.
 
     Args:
@@ -87,4 +87,4 @@ def bound_at(record: Record, model: Model, alpha: float) -> float:
     """
     problem = make_problem(record, model)
     noise = problem.noise.measured
-    return bound(problem, {ALPHA: alpha}, noise, MODEST_TORQUE_NOISE)
+    return error_bound(problem, {ALPHA: alpha}, noise, MODEST_TORQUE_NOISE)

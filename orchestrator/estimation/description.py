@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.estimation.cramer_rao import bound_of_fit
+from orchestrator.estimation.cramer_rao import error_bound_of_fit
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.likelihood import GapFit, Likelihood
 from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
@@ -44,7 +44,7 @@ def describe(fit: GapFit) -> Estimate:
         "iterations": fit.iterations,
         "traversals": traversals,
         "profile_limit": limit,
-        "cramer_rao": bound_of_fit(likelihood, fit),
+        "cramer_rao": error_bound_of_fit(likelihood, fit),
         "deviance": fit.point.deviance,
         "parameters": _parameters(likelihood, fit),
         "innovation_autocorrelation": [float(_autocorrelation(white[:, n])) for n in range(white.shape[1])],

@@ -207,11 +207,11 @@ def _judge(name: str, shape: Array, task: _Task) -> Excitation:
     if fastest > task.limits.speed:
         return Excitation(name, u, math.inf, float(np.max(np.abs(u))), fastest)
     noise = (_noise(task.model, "theta_m", 0), _noise(task.model, "theta_l", 1))
-    bound = bound_of_excitation(task.model, task.time, u, task.alpha, noise, task.motor_only)
+    bound = error_bound_of_excitation(task.model, task.time, u, task.alpha, noise, task.motor_only)
     return Excitation(name, u, bound, float(np.max(np.abs(u))), fastest)
 
 
-def bound_of_excitation(
+def error_bound_of_excitation(
     model: Model, time: Array, u: Array, alpha: float, noise: tuple[float, float], motor_only: bool
 ) -> float:
     """Return the bound [rad] on a half-gap ``alpha`` that a torque would give on the model's plant, from rest.
@@ -229,7 +229,7 @@ def bound_of_excitation(
         return math.inf
     record = Record(time, u, states[:, 0].copy(), None if motor_only else states[:, 2].copy(), "simulated")
     truth = cramer_rao.truth_values({}, alpha, np.zeros(5))
-    return cramer_rao.bound(make_problem(record, model), truth, noise, TORQUE_NOISE)
+    return cramer_rao.error_bound(make_problem(record, model), truth, noise, TORQUE_NOISE)
 
 
 def _noise(model: Model, column: str, place: int) -> float:

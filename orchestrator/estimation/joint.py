@@ -64,7 +64,7 @@ class JointLikelihood(Likelihood):
         """Return the innovations of all records at ``theta``."""
         runs = []
         for part, places in zip(self._parts, self._own, strict=True):
-            runs.append(part.changed(soft=self.soft).run(theta[places], keep))
+            runs.append(part.with_options(soft=self.soft).run(theta[places], keep))
         return Innovations(
             np.concatenate([run.errors for run in runs]),
             np.concatenate([run.variances for run in runs]),
@@ -94,7 +94,7 @@ def _evidence(record: Record, estimate: Estimate, start: int, stop: int) -> dict
     return {
         "source": record.source,
         "rows": record.size,
-        "missing": record.missing,
+        "missing": record.n_missing,
         "traversals": int(np.count_nonzero(np.diff(flanks))),
         "one_step_error_in_noise": [float(np.sqrt(np.mean(errors[:, k] ** 2))) / noise[k] for k in range(len(noise))],
     }

@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-from orchestrator.shared.numba_cache import kept
+from orchestrator.shared.numba_cache import njit_on_disk
 
 BLUR = 3e-4  # least standard deviation of the twist [rad] in a soft run
 MOST_EVENTS = 20  # in one sample
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped-def]
     """Fill the exact transition over ``h`` of ``x' = a x + b_u u + b_1`` from its Taylor series.
 
@@ -45,7 +45,7 @@ def transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped-
             break
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def _derivative(a, b_u, b_1, x, u, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with the time derivative of ``x`` in one mode."""
     for r in range(5):
@@ -55,7 +55,7 @@ def _derivative(a, b_u, b_1, x, u, out):  # type: ignore[no-untyped-def]
         out[r] = total
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def _first_root(v0, s0, v1, s1, h):  # type: ignore[no-untyped-def]
     """Return the first time in (0, h] at which the cubic with these end values and slopes turns negative, or -1.0."""
     c1 = h * s0
@@ -88,7 +88,7 @@ def _first_root(v0, s0, v1, s1, h):  # type: ignore[no-untyped-def]
     return -1.0
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def _next_event(normal, alpha, flank, x, end, h):  # type: ignore[no-untyped-def]
     """Return (time, side) of the first meeting of twist and flank between states ``x`` and ``end``; -1.0: none.
 
@@ -118,7 +118,7 @@ def _next_event(normal, alpha, flank, x, end, h):  # type: ignore[no-untyped-def
     return hit, side
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def _cut_at(mats, b_u, b_1, normal, edge, hit, left, u, x, part, y):  # type: ignore[no-untyped-def]
     """Fill ``y`` and the transition ``part`` at the event near ``hit``, and return its time; ``edge`` is the flank."""
     part_u = np.empty(5)
@@ -139,7 +139,7 @@ def _cut_at(mats, b_u, b_1, normal, edge, hit, left, u, x, part, y):  # type: ig
     return hit
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x, total, end):  # type: ignore[no-untyped-def]
     """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch.
 
@@ -215,7 +215,7 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
         transition(mats[flank], b_u, b_1[flank], left, f, g_u, g_1)
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def advance_blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore[no-untyped-def]
     """Advance ``x`` over ``h`` with the dead zone averaged over the twist's distribution (Booton 1954).
 
@@ -273,7 +273,7 @@ def advance_blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type
         total[:, :] = one @ total
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def run_free(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x0, states):  # type: ignore[no-untyped-def]
     """Fill ``states`` (n, 5) with the run from ``x0`` under ``u`` (n,), nothing measured.
 
@@ -297,7 +297,7 @@ def run_free(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x0,
         propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u[k], x, total, end)
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def _update(x, cov, row, e, s, gain, work):  # type: ignore[no-untyped-def]
     """Correct state and covariance in place by the error ``e``, of variance ``s``, of the measured state ``row``."""
     for r in range(5):
@@ -311,7 +311,7 @@ def _update(x, cov, row, e, s, gain, work):  # type: ignore[no-untyped-def]
             cov[r, c] = 0.5 * (work[r, c] + work[c, r])
 
 
-@kept(nogil=True)
+@njit_on_disk(nogil=True)
 def run_filter(  # type: ignore[no-untyped-def]
     mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, u_variance, y, variance, intensity, x0, errors,
     variances, states, contacts, soft,

@@ -97,7 +97,7 @@ class Likelihood:
         self._mean = problem.start
         self._weight = np.array([u.deviation**-2 if math.isfinite(u.deviation) else 0.0 for u in problem.unknowns])
 
-    def changed(
+    def with_options(
         self, *, soft: bool | None = None, information: Array | None = None, problem: GapProblem | None = None
     ) -> Self:
         """Return the likelihood with other flanks, information or bounds of the unknowns.
@@ -117,7 +117,7 @@ class Likelihood:
         return 1.0 if self.soft else DIFFERENCE
 
     @property
-    def damping(self) -> float:
+    def first_damping(self) -> float:
         """Return the damping with which a fit starts."""
         return 1e-3 if self.soft else START_DAMPING
 
@@ -191,7 +191,7 @@ class Likelihood:
         information = 0.5 * (information + information.T) + np.diag(weight)
         known = self.information.copy()
         known[np.ix_(free, free)] = information
-        return gradient, information, self.changed(information=known)
+        return gradient, information, self.with_options(information=known)
 
     def scores(self, point: Point, free: NDArray[np.int64]) -> Array:
         """Return what each row adds to the gradient (k,) of half the objective, without the prior.
@@ -272,7 +272,7 @@ def maximise(
     lower = np.array([unknowns[n].lower for n in places])
     upper = np.array([unknowns[n].upper for n in places])
     point = likelihood.at(start)
-    damping, converged, done = likelihood.damping, False, 0
+    damping, converged, done = likelihood.first_damping, False, 0
     information = np.eye(places.size)
     for _ in range(iterations):
         done += 1
@@ -284,7 +284,7 @@ def maximise(
         if before - point.objective < tolerance:
             # The first differences may have been taken too coarsely: look again with better ones.
             if before == point.objective and done == 1:
-                damping = likelihood.damping
+                damping = likelihood.first_damping
                 continue
             converged = True
             break

@@ -28,7 +28,7 @@ def repeats_of(records: Sequence[Record]) -> Repeats | None:
         return None
     names = ("theta_m",) if records[0].theta_l is None else ("theta_m", "theta_l")
     variances, sources = [], dict[str, None]()
-    for one, other in itertools.combinations((record.filled() for record in records), 2):
+    for one, other in itertools.combinations((record.fill_missing() for record in records), 2):
         size = min(one.size, other.size)
         rms = float(np.sqrt(np.mean(one.u[:size] ** 2)))
         apart = float(np.sqrt(np.mean((one.u[:size] - other.u[:size]) ** 2)))

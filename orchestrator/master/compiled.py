@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from orchestrator.master.protocol import NativeCalls, NativeTransfer
 from orchestrator.master.wiring import Wiring
-from orchestrator.shared.machine_code import compiled_library
+from orchestrator.shared.machine_code import compile_library
 
 Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
@@ -103,7 +103,7 @@ class _Failure(ctypes.Structure):
 @cache
 def _loaded(holds_lock: bool) -> Any:
     """Return ``run_steps`` of the compiled ``loop.c``, or ``None``."""
-    path = compiled_library(SOURCE)
+    path = compile_library(SOURCE)
     if path is None:
         return None
     try:
@@ -117,7 +117,7 @@ def _loaded(holds_lock: bool) -> Any:
 
 def prepare() -> None:
     """Compile the loop now, for child processes behind walls, which cannot."""
-    compiled_library(SOURCE)
+    compile_library(SOURCE)
 
 
 def _transfers(transfers: Sequence[NativeTransfer]) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.paired.experiment import Experiment
-from orchestrator.plants.compiled import compiled
+from orchestrator.plants.compiled import compile_module
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters
 
 Array = NDArray[np.float64]
@@ -36,13 +36,13 @@ class CompiledLoop:
         """
         e = self.experiment
         p = _plant_parameters(e, alpha)
-        drivetrain = compiled("drivetrain")
+        drivetrain = compile_module("drivetrain")
         x = drivetrain.consistent_start((0.0,) * 8, p)
         table = drivetrain.prepare(p, e.sample_time)
         mode = drivetrain.initial_mode(x, p)
         limits = (e.values.i, 1.0 / e.values.k, e.torque_limit)
         out = np.empty((len(self.reference), len(COLUMNS)))
-        compiled("closed_loop").run_loop(
+        compile_module("closed_loop").run_loop(
             (x, mode, p, table, e.sample_time),
             self.reference,
             self.reference_speed,

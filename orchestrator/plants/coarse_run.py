@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
 from orchestrator.plants.sample import is_usual, parameters_of, sample_of
-from orchestrator.shared.numba_cache import ALGEBRA, kept
+from orchestrator.shared.numba_cache import ALGEBRA, njit_on_disk
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def _coarse_runner(plant: Plant, usual: bool) -> Any:
     prepared, sample = sample_of(plant)
     parameters = parameters_of(plant, usual)
 
-    @kept(error_model="numpy", nogil=True, **ALGEBRA)
+    @njit_on_disk(error_model="numpy", nogil=True, **ALGEBRA)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, substeps: Any, out: Array) -> None:
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7])
         values = parameters(p)

@@ -21,7 +21,7 @@ import numba
 
 import pyfmu_sources
 from orchestrator.shared.cache import cache_directory
-from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
+from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 from orchestrator.shared.output import write_text
 
 INLINED = ("rates", "elastic_torque", "motor_torque", "load_torque")
@@ -38,7 +38,7 @@ _SOURCES = Path(pyfmu_sources.__file__).parent
 
 
 @cache
-def compiled(name: str) -> ModuleType:
+def compile_module(name: str) -> ModuleType:
     """Return a copy of ``pyfmu_sources.NAME`` whose functions are compiled by numba (at their first call)."""
     full_name = f"_compiled_{name}"
     original = f"{_PACKAGE}.{name}"
@@ -59,9 +59,9 @@ def compiled(name: str) -> ModuleType:
         home = value.__module__.rpartition(".")[2]
         if home == name:
             value.__module__ = full_name
-            setattr(copy, attribute, kept(forceinline=attribute in INLINED, **options)(value))
+            setattr(copy, attribute, njit_on_disk(forceinline=attribute in INLINED, **options)(value))
         elif value.__module__.startswith(_PACKAGE + "."):
-            setattr(copy, attribute, getattr(compiled(home), attribute))
+            setattr(copy, attribute, getattr(compile_module(home), attribute))
     return copy
 
 

@@ -194,11 +194,11 @@ class Plant:
         """
         return self.value(p, self.shaft.ratio) if self.shaft else 1.0
 
-    def extended(self, values: Sequence[float]) -> Array:
+    def extend_values(self, values: Sequence[float]) -> Array:
         """Return the plant's values followed by the analysis's own parameters at their defaults."""
         return np.array([*values, *(entry.default for entry in self.nuisances)])
 
-    def own(self, p: Array) -> Array:
+    def fmu_values(self, p: Array) -> Array:
         """Return the FMU's parameters (n,) of the ``p`` of the analysis.
 
         Args:
@@ -206,7 +206,7 @@ class Plant:
         """
         return self.realised(p) if self.realised else np.asarray(p[: len(self.table)])
 
-    def followed(self, p: Array, u: Array, h: float) -> tuple[Array, Array]:
+    def follow_requests(self, p: Array, u: Array, h: float) -> tuple[Array, Array]:
         """Return what requests (n,) [N.m] become behind a second lag and a limited rate.
 
         Args:
@@ -223,9 +223,9 @@ class Plant:
             return u, u
         means, begins = np.empty_like(u), np.empty_like(u)
         request = float(u[0])
-        from orchestrator.plants.compiled import compiled  # numba takes its time to import
+        from orchestrator.plants.compiled import compile_module  # numba takes its time to import
 
-        follow = compiled("drive_request").followed_request
+        follow = compile_module("drive_request").followed_request
         for n, asked in enumerate(u.tolist()):
             begins[n] = request
             request, means[n] = follow(request, asked, lag, rate, h)
@@ -260,7 +260,7 @@ class Plant:
 
     def _plain(self, p: Array) -> Array:
         """Return the parameters of the analysis with every effect off."""
-        plain = self.extended([entry.default for entry in self.table])
+        plain = self.extend_values([entry.default for entry in self.table])
         for name in self.linear:
             plain[self.index(name)] = p[self.index(name)]
         return plain

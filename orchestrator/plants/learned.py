@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.compiled import compiled
+from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.description import CompiledEquations, Plant
 from orchestrator.plants.sample import complete_equations, sample_of
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
@@ -77,7 +77,7 @@ def with_law(plant: Plant) -> Plant:
 
 
 def _stage(plant: Plant, first: int) -> CompiledEquations:
-    from orchestrator.shared.numba_cache import kept
+    from orchestrator.shared.numba_cache import njit_on_disk
 
     equations = complete_equations(plant.stage())
     rates = equations.rates
@@ -88,9 +88,9 @@ def _stage(plant: Plant, first: int) -> CompiledEquations:
     drive = plant.drive.torque
     knot_at, value_at = first + 1, first + 1 + KNOTS
 
-    straight = compiled("learned_law").straight
+    straight = compile_module("learned_law").straight
 
-    @kept(error_model="numpy")
+    @njit_on_disk(error_model="numpy")
     def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
         r = rates(x, signs, p, u)
         code = int(p[first])
@@ -123,11 +123,11 @@ def _stage(plant: Plant, first: int) -> CompiledEquations:
 
 
 def _runner(plant: Plant) -> Any:
-    from orchestrator.shared.numba_cache import kept
+    from orchestrator.shared.numba_cache import njit_on_disk
 
     prepared, sample = sample_of(plant)
 
-    @kept(error_model="numpy", nogil=True)
+    @njit_on_disk(error_model="numpy", nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
         common = prepared(p, first, h, (4, 16))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
 from orchestrator.plants.design import LinearModel, discretise
-from orchestrator.shared.numba_cache import kept
+from orchestrator.shared.numba_cache import njit_on_disk
 
 Array = NDArray[np.float64]
 Run = Callable[[Array, Array, Array, Array], None]
@@ -41,7 +41,7 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
         h: length of a sample [s].
     """
     A, B = plant.jacobian(p), plant.request_column(p)
-    places = list(moving(plant, p))
+    places = list(state_places(plant, p))
     rows = [plant.states.index(place) for place in places]
     A, B = A[np.ix_(rows, rows)], B[rows, None]
     model = LinearModel(A, B, C=np.eye(len(places)), states=())
@@ -56,13 +56,13 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
     return run
 
 
-def moving(plant: Plant, p: Array) -> tuple[int, ...]:
+def state_places(plant: Plant, p: Array) -> tuple[int, ...]:
     """Return the places of the states that the linear plant has: without a lag the drive has none."""
     lagged = plant.value(p, plant.drive.lag) > 0.0
     return tuple(place for place in plant.states if place != plant.drive.torque or lagged)
 
 
-@kept(error_model="numpy", nogil=True)
+@njit_on_disk(error_model="numpy", nogil=True)
 def _repeat(
     x: Array, phi: Array, by_early: Array, by_late: Array, early: Array, late: Array, shown: Array, out: Array
 ) -> None:  # fmt: skip

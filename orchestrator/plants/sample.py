@@ -155,7 +155,7 @@ def sample_of(plant: Plant) -> Sample:
     at_lag = plant.index(plant.drive.lag)
 
     @njit(error_model="numpy", forceinline=True, **ALGEBRA)
-    def advanced(x: Any, signs: Any, p: Any, torque: float, way: Any) -> Any:
+    def advance(x: Any, signs: Any, p: Any, torque: float, way: Any) -> Any:
         _, step, begin, middle, end, left = way
         off = x[LAGGED] - torque
         k1 = stage(_with_torque(x, torque + off * begin), signs, p, torque)
@@ -166,7 +166,7 @@ def sample_of(plant: Plant) -> Sample:
         return _with_torque(new, torque + off * left)
 
     @njit(error_model="numpy", **ALGEBRA)
-    def prepared(p: Any, first: float, h: float, substeps: Any) -> Any:
+    def prepare(p: Any, first: float, h: float, substeps: Any) -> Any:
         rest, varies = rest_of(p)
         reach = (math.exp(p[at_m]), math.exp(p[at_l]))
         lag, meeting = p[at_lag], flanks(p)
@@ -197,10 +197,10 @@ def sample_of(plant: Plant) -> Sample:
                     bristle_m, sign_m = _turn_bristle(bristle_m, x[1], level[0], rest[0], varies[0], reach[0], way[1])
                     bristle_l, sign_l = _turn_bristle(bristle_l, x[3], level[1], rest[1], varies[1], reach[1], way[1])
                     signs = (sign_m, sign_l)
-                x = advanced(x, signs, p, torque, way)
+                x = advance(x, signs, p, torque, way)
         return x, (bristle_m, bristle_l, signs[0], signs[1])
 
-    return Sample(prepared, sample)
+    return Sample(prepare, sample)
 
 
 @cache

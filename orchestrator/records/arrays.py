@@ -66,12 +66,12 @@ class Record:
         return bool(np.isfinite(self.u).any())
 
     @property
-    def missing(self) -> int:
+    def n_missing(self) -> int:
         """Return the number of rows in which a measured angle or the torque is missing."""
-        return int(np.count_nonzero(self.lost))
+        return int(np.count_nonzero(self.is_missing))
 
     @property
-    def lost(self) -> NDArray[np.bool_]:
+    def is_missing(self) -> NDArray[np.bool_]:
         """Return the rows (n,) in which a measured angle or the torque is missing."""
         lost = np.isnan(self.theta_m)
         if self.theta_l is not None:
@@ -109,23 +109,23 @@ class Record:
         """
         return replace(self, theta_l=None)
 
-    def filled(self) -> "Record":
+    def fill_missing(self) -> "Record":
         """Return the record with straight lines over missing samples, for looks and for checks of plausibility.
 
         Returns:
             A copy; this record itself when nothing is missing.
         """
-        if not self.missing:
+        if not self.n_missing:
             return self
         return replace(
             self,
-            theta_m=lined(self.theta_m),
-            theta_l=None if self.theta_l is None else lined(self.theta_l),
+            theta_m=interpolate_missing(self.theta_m),
+            theta_l=None if self.theta_l is None else interpolate_missing(self.theta_l),
             u_deviation=None,
         )
 
 
-def lined(values: Array) -> Array:
+def interpolate_missing(values: Array) -> Array:
     """Return values with straight lines over NaN.
 
     Args:

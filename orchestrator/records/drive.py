@@ -8,7 +8,7 @@ encoder's noise moves the torque's sum only from one sample to the next, and doe
 
 import numpy as np
 
-from orchestrator.records.arrays import lined
+from orchestrator.records.arrays import interpolate_missing
 from orchestrator.records.columns import Array, Column
 
 
@@ -27,7 +27,7 @@ def torque_of_voltage(voltage: Array, angle: Array, time: Array, column: Column)
     assert column.torque_constant is not None
     back_emf = column.torque_constant if column.back_emf_constant is None else column.back_emf_constant
     steps = np.diff(time)
-    speed = np.diff(lined(angle)) / np.where(steps > 0.0, steps, np.nan)
+    speed = np.diff(interpolate_missing(angle)) / np.where(steps > 0.0, steps, np.nan)
     speed = np.append(speed, speed[-1])
     current = (voltage - back_emf * speed) / column.resistance
     if column.inductance:
@@ -40,7 +40,7 @@ def _lag(settled: Array, step: float, lag: float) -> Array:
     from scipy.signal import lfilter  # a second of importing that few records need
 
     missing = np.isnan(settled)
-    target = lined(settled)
+    target = interpolate_missing(settled)
     keep = float(np.exp(-step / lag))
     # At the start of each sample the current is what the earlier samples have left of it.
     start, _ = lfilter([0.0, 1.0 - keep], [1.0, -keep], target, zi=target[:1])

@@ -26,7 +26,7 @@ from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, choose
 from orchestrator.records.stamps import seconds_of
-from orchestrator.records.timing import interpolated, interpolation_cost, resample_grid
+from orchestrator.records.timing import interpolate, interpolation_cost, resample_grid
 from orchestrator.records.units import parse_unit
 
 
@@ -265,7 +265,7 @@ def _same_rows(
                 f"`{source.heads[places['theta_m']].full}`: `resample` linear or cubic"
             )
         cost = interpolation_cost(own, table[name], reading.resample)
-        table[name] = interpolated(table["time"], own, table[name], reading.resample)
+        table[name] = interpolate(table["time"], own, table[name], reading.resample)
         notes.append(f"{head.full} resampled ({reading.resample}), error about {cost:.2g} (rms)")
     return table, notes
 
@@ -302,7 +302,7 @@ def _resample(table: dict[str, Array], reading: Reading) -> tuple[dict[str, Arra
     if grid.size > 2 * time.size:
         return table, []
     cost = {name: interpolation_cost(time, table[name], reading.resample) for name in COLUMNS[1:] if name in table}
-    out = {name: interpolated(grid, time, values, reading.resample) for name, values in table.items() if name != "time"}
+    out = {name: interpolate(grid, time, values, reading.resample) for name, values in table.items() if name != "time"}
     spoken = ", ".join(f"{name} {error:.2g} {'N.m' if name == 'u' else 'rad'}" for name, error in cost.items())
     low, high = np.quantile(1e3 * np.diff(time), (0.05, 0.95))
     text = (

@@ -54,9 +54,9 @@ def choose(
             if choice is not None:
                 found[name] = choice
             elif name not in OPTIONAL and not (name == "time" and rated) and (name != "u" or torque_needed):
-                raise RecordError(_missing_text(name, heads, source))
+                raise RecordError(_absence_message(name, heads, source))
     if "u" in names and "u" not in found and "theta_l" not in found:
-        raise RecordError(_missing_text("u", heads, source))
+        raise RecordError(_absence_message("u", heads, source))
     return found
 
 
@@ -166,7 +166,7 @@ def near(name: str, heads: Sequence[Head]) -> str:
     return f"; did you mean `{close[0]}`?" if close else ""
 
 
-def _missing_text(name: str, heads: Sequence[Head], source: str) -> str:
+def _absence_message(name: str, heads: Sequence[Head], source: str) -> str:
     if heads and all(re.fullmatch(r"#\d+", head.name) for head in heads):
         return (
             f"{source}: column `{name}` must be there, but the file has no names (the first row must hold names): say "

@@ -29,7 +29,7 @@ def check_plausible(record: Record, model: Model) -> None:
     """Refuse a record of a ``Drivetrain`` whose units, signs or columns cannot be what the format demands."""
     if model.fmu != "Drivetrain":
         return
-    record = record.filled()
+    record = record.fill_missing()
     parameters = {name: entry.value for name, entry in model.parameters.items()}
     _check_rate(record, natural_frequency(model))
     if record.theta_l is not None:

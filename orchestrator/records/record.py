@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.errors import RecordError
-from orchestrator.records.arrays import MINIMUM_ROWS, Record, lined, runs_of
+from orchestrator.records.arrays import MINIMUM_ROWS, Record, interpolate_missing, runs_of
 from orchestrator.records.checks import (
     check_driven,
     check_finite,
@@ -43,7 +43,7 @@ def read_record(
     if "u" in loaded.table:
         check_driven(loaded.table["u"], loaded.labels["u"], path.name)
     record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
-    span = motion_span(lined(record.theta_m), record.time)
+    span = motion_span(interpolate_missing(record.theta_m), record.time)
     if span is not None:
         start, end = span
         note = (
@@ -79,7 +79,9 @@ def record_from_columns(
     for name in ("theta_m", "theta_l"):
         if name in arrays:
             check_range(arrays[name], label[name], source)
-            check_moving({key: lined(values) for key, values in arrays.items()}, name, label[name], source)
+            check_moving(
+                {key: interpolate_missing(values) for key, values in arrays.items()}, name, label[name], source
+            )
     return _on_grid(arrays, grid, source, trust_rows)
 
 
@@ -111,11 +113,11 @@ def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: b
         table["time"] = np.asarray(grid.start + timing.step * np.arange(grid.size), dtype=np.float64)
     absent = np.full(table["time"].size, np.nan)
     u, deviation = _interpolate(table["u"]) if "u" in table else (absent, None)
-    rest = {name: lined(values) for name, values in table.items() if name not in COLUMNS}
+    rest = {name: interpolate_missing(values) for name, values in table.items() if name not in COLUMNS}
     record = Record(table["time"], u, table["theta_m"], table.get("theta_l"), source, rest, deviation, 0.0, timing)
-    if record.missing:
-        share = 100.0 * record.missing / record.size
-        notes.append(f"{record.missing} rows ({share:.2g} %) have missing samples; estimates leave them out")
+    if record.n_missing:
+        share = 100.0 * record.n_missing / record.size
+        notes.append(f"{record.n_missing} rows ({share:.2g} %) have missing samples; estimates leave them out")
     if timing.jitter > 1e-3 * timing.step or timing.missing:
         notes.append(timing.describe())
     return replace(record, notes=tuple(notes))
@@ -130,7 +132,7 @@ def _interpolate(u: Array) -> tuple[Array, Array | None]:
     lost = np.isnan(u)
     if not lost.any():
         return u, None
-    filled = lined(u)
+    filled = interpolate_missing(u)
     deviation = np.zeros(u.size)
     known: dict[int, float] = {}
     for start, stop in zip(*runs_of(lost), strict=True):

@@ -94,7 +94,7 @@ def column_names(path: Path) -> list[str]:
         return [head.full or head.name for head in source.heads]
 
 
-def known_unit(text: str, wanted: Wanted, label: str, path: Path) -> KnownUnit:
+def read_unit(text: str, wanted: Wanted, label: str, path: Path) -> KnownUnit:
     """Return a stated unit."""
     unit = parse_any_unit(text)
     if unit is None:

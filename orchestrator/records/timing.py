@@ -191,7 +191,7 @@ def resample_grid(time: Array) -> tuple[Array, float]:
     return time[0] + step * np.arange(rows), step
 
 
-def interpolated(grid: Array, time: Array, values: Array, how: str) -> Array:
+def interpolate(grid: Array, time: Array, values: Array, how: str) -> Array:
     """Return ``values`` at ``time`` brought to ``grid``, by lines or by a spline through the points.
 
     Args:
@@ -234,6 +234,6 @@ def interpolation_cost(time: Array, values: Array, how: str) -> float:
     t, v = time[good], values[good]
     if t.size < 8:
         return 0.0
-    guess = interpolated(t[1:-1:2], t[::2], v[::2], how)[: t[1:-1:2].size]
+    guess = interpolate(t[1:-1:2], t[::2], v[::2], how)[: t[1:-1:2].size]
     error = float(np.sqrt(np.nanmean((guess - v[1:-1:2]) ** 2)))
     return error / (4.0 if how == "linear" else 16.0)

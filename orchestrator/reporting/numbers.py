@@ -32,7 +32,7 @@ def _float(value: float, digits: int) -> str:
     return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(exponent)}"
 
 
-def thinned(series: Series, limit: int) -> Series:
+def thin_series(series: Series, limit: int) -> Series:
     """Return a series of at most about ``limit`` points that looks the same.
 
     A curve keeps the smallest and the largest y of each of ``limit / 2`` runs of points, a cloud every n-th point.

@@ -28,7 +28,7 @@ from orchestrator.reporting.model import (
     Series,
     Text,
 )
-from orchestrator.reporting.numbers import in_words, thinned
+from orchestrator.reporting.numbers import in_words, thin_series
 
 EMBED_LIMIT = 1_000_000
 LIVE_LIMIT = 1_500_000
@@ -137,7 +137,7 @@ def _plot_data(plot: Plot) -> Markup:
         "diagonal": plot.diagonal,
         "categories": list(plot.categories),
         "spans": [{"start": s.start, "end": s.end, "name": s.name} for s in plot.spans],
-        "series": [_series_data(thinned(s, POINT_LIMIT)) for s in plot.series],
+        "series": [_series_data(thin_series(s, POINT_LIMIT)) for s in plot.series],
     }
     return in_script(data)
 

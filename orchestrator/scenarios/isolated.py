@@ -69,7 +69,7 @@ def describe_walls(system: System, safety: Safety) -> WallsFound:
         own_process=behind,
         landlock=walls.landlock if behind else None,
         seccomp=walls.seccomp if behind else None,
-        not_enforced=walls.missing if behind else "",
+        not_enforced=walls.not_enforced if behind else "",
     )
 
 

@@ -25,7 +25,7 @@ def usable_cores() -> int:
 _SPARE = Semaphore(usable_cores() - 1)
 
 
-def spread(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+def map_on_threads(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     """Return ``function`` of each item, in order; threads help where cores of this process are idle.
 
     Work that is spread may spread its own: what helps is counted over the whole process. After an error no item is
@@ -71,8 +71,8 @@ def spread(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     return [results[place] for place in range(len(items))]
 
 
-def run_both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
+def run_pair(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
     """Return the results of two functions, called at once where a core is idle."""
     calls: tuple[Callable[[], Any], ...] = (first, second)
-    one, other = spread(lambda call: call(), calls)
+    one, other = map_on_threads(lambda call: call(), calls)
     return one, other

@@ -41,7 +41,7 @@ def machine_code_folder() -> Path:
 
 
 @cache
-def compiled_library(source: Path) -> Path | None:
+def compile_library(source: Path) -> Path | None:
     """Return the shared library made from one C file that needs no other, or ``None`` where it cannot be made."""
     if not sys.platform.startswith(("linux", "darwin")):
         return None

@@ -40,7 +40,7 @@ _DIGEST = hashlib.sha256().digest_size
 FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6), "big"))
 
 
-def kept(**options: Any) -> Callable[[Any], Any]:
+def njit_on_disk(**options: Any) -> Callable[[Any], Any]:
     """Return a decorator like ``numba.njit`` that keeps machine code for later processes, where there is a place.
 
     A function with a closure is kept under a digest of all that it reaches; where that is not known, not at all.

@@ -25,7 +25,7 @@ class Play:
         """Return the total play [rad] at the load, from one flank to the other."""
         return 2.0 * self.alpha
 
-    def found(self) -> Sizes:
+    def to_result(self) -> Sizes:
         """Return half-gap and total play, at the load and at the motor, in rad and arc minutes."""
         return {
             name: {side: {"rad": value, "arcmin": value * ARCMIN} for side, value in self._sides(load).items()}

@@ -80,12 +80,12 @@ def as_tables(settings: Settings) -> dict[str, Any]:
     return tables
 
 
-def described(kind: type[Settings], prefix: str = "") -> list[tuple[str, Any, str]]:
+def describe_settings(kind: type[Settings], prefix: str = "") -> list[tuple[str, Any, str]]:
     """Return (dotted name, default, why) of every setting, group by group."""
     rows: list[tuple[str, Any, str]] = []
     for entry in msgspec.structs.fields(kind):
         if isinstance(entry.default, Settings):
-            rows += described(type(entry.default), f"{prefix}{entry.name}.")
+            rows += describe_settings(type(entry.default), f"{prefix}{entry.name}.")
         else:
             notes = [note for note in getattr(entry.type, "__metadata__", ()) if isinstance(note, msgspec.Meta)]
             rows.append((f"{prefix}{entry.name}", entry.default, (notes[0].description or "") if notes else ""))

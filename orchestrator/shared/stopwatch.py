@@ -25,7 +25,7 @@ class Stopwatch:
         return min(wall, max(time.process_time() - self._processor, wall / _BUSIEST))
 
     @property
-    def left(self) -> float:
+    def time_left(self) -> float:
         """Return what is left of the limit [s]."""
         return max(self.limit - self.seconds, 0.0)
 

@@ -44,7 +44,7 @@ class Trust:
     level: Level
     reasons: tuple[str, ...] = ()
 
-    def found(self) -> TrustFound:
+    def to_result(self) -> TrustFound:
         """Return the level's word and the reasons, as they stand in result files."""
         return TrustFound(self.level.word, self.reasons)
 

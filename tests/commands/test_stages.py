@@ -19,16 +19,16 @@ def test_the_time_left_is_known_from_the_start_and_follows_the_shares(monkeypatc
     monkeypatch.setattr(_stages.time, "monotonic", lambda: now[0])
     stages = Stages(io.StringIO())
     stages.begin("preparing", 60.0)
-    assert stages.left() == 60.0
+    assert stages.time_left() == 60.0
     now[0] = 110.0
-    assert stages.left() == 50.0
+    assert stages.time_left() == 50.0
     stages.at("a quarter", 0.25)
-    assert stages.left() == pytest.approx(30.0)
+    assert stages.time_left() == pytest.approx(30.0)
     stages.at("as before", 0.0)
     now[0] = 200.0
-    assert stages.left() == 0.0
+    assert stages.time_left() == 0.0
     stages.begin("anew", 5.0)
-    assert stages.left() == 5.0
+    assert stages.time_left() == 5.0
 
 
 def test_a_terminal_shows_stage_and_time_left() -> None:

@@ -8,7 +8,7 @@ from orchestrator.diagnosis.inference.fitting import ScoreComparison
 from orchestrator.diagnosis.selection.grading import GRADE_RULES, grade_effect, highest_grade
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings
-from orchestrator.shared.settings import described
+from orchestrator.shared.settings import describe_settings
 
 SETTINGS = DiagnosisSettings()
 EFFECT = EffectEvidence("friction@motor", "friction", 20.0, 0.9, 0.5, 30.0, (), False, True, 0.9)
@@ -45,7 +45,7 @@ def test_each_rule_lowers_the_grade(rule):
 
 
 def test_thresholds_of_rules_are_settings():
-    names = {name for name, _, _ in described(DiagnosisSettings)}
+    names = {name for name, _, _ in describe_settings(DiagnosisSettings)}
     assert {rule.setting for rule in GRADE_RULES if rule.setting} <= names
     assert all(rule.reason and rule.statistic for rule in GRADE_RULES)
 

@@ -56,7 +56,7 @@ def requests(size=2400, seed=5):
 
 def exact_record(values):
     """A record of the event-located plant without noise, and its parameters."""
-    p = DRIVETRAIN.extended(MODEL.values)
+    p = DRIVETRAIN.extend_values(MODEL.values)
     for name, value in values.items():
         p[DRIVETRAIN.index(name)] = value
     u = requests()

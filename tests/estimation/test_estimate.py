@@ -61,7 +61,7 @@ def test_the_filter_without_noise_is_the_plant() -> None:
 def test_the_error_is_the_cramer_rao_bound(exact: tuple[Record, dict], fitted) -> None:
     record, truth = exact
     values = cramer_rao.truth_values(truth["linear"], 0.02, truth["states"][0, :5])
-    bound = cramer_rao.bound(make_problem(record, MODEL), values, (1e-4, 1e-4))
+    bound = cramer_rao.error_bound(make_problem(record, MODEL), values, (1e-4, 1e-4))
     assert fitted.diagnostics["converged"]
     assert fitted.standard_error == pytest.approx(bound, rel=0.15)
     assert abs(fitted.alpha - 0.02) < 4.0 * bound
@@ -106,7 +106,7 @@ def test_a_fit_leaves_the_likelihood_as_it_was(exact: tuple[Record, dict]) -> No
     fit = maximise(likelihood, start, [likelihood.problem.index("alpha")], iterations=1)
     assert np.array_equal(likelihood.information, before)
     assert not np.array_equal(fit.likelihood.information, before)
-    assert fit.likelihood.changed(soft=True).soft
+    assert fit.likelihood.with_options(soft=True).soft
     assert not fit.likelihood.soft
 
 

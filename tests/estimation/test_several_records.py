@@ -37,8 +37,8 @@ def test_two_records_give_the_standard_error_that_theory_promises(made, records)
     result = maximum_likelihood.estimate(records[0], MODEL, more=records[1:])
     values = cramer_rao.truth_values(made[0][1]["linear"], ALPHA, *(truth["states"][0, :5] for _, truth in made))
     problems = [make_problem(record, MODEL) for record in records]
-    bound = cramer_rao.bound(problems, values, (1e-4, 1e-4))
-    alone = [cramer_rao.bound(problem, values, (1e-4, 1e-4)) for problem in problems]
+    bound = cramer_rao.error_bound(problems, values, (1e-4, 1e-4))
+    alone = [cramer_rao.error_bound(problem, values, (1e-4, 1e-4)) for problem in problems]
     assert bound < 1.001 / np.hypot(1.0 / alone[0], 1.0 / alone[1])
     assert result.standard_error == pytest.approx(bound, rel=0.1)
     assert result.interval[0] < ALPHA < result.interval[1]
@@ -54,7 +54,7 @@ def test_missing_samples_are_left_out_of_the_likelihood(made, records) -> None:
     keep[0] = keep[-1] = True
     record = record_from_columns({name: values[keep] for name, values in columns.items()}, "gaps")
     assert record.size == records[0].size
-    assert record.missing == int(np.count_nonzero(~keep))
+    assert record.n_missing == int(np.count_nonzero(~keep))
     result = maximum_likelihood.estimate(record, MODEL)
     assert result.interval[0] < ALPHA < result.interval[1]
     assert result.standard_error < 2e-5

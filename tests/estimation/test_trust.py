@@ -40,7 +40,7 @@ def fitted(name: str, factor: float, error: float = 0.0) -> Estimate:
 def test_the_worst_reason_decides_and_comes_first() -> None:
     found = trust_of([Reason(Level.AMBER, "a"), Reason(Level.GREEN, "b"), Reason(Level.RED, "c")])
     assert found == Trust(Level.RED, ("c", "a"))
-    assert found.found() == TrustFound("red", ("c", "a"))
+    assert found.to_result() == TrustFound("red", ("c", "a"))
     assert str(found) == "red: c; a"
     assert str(trust_of([])) == "green"
 

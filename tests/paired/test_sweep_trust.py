@@ -19,7 +19,7 @@ def test_intervals_that_hold_too_few_sizes_are_red(count: int, held: int, level:
 
 
 def test_failed_cases_are_amber_and_the_worst_level_wins() -> None:
-    assert trust_of_sweep([statistics(20, 19)], 0.95, 2).found() == TrustFound("amber", ("2 cases failed",))
+    assert trust_of_sweep([statistics(20, 19)], 0.95, 2).to_result() == TrustFound("amber", ("2 cases failed",))
     found = trust_of_sweep([statistics(20, 19), statistics(20, 0)], 0.95, 2)
     assert found.level.word == "red"
     assert found.reasons[0].startswith("0 of 20 intervals hold the size")

@@ -25,7 +25,7 @@ def test_equations_of_a_plant_may_make_arrays() -> None:
         return (made[0], rate[1], rate[2], rate[3], rate[4], rate[5], rate[6], rate[7])
 
     other = replace(PLANT, stage=lambda: stage._replace(rates=by_an_array), _index={})
-    p = PLANT.extended([entry.default for entry in PLANT.table])
+    p = PLANT.extend_values([entry.default for entry in PLANT.table])
     angles = [np.empty((50, 2)) for _ in range(2)]
     for plant, out in zip((PLANT, other), angles, strict=True):
         coarse_runner_of(plant, p)((0.0,) * 8, p, np.ones(50), np.ones(50), 0.0, 0.01, (1, 8), out)
@@ -41,7 +41,7 @@ def test_machine_code_of_a_run_is_kept(plant) -> None:
 
 
 def drivetrain(**changed: float) -> np.ndarray:
-    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    p = DRIVETRAIN.extend_values([entry.default for entry in DRIVETRAIN.table])
     for name, value in {"effects.coulomb_friction.motor.torque": 0.3, **changed}.items():
         p[DRIVETRAIN.index(name)] = value
     return p
@@ -63,9 +63,9 @@ def test_a_coarse_run_follows_what_is_not_smooth(law: str) -> None:
     u = 20.0 * np.sin(0.05 * np.arange(n))
     plain, coarse, exact = (np.empty((n, 2)) for _ in range(3))
     coarse_runner_of(DRIVETRAIN, p)((0.0,) * 8, p, u, u, 0.0, 0.005, (1, 8), coarse)
-    DRIVETRAIN.runner()((0.0,) * 9, DRIVETRAIN.own(p), u, u, 0.0, 0.005, exact)
+    DRIVETRAIN.runner()((0.0,) * 9, DRIVETRAIN.fmu_values(p), u, u, 0.0, 0.005, exact)
     without = drivetrain(**{"effects.coulomb_friction.motor.torque": 0.0, "c": changed.get("c", 1.0)})
-    DRIVETRAIN.runner()((0.0,) * 9, DRIVETRAIN.own(without), u, u, 0.0, 0.005, plain)
+    DRIVETRAIN.runner()((0.0,) * 9, DRIVETRAIN.fmu_values(without), u, u, 0.0, 0.005, plain)
     assert np.max(np.abs(exact - plain)) > 0.01
     assert np.max(np.abs(exact - coarse)) < near
 

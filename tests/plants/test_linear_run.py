@@ -20,7 +20,7 @@ def torque(size):
 
 
 def model_of(plant, values):
-    p = plant.extended([entry.default for entry in plant.table])
+    p = plant.extend_values([entry.default for entry in plant.table])
     for name, value in values.items():
         p[plant.index(name)] = value
     return p

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.plants.compiled import compiled
+from orchestrator.plants.compiled import compile_module
 from pyfmu_sources import servo_axis_parameters
 from pyfmu_sources.drivetrain_parameters import NAMES, parameters, with_values
 from tests.support import independent_plant as truth
@@ -81,7 +81,7 @@ def record(hidden: dict[str, float], seconds: float = 6.0) -> tuple[dict, dict]:
 
 
 def simulated(own: dict[str, float], u: np.ndarray) -> np.ndarray:
-    plant = compiled("drivetrain")
+    plant = compile_module("drivetrain")
     p = with_values(parameters(tau=0.1), {f"effects.{name}": value for name, value in own.items()})
     x = plant.consistent_start((0.0,) * 8, p)
     mode, table, angles = plant.initial_mode(x, p), plant.prepare(p, 1.0 / RATE), []
@@ -105,7 +105,7 @@ def test_law_agrees_with_the_independent_simulator(law: str) -> None:
 
 
 def test_every_effect_of_the_table_is_off_by_default() -> None:
-    plant = compiled("drivetrain")
+    plant = compile_module("drivetrain")
     assert not plant.has_nonlinear_effect(parameters())
     assert len(NAMES) == len(set(NAMES))
 
@@ -178,7 +178,7 @@ def textbook(v: dict[str, float], u: np.ndarray, h: float) -> np.ndarray:
 @pytest.mark.parametrize("law", AXIS)
 def test_axis_agrees_with_its_equations_written_out(law: str) -> None:
     values, tolerance = AXIS[law]
-    source, h = compiled("servo_axis"), 0.01
+    source, h = compile_module("servo_axis"), 0.01
     p = list(servo_axis_parameters.DEFAULTS)
     for name, value in values.items():
         p[getattr(servo_axis_parameters, name)] = value

@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from orchestrator.plants.compiled import compiled
+from orchestrator.plants.compiled import compile_module
 from pyfmu_sources import drivetrain, servo_axis_parameters, smooth_mode
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters, with_values
 
@@ -81,7 +81,7 @@ def test_a_state_beyond_a_rigid_flank_ends_in_few_steps(model, counted):
 def test_rigid_teeth_stay_on_their_flank_and_inside_the_gap(model, effects):
     p = gear_train(model, effects, tau=0.05, b_l=20.0)
     torques = 60.0 * np.cos(2.0 * np.pi * 0.8 * 1e-3 * np.arange(3000))
-    states, modes = run(p, torques, 1e-3, source=compiled("drivetrain"))
+    states, modes = run(p, torques, 1e-3, source=compile_module("drivetrain"))
     error = effects.get("effects.gear_eccentricity.amplitude", 0.0)
     turns = effects.get("effects.gear_eccentricity.cycles_per_rev", 0.0)
     twist = states[:, 0] / 3.984 - states[:, 2] + error * np.sin(turns * states[:, 0])
@@ -131,7 +131,7 @@ EXTREME = [{"J_m": 1e-9}, {"J_l": 1e-9}, {"c": 1e12}, {"k": 1e12}, {"J_m": 1e-9,
 @pytest.mark.parametrize("model", BACKLASH_MODELS)
 @pytest.mark.parametrize("effects", [{}, RIPPLE, DRY_M | DRY_L, HARD])
 def test_extreme_parameters_and_inputs_are_quick_or_refused(model, effects):
-    plant = compiled("drivetrain")
+    plant = compile_module("drivetrain")
     run(gear_train(model, effects), [1.0], 1e-3, source=plant)
     for values in EXTREME:
         p = gear_train(model, effects, **values)
@@ -154,5 +154,5 @@ def test_a_stiff_shaft_without_effects_has_a_result():
 def test_a_single_axis_that_no_step_resolves_is_refused():
     p = list(servo_axis_parameters.DEFAULTS)
     p[servo_axis_parameters.P_J], p[servo_axis_parameters.P_B] = 1e-9, 1e12
-    x, _ = compiled("servo_axis").advance((0.0, 1.0, 0.0, 0.0, 0.0), 1, tuple(p), 1.0, 0.0, 1e-3)
+    x, _ = compile_module("servo_axis").advance((0.0, 1.0, 0.0, 0.0, 0.0), 1, tuple(p), 1.0, 0.0, 1e-3)
     assert np.isnan(x).all()

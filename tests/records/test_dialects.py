@@ -29,7 +29,7 @@ def test_a_dialect_gives_the_same_arrays(write, columns: dict[str, np.ndarray], 
     model = tmp_path / "model.toml"
     model.write_text(text)
     record = read_record(path, read_model(model).columns)
-    assert record.missing == 0
+    assert record.n_missing == 0
     assert record.size == plain.size
     assert record.step == pytest.approx(plain.step, rel=1e-6)
     np.testing.assert_allclose(record.u, plain.u, rtol=1e-8, atol=1e-9)

@@ -169,6 +169,6 @@ def test_invalid_samples_are_missing_at_their_own_rows(channel: str, tmp_path: P
         file.append(signals)
         file.save(path, overwrite=True)
     record = read_record(path)
-    assert np.flatnonzero(record.lost).tolist() == [7, 300, 301, 650]
+    assert np.flatnonzero(record.is_missing).tolist() == [7, 300, 301, 650]
     np.testing.assert_allclose(getattr(record, channel)[~bad], columns[channel][~bad])
     assert abs(record.u).max() < 900.0

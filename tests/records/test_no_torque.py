@@ -26,7 +26,7 @@ def test_two_angles_are_read_without_a_torque(tmp_path: Path) -> None:
     assert not record.has_torque
     assert record.theta_l == pytest.approx(0.1 * ANGLE, abs=1e-8)
     assert any("no column looks like a torque" in note for note in record.notes)
-    assert record.missing == 0
+    assert record.n_missing == 0
     slower = oc.read_record(path, torque_needed=False, rate=50.0, part=(0.0, 5.5))
     assert not slower.has_torque
     assert slower.size < 300

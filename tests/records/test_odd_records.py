@@ -49,7 +49,7 @@ def test_gaps_are_missing_samples_after_resampling(tmp_path: Path) -> None:
     motion = {"time": time, "u": np.cos(4.0 * time), "theta_m": np.sin(4.0 * time)}
     record = read_record(_write(tmp_path / "log.csv", motion), reading=Reading(resample="linear"))
     assert record.step == pytest.approx(5e-3, rel=0.03)
-    lost = record.time[record.lost]
+    lost = record.time[record.is_missing]
     assert lost.min() > 1.99
     assert lost.max() < 2.31
     assert lost.size == pytest.approx(60, abs=4)

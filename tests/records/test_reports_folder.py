@@ -48,7 +48,7 @@ def test_units_that_were_taken_as_si() -> None:
 def test_invalid_samples_of_mdf(name: str) -> None:
     pytest.importorskip("asammdf")
     record = read_record(_of(f"04-mdf-invalid-samples/{name}.mf4"))
-    assert np.flatnonzero(record.lost).tolist() == [500]
+    assert np.flatnonzero(record.is_missing).tolist() == [500]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import pytest
 
 from orchestrator.reporting import Facts, Findings, Plot, Remark, Report, ReportTable, Series, TableColumn, Text, render
-from orchestrator.reporting.numbers import in_words, thinned
+from orchestrator.reporting.numbers import in_words, thin_series
 from tests.support.report import example
 
 
@@ -128,13 +128,13 @@ def test_a_thinned_curve_keeps_its_peaks_its_gaps_and_its_ends():
     y[54_321] = 9.0
     y[54_400] = -9.0
     y[70_000:80_000] = [None] * 10_000
-    thin = thinned(Series("a", list(range(count)), y, labels=[str(i) for i in range(count)]), 1000)
+    thin = thin_series(Series("a", list(range(count)), y, labels=[str(i) for i in range(count)]), 1000)
     assert len(thin.x) <= 1002
     assert (max(v for v in thin.y if v is not None), min(v for v in thin.y if v is not None)) == (9.0, -9.0)
     assert None in thin.y
     assert (thin.x[0], thin.x[-1]) == (0, count - 1)
     assert all(thin.labels[i] == str(x) for i, x in enumerate(thin.x))
     few = Series("c", [0, 1, 2, 3], [1.0, 2.0, 2.0, 1.0])
-    assert thinned(few, 4) is few
-    cloud = thinned(Series("b", list(range(count)), y, "points"), 1000)
+    assert thin_series(few, 4) is few
+    cloud = thin_series(Series("b", list(range(count)), y, "points"), 1000)
     assert 900 <= len(cloud.x) <= 1000

@@ -19,7 +19,7 @@ from orchestrator.master.system import SignalSource, System
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.scenario import scenario_of_pair
 from orchestrator.scenarios.scenario import Scenario, simulate
-from orchestrator.scenarios.ssp.read import opened_ssp
+from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.scenarios.ssp.write import write_ssp
 
 
@@ -41,7 +41,7 @@ def package(scenario, tmp_path_factory) -> Path:
 
 
 def test_what_is_written_reads_back_as_the_same_run(scenario, package) -> None:
-    with opened_ssp(package) as again:
+    with open_ssp(package) as again:
         assert again.algorithm == GaussSeidel(1e-3)
         assert again.stop == 0.3
         assert again.system.execution_order()[:3] == ("plant", "estimator", "controller")
@@ -57,7 +57,7 @@ def test_how_exactly_fmus_solve_is_kept(scenario, tmp_path, stated) -> None:
     with zipfile.ZipFile(tmp_path / "s.ssp") as archive:
         text = archive.read("SystemStructure.ssd").decode()
     assert f'relativeTolerance="{stated or 1e-4}"' in text  # OMSimulator hands 0 to FMUs where it is left out
-    with opened_ssp(tmp_path / "s.ssp") as again:
+    with open_ssp(tmp_path / "s.ssp") as again:
         assert {i.solver_tolerance for i in again.system.instances} == {stated}
 
 
@@ -70,7 +70,7 @@ def test_fmpy_runs_it_to_the_same_bits(package) -> None:
             parameter.name = f"{Path(file).stem}.{parameter.name}"
             values.parameters.append(parameter)
     theirs = simulate_ssp(str(package), stop_time=0.3, step_size=1e-3, parameter_set=values)
-    with opened_ssp(package, simultaneous=True) as again:
+    with open_ssp(package, simultaneous=True) as again:
         assert again.algorithm == Jacobi(1e-3)
         ours = simulate(again)
     for name in ("plant.theta_l", "twin_plant.theta_m", "controller.u", "estimator.T_l_hat"):
@@ -170,7 +170,7 @@ def pack(folder: Path, fmus: dict[str, Path], structure: str = NESTED, **more: b
 
 
 def test_nested_systems_bindings_mappings_and_transformations(fmus, tmp_path: Path) -> None:
-    with opened_ssp(pack(tmp_path, fmus), {"torque": Constant(4.0)}, step=1e-3) as found:
+    with open_ssp(pack(tmp_path, fmus), {"torque": Constant(4.0)}, step=1e-3) as found:
         assert [i.name for i in found.system.instances] == ["drive/plant", "estimator"]
         start = found.system.instances[0].start
         assert start == {"alpha": pytest.approx(np.deg2rad(2.0)), "backlash_model": "nordin"}
@@ -181,7 +181,7 @@ def test_nested_systems_bindings_mappings_and_transformations(fmus, tmp_path: Pa
 
 
 def test_outer_inputs_reach_through_with_their_transformation(fmus, tmp_path: Path) -> None:
-    with opened_ssp(pack(tmp_path, fmus), {"torque": Constant(4.0)}, step=1e-3) as found:
+    with open_ssp(pack(tmp_path, fmus), {"torque": Constant(4.0)}, step=1e-3) as found:
         result = simulate(replace(found, record=("drive/plant.u",)))
     assert result.values[0, -1] == 13.0
 
@@ -207,7 +207,7 @@ CONTROLLER = """<ssd:System name="root">
 
 def test_what_is_fed_in_at_a_communication_point_holds_from_there_on(fmus, tmp_path: Path) -> None:
     path = pack(tmp_path, fmus, CONTROLLER, **{"resources/LqrController.fmu": fmus["LqrController"].read_bytes()})
-    with opened_ssp(path, {"angle": Step(0.003, 1.0)}, step=1e-3) as found:
+    with open_ssp(path, {"angle": Step(0.003, 1.0)}, step=1e-3) as found:
         assert found.system.fed_through("controller.theta_l_hat")  # a sampled-data block would be given what comes next
         torque = simulate(found)["controller.u"]
     assert not np.any(torque[:4])
@@ -234,7 +234,7 @@ def test_what_is_wrong_is_named(fmus, tmp_path: Path, change, error, expected: s
     if error is None:
         assert change[0] not in NESTED
         return
-    with pytest.raises(InputError) as caught, opened_ssp(path, step=1e-3) as found:
+    with pytest.raises(InputError) as caught, open_ssp(path, step=1e-3) as found:
         simulate(found)
     assert type(caught.value) is error
     assert expected in str(caught.value)
@@ -247,7 +247,7 @@ def test_archives_that_are_none_or_lead_outside(fmus, tmp_path: Path) -> None:
         (tmp_path / "none.ssp", "`ssp` must exist"),
         (pack(tmp_path, fmus, **{"../evil": b"x"}), "must lie within the archive"),
     ):
-        with pytest.raises(ScenarioError, match=expected), opened_ssp(path):
+        with pytest.raises(ScenarioError, match=expected), open_ssp(path):
             pass
 
 

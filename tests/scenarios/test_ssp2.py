@@ -22,7 +22,7 @@ from orchestrator.paired.scenario import scenario_of_pair
 from orchestrator.scenarios.isolated import Safety
 from orchestrator.scenarios.scenario import Scenario, simulate
 from orchestrator.scenarios.ssp.common import parse, require_valid
-from orchestrator.scenarios.ssp.read import opened_ssp
+from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.scenarios.ssp.write import write_ssp
 from tests.support.c_fmu import have_compiler
 from tests.support.sized3_fmu import build_sized3_fmu
@@ -67,7 +67,7 @@ def loops(request: pytest.FixtureRequest, built: dict[int, dict[str, Path]], tmp
 def test_the_loops_run_to_the_bits_of_fmi_2(loops: tuple[Scenario, Path]) -> None:
     scenario, package = loops
     expected = simulate(scenario, TRUSTED)
-    with opened_ssp(package, events=False) as again:
+    with open_ssp(package, events=False) as again:
         assert again.algorithm == GaussSeidel(1e-3)
         found = simulate(again, TRUSTED)
     for name in expected.names:
@@ -115,7 +115,7 @@ def test_arrays_and_their_sizes_are_written_and_read(sized: Path, tmp_path: Path
     values = texts_of(tmp_path / "chain.ssp")["resources/a.ssv"].decode()
     assert '<ssv:Float64 value="1.0 2.0 3.0"/>' in values
     assert '<ssv:UInt64 value="3"/>' in values
-    with opened_ssp(tmp_path / "chain.ssp", simultaneous=True) as again:
+    with open_ssp(tmp_path / "chain.ssp", simultaneous=True) as again:
         found = simulate(replace(again, record=scenario.record), TRUSTED)
     np.testing.assert_array_equal(found.values, simulate(scenario, TRUSTED).values)
     for name, content in texts_of(tmp_path / "chain.ssp").items():
@@ -177,7 +177,7 @@ def package(folder: Path, fmu: Path, system: str) -> Path:
 
 
 def test_whole_arrays_go_through_connectors_of_systems(sized: Path, tmp_path: Path) -> None:
-    with opened_ssp(package(tmp_path, sized, PLAIN), step=0.1) as found:
+    with open_ssp(package(tmp_path, sized, PLAIN), step=0.1) as found:
         result = simulate(found, TRUSTED)
     assert [result[f"a.y[{k}]"][-1] for k in (1, 2, 3)] == pytest.approx([4.0, 10.0, 18.0])
     np.testing.assert_array_equal(result["out[3]"], result["a.y[3]"])
@@ -186,7 +186,7 @@ def test_whole_arrays_go_through_connectors_of_systems(sized: Path, tmp_path: Pa
 def test_an_element_is_joined_by_its_indices(sized: Path, tmp_path: Path) -> None:
     one = PLAIN.replace('startConnector="in" endElement', 'startConnector="in" startIndices="2" endElement')
     one = one.replace('endConnector="u"/>', 'endConnector="u" endIndices="3"/>')
-    with opened_ssp(package(tmp_path, sized, one), step=0.1) as found:
+    with open_ssp(package(tmp_path, sized, one), step=0.1) as found:
         result = simulate(found, TRUSTED)
     assert [result[f"a.y[{k}]"][-1] for k in (1, 2, 3)] == pytest.approx([0.0, 0.0, 12.0])
 
@@ -213,7 +213,7 @@ def test_an_element_is_joined_by_its_indices(sized: Path, tmp_path: Path) -> Non
 def test_what_cannot_be_is_named(sized: Path, tmp_path: Path, change: tuple[str, str], expected: str) -> None:
     assert change[0] in PLAIN
     path = package(tmp_path, sized, PLAIN.replace(*change))
-    with pytest.raises((InputError, FmuError), match=expected), opened_ssp(path, step=0.1):
+    with pytest.raises((InputError, FmuError), match=expected), open_ssp(path, step=0.1):
         pass
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.shared import cores
-from orchestrator.shared.cores import run_both, spread
+from orchestrator.shared.cores import map_on_threads, run_pair
 
 
 def test_results_come_in_order_of_their_items() -> None:
@@ -15,8 +15,8 @@ def test_results_come_in_order_of_their_items() -> None:
         time.sleep(0.002 * (5 - n % 5))
         return n * n
 
-    assert spread(slow, range(20)) == [n * n for n in range(20)]
-    assert spread(slow, []) == []
+    assert map_on_threads(slow, range(20)) == [n * n for n in range(20)]
+    assert map_on_threads(slow, []) == []
 
 
 def test_helpers_are_counted_over_the_whole_process(monkeypatch) -> None:
@@ -33,9 +33,9 @@ def test_helpers_are_counted_over_the_whole_process(monkeypatch) -> None:
         return n
 
     def outer(n: int) -> list[int]:
-        return spread(inner, range(4))
+        return map_on_threads(inner, range(4))
 
-    assert spread(outer, range(6)) == [[0, 1, 2, 3]] * 6
+    assert map_on_threads(outer, range(6)) == [[0, 1, 2, 3]] * 6
     assert 2 <= max(most) <= 3
     assert all(cores._SPARE.acquire(blocking=False) for _ in range(2))  # both have been given back
 
@@ -51,7 +51,7 @@ def test_after_an_error_nothing_is_begun() -> None:
         return n
 
     with pytest.raises(ValueError, match="one"):
-        spread(fails, range(50))
+        map_on_threads(fails, range(50))
     assert len(begun) < 10
 
 
@@ -65,16 +65,16 @@ def test_a_thread_that_waits_gives_its_core_to_what_it_waits_for(monkeypatch) ->
     def spreads() -> None:
         begun.wait(timeout=10.0)
         time.sleep(0.2)  # until the other has ended and waits
-        spread(lambda n: at_once.wait(timeout=10.0), range(2))  # breaks where one thread must do both
+        map_on_threads(lambda n: at_once.wait(timeout=10.0), range(2))  # breaks where one thread must do both
 
-    run_both(ends, spreads)
-    run_both(spreads, ends)
+    run_pair(ends, spreads)
+    run_pair(spreads, ends)
     assert cores._SPARE.acquire(blocking=False)
     assert not cores._SPARE.acquire(blocking=False)
 
 
 def test_two_functions_give_two_results() -> None:
-    assert run_both(lambda: "one", lambda: 2) == ("one", 2)
+    assert run_pair(lambda: "one", lambda: 2) == ("one", 2)
 
 
 def test_what_numpy_is_to_be_silent_about_holds_in_every_thread(monkeypatch) -> None:
@@ -86,4 +86,4 @@ def test_what_numpy_is_to_be_silent_about_holds_in_every_thread(monkeypatch) -> 
         return np.geterr()["over"]
 
     with np.errstate(over="ignore"):
-        assert spread(silent, range(2)) == ["ignore", "ignore"]
+        assert map_on_threads(silent, range(2)) == ["ignore", "ignore"]

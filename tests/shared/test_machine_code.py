@@ -15,7 +15,7 @@ def test_a_damaged_library_is_made_anew(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(machine_code, "machine_code_folder", lambda: tmp_path)
     source = tmp_path / "half.c"
     source.write_text("double half(double x) { return 0.5 * x; }\n")
-    made = machine_code.compiled_library.__wrapped__
+    made = machine_code.compile_library.__wrapped__
     path = made(source)
     intact = path.read_bytes()
     noted = path.with_suffix(".sha256")
@@ -44,4 +44,4 @@ def test_no_room_means_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(machine_code, "machine_code_folder", lambda: tmp_path / "missing")
     source = tmp_path / "half.c"
     source.write_text("double half(double x) { return 0.5 * x; }\n")
-    assert machine_code.compiled_library.__wrapped__(source) is None
+    assert machine_code.compile_library.__wrapped__(source) is None

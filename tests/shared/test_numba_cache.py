@@ -37,7 +37,7 @@ def loaded(path: Path, source: str):
 
 
 def hits(folder: Path) -> int:
-    function = numba_cache.kept()(loaded(folder / "source.py", SOURCE).twice)
+    function = numba_cache.njit_on_disk()(loaded(folder / "source.py", SOURCE).twice)
     assert function(1.5) == 3.0
     return sum(function.stats.cache_hits.values())
 
@@ -85,7 +85,7 @@ CLOSURE = "def make(factor):\n    def times(x):\n        return factor * x\n    
 
 
 def closure_hits(folder: Path, factor: float) -> int:
-    function = numba_cache.kept()(loaded(folder / "closure.py", CLOSURE).make(factor))
+    function = numba_cache.njit_on_disk()(loaded(folder / "closure.py", CLOSURE).make(factor))
     assert function(1.5) == factor * 1.5
     return sum(function.stats.cache_hits.values())
 
@@ -102,7 +102,7 @@ def test_predictors_are_compiled_once_per_machine(tmp_path: Path) -> None:
     program = (
         "from orchestrator.plants.known.servo_axis import PLANT\n"
         "rates = PLANT.stage().rates\n"
-        "PLANT.jacobian(PLANT.extended([entry.default for entry in PLANT.table]))\n"
+        "PLANT.jacobian(PLANT.extend_values([entry.default for entry in PLANT.table]))\n"
         "print(sum(rates.stats.cache_hits.values()))\n"
     )
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}

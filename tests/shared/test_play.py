@@ -6,7 +6,7 @@ from orchestrator.shared.play import Play
 
 
 def test_both_sizes_from_both_sides_in_both_units() -> None:
-    found = Play(0.001, 4.0).found()
+    found = Play(0.001, 4.0).to_result()
     assert found["half_gap"]["load"] == {"rad": 0.001, "arcmin": pytest.approx(3.4377, rel=1e-4)}
     assert found["half_gap"]["motor"] == {"rad": 0.004, "arcmin": pytest.approx(13.751, rel=1e-4)}
     assert found["total_play"]["load"] == {"rad": 0.002, "arcmin": pytest.approx(6.8755, rel=1e-4)}

@@ -19,12 +19,12 @@ def test_time_counts_as_far_as_it_could_be_used(monkeypatch, wall, processor, co
     clocks = SimpleNamespace(monotonic=lambda: now.wall, process_time=lambda: now.processor)
     monkeypatch.setattr("orchestrator.shared.stopwatch.time", clocks)
     watch, endless = Stopwatch(5.0), Stopwatch()
-    assert (watch.seconds, watch.left, watch.over) == (0.0, 5.0, False)
+    assert (watch.seconds, watch.time_left, watch.over) == (0.0, 5.0, False)
     now.wall, now.processor = 100.0 + wall, 7.0 + processor
     assert watch.seconds == pytest.approx(counted)
-    assert watch.left == pytest.approx(max(5.0 - counted, 0.0))
+    assert watch.time_left == pytest.approx(max(5.0 - counted, 0.0))
     assert watch.over is (counted >= 5.0)
-    assert endless.left == math.inf
+    assert endless.time_left == math.inf
     assert not endless.over
 
 

@@ -23,7 +23,7 @@ from orchestrator.fmi.model_description import read_description
 from orchestrator.records.model_file import read_model
 from orchestrator.records.record import read_record
 from orchestrator.scenarios.scenario import load_scenario
-from orchestrator.scenarios.ssp.read import opened_ssp
+from orchestrator.scenarios.ssp.read import open_ssp
 from tests.scenarios.test_scenario import GOOD, LOOP
 from tests.support import dialects
 from tests.support.c_fmu import IDENTIFIER, fmu_files, write_fmu
@@ -110,7 +110,7 @@ def scenario(data: bytes) -> bool:
 def ssp(data: bytes) -> bool:
     """An SSP file."""
     accepted: list[bool] = []
-    with _errors_of_ours(accepted), opened_ssp(_case(data, "case.ssp")):
+    with _errors_of_ours(accepted), open_ssp(_case(data, "case.ssp")):
         pass
     return bool(accepted)
 

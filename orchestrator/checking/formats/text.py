@@ -23,7 +23,7 @@ def _extent(report: FmuFindings) -> str:
     """How far the FMU was executed, in a few words."""
     if not report.executed:
         return f"not executed: {report.not_executed}" if report.not_executed else "not executed"
-    runs = (f"{e.interface}: {len(e.carried_out)} of {len(e.stages)} stages" for e in report.executions)
+    runs = (f"{e.interface}: {len(e.stages_run)} of {len(e.stages)} stages" for e in report.executions)
     return f"executed, {', '.join(runs)}"
 
 
@@ -47,11 +47,11 @@ def as_results(verdicts: Sequence[Verdict]) -> CheckFound:
     return CheckFound(
         ok=all(v.ok for v in verdicts),
         counts={severity: sum(v.count(severity) for v in verdicts) for severity in SEVERITIES},
-        fmus=[_checked_fmu(v) for v in verdicts],
+        fmus=[_fmu_result(v) for v in verdicts],
     )
 
 
-def _checked_fmu(verdict: Verdict) -> CheckedFmu:
+def _fmu_result(verdict: Verdict) -> CheckedFmu:
     report = verdict.report
     findings = [
         FindingFound(

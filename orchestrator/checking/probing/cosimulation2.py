@@ -59,7 +59,7 @@ class CoSimulation2(Driver):
             status = self._wait()
         self.library.messages = messages
         if status not in (OK, WARNING):
-            raise self.refused("DoStep", status, when)
+            raise self.status_error("DoStep", status, when)
         self._remark("fmi2DoStep", status, messages, errors)
         return True
 

@@ -78,7 +78,7 @@ class CoSimulation3(EventDriver):
             self.report_discard(when)
             return None
         if status not in (OK, WARNING):
-            raise self.refused("DoStep", status, when)
+            raise self.status_error("DoStep", status, when)
         self._remark("fmi3DoStep", status, self.library.messages, self.library.errors)
         event, terminate, early, last = (values[0] for values in found)
         if not t - slack <= last <= goal + slack:
@@ -105,7 +105,7 @@ class CoSimulation3(EventDriver):
         """
         announced = self.memory.get("next")
         expected = announced is not None and announced <= t + _SMALL * max(abs(t), self.job.step)
-        watched = self.job.watched() if wanted and not expected and not self.due(t) else []
+        watched = self.job.event_variables() if wanted and not expected and not self.due(t) else []
         before = self.read(watched, when)
         self.call("EnterEventMode", when=when)
         outcomes = self.settle(t, when)

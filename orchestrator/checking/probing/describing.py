@@ -39,7 +39,7 @@ def make_job(
     version, folder = d.dialect.version, fmu / "resources"
     resources = folder.as_uri() if version == "2.0" else f"{folder}/" if folder.is_dir() else None
     known = [v for v in d.variables if v.reference is not None and v.kind]
-    variables = tuple(p for p in (_probed_variable(d, v) for v in known) if 0 < p.size <= _MOST_VALUES)
+    variables = tuple(p for p in (_variable_of_job(d, v) for v in known) if 0 < p.size <= _MOST_VALUES)
     return ProbeJob(
         version=version,
         interface=interface.kind,
@@ -82,7 +82,7 @@ def _indicators(d: Description) -> int | None:
     return _count(d, [d.variable(u.variable) for u in d.event_indicators])
 
 
-def _probed_variable(d: Description, v: DescribedVariable) -> ProbedVariable:
+def _variable_of_job(d: Description, v: DescribedVariable) -> ProbedVariable:
     base = v.base if d.dialect.version == "2.0" else "Int64" if v.kind == "Enumeration" else v.kind
     size = d.size(v) or 0
     return ProbedVariable(

@@ -68,7 +68,7 @@ class EventDriver(Driver):
             raise StatusError("fmi3GetIntervalDecimal", 0, text, "clock.interval-value")
         return interval, qualifier
 
-    def described_intervals(self) -> list[str]:
+    def judge_intervals(self) -> list[str]:
         """Ask for the intervals that the description has; what differs from it.
 
         An FMU that refuses to tell is left alone; it must not be called any further then.

@@ -42,7 +42,7 @@ class FmuInstance:
         """
         status, values = self.raw(function, *arguments)
         if status not in (OK, WARNING):
-            raise self.refused(function, status, when)
+            raise self.status_error(function, status, when)
         self._remark(self.library.names.prefix + function, status, self.library.messages, self.library.errors)
         return values
 
@@ -68,14 +68,14 @@ class FmuInstance:
         status = done[-1][0]
         self.dead = status == FATAL
         if status not in (OK, WARNING):
-            raise self.refused(requests[len(done) - 1][0], status, when)
+            raise self.status_error(requests[len(done) - 1][0], status, when)
         if len(done) < len(requests):
             raise odd(requests[len(done)][0])
         for (function, _), (status, _), (messages, errors) in zip(requests, done, self.library.logged, strict=True):
             self._remark(prefix + function, status, messages, errors)
         return [values for _, values in done]
 
-    def refused(self, function: str, status: int, when: str = "") -> StatusError:
+    def status_error(self, function: str, status: int, when: str = "") -> StatusError:
         """The error of a status that is not wanted."""
         prefix = self.library.names.prefix
         known = 0 <= status < len(_STATUS) and not (prefix == "fmi3" and status == PENDING)

@@ -104,7 +104,7 @@ class ProbeJob:
         found = (v for v in self.variables if v.causality == "input" and v.real and not v.clocks)
         return [v for v in found if v.variability == "continuous" or self.interface != "ModelExchange"]
 
-    def watched(self) -> list[ProbedVariable]:
+    def event_variables(self) -> list[ProbedVariable]:
         """What an event can change, as far as it can be read: outputs and local variables without clocks."""
         kinds = ("output", "local")
         return [v for v in self.variables if v.causality in kinds and not v.clocks and v.base != "Clock"]

@@ -106,7 +106,7 @@ def clocks(context: Context) -> None:
     with bench.instance(initialised=False) as driver:
         assert isinstance(driver, EventDriver)
         driver.enter_initialisation(job.start, job.stop)
-        for wrong in driver.described_intervals():
+        for wrong in driver.judge_intervals():
             context.report("clock.interval-value", wrong)
     if job.interface == "ScheduledExecution":
         raise SkippedError("there is no event mode")
@@ -163,7 +163,7 @@ def structure(context: Context) -> None:
                 driver.call("ExitConfigurationMode")
                 arrays = [v for v in job.variables if v.extents and not v.clocks and v.base != "Binary"]
                 for v in arrays:
-                    driver.get([v.resized(sizes)], f"for `{v.name}` of the new size")
+                    driver.get([v.resize(sizes)], f"for `{v.name}` of the new size")
             except (StatusError, TerminatedError) as error:
                 context.report("configuration.status", str(error))
                 return

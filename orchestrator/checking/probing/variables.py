@@ -34,7 +34,7 @@ class ProbedVariable:
     intermediate: bool = False
     extents: tuple[int, ...] = ()
 
-    def resized(self, sizes: Mapping[int, int]) -> "ProbedVariable":
+    def resize(self, sizes: Mapping[int, int]) -> "ProbedVariable":
         """The variable after structural parameters have changed."""
         lengths = (e if e >= 0 else sizes.get(-1 - e, 1) for e in self.extents)
         return replace(self, size=math.prod(lengths))

@@ -75,7 +75,7 @@ def check_record(record: Record) -> None:
             f"{record.source}: column `u` must drive the machine, but is 0 in all {record.size} rows: "
             "a diagnosis needs an excitation"
         )
-    filled = record.filled()
+    filled = record.fill_missing()
     for name in ("theta_m", "theta_l"):
         values = getattr(filled, name)
         if values is None:
@@ -91,7 +91,7 @@ def check_record(record: Record) -> None:
 
 def check_resolved(plant: Plant, model: Model, record: Record) -> None:
     """Refuse a model that is far faster than the record."""
-    p = plant.extended(model.values)
+    p = plant.extend_values(model.values)
     if plant.substeps(p, record.step) > MOST_SUBSTEPS:
         raise ScenarioError(
             f"{model.source}: the model's time constants must be at least {record.step / (MOST_SUBSTEPS * STEP):.2g} s "

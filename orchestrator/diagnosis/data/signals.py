@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt, welch
 
 from orchestrator.diagnosis.settings import BandSettings
-from orchestrator.records.arrays import lined
+from orchestrator.records.arrays import interpolate_missing
 from orchestrator.records.record import Record
 
 Array = NDArray[np.float64]
@@ -62,9 +62,9 @@ def prepare_signals(
         inertia: nominal inertia [kg.m2] of a single body, which bounds its band by the torque that is there; None: of
             two bodies no such bound is taken.
     """
-    angles = [lined(record.theta_m)]
+    angles = [interpolate_missing(record.theta_m)]
     if load_encoder and record.theta_l is not None:
-        angles.append(lined(record.theta_l))
+        angles.append(interpolate_missing(record.theta_l))
     torque, step, count = record.u, record.step, record.size
     cutoffs = [motion_band(angle, step, settings) for angle in angles]
     if inertia is not None:
@@ -74,7 +74,7 @@ def prepare_signals(
     noise = tuple(float(np.std(np.diff(angle, 2)) / np.sqrt(6.0)) for angle in angles)
     highest = max(cutoffs)
     factor = max(int(1.0 / (step * settings.samples_per_period * highest)), -(-count // settings.most_rows), 1)
-    measured, held = ~record.lost, True
+    measured, held = ~record.is_missing, True
     if factor > 1:
         centred = np.concatenate([torque[:1], 0.5 * (torque[1:] + torque[:-1])])  # half a sample of the hold
         low_pass = butter(6, 0.8 / factor, output="sos")

@@ -30,7 +30,7 @@ from orchestrator.scenarios.ssp.common import (
     new_document,
     tag,
 )
-from orchestrator.scenarios.ssp.read import opened_ssp
+from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.results.any_fmu import DeliveredFound, PartFound
 from pyfmu_sources.attachment import SERIES
 
@@ -153,7 +153,7 @@ def _difference(path: Path, problem: FmuProblem, model: FmuModel, parts: tuple[P
         values = problem.data.signals[:-1, list(problem.map.signals).index(name)] + problem.map.signals[name].reference
         signals[_border(name, "in")] = Samples(np.repeat(values, problem.m), problem.step, start)
     worst = 0.0
-    with opened_ssp(path, signals, problem.step, False) as scenario:
+    with open_ssp(path, signals, problem.step, False) as scenario:
         result = simulate(scenario, Safety())
     for k, name in enumerate(problem.outputs):
         last = [p.name for p in parts if p.where == OUTPUT and p.place == name]

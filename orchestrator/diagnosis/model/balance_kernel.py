@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
 from orchestrator.plants.sample import is_usual, parameters_of
-from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
+from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def _kernel(plant: Plant, usual: bool) -> Any:
     def moved(hidden: Any, rate: Any, step: float) -> Any:
         return hidden[0] + step * rate[5], hidden[1] + step * rate[6], hidden[2] + step * rate[7]
 
-    @kept(error_model="numpy", nogil=True, **ALGEBRA)
+    @njit_on_disk(error_model="numpy", nogil=True, **ALGEBRA)
     def fill(motion: Array, signs: Array, p: Any, step: float, moves: bool, out: Array) -> None:
         values = parameters(p)
         hidden = (motion[0, 2], motion[0, 3], 0.0)
@@ -119,7 +119,7 @@ def _hidden_load_kernel(plant: Plant, usual: bool) -> Any:
     def moved(y: Any, rate: Any, h: float) -> Any:
         return y[0] + h * rate[2], y[1] + h * rate[3], y[2] + h * rate[5], y[3] + h * rate[6], y[4] + h * rate[7]
 
-    @kept(error_model="numpy", nogil=True, **ALGEBRA)
+    @njit_on_disk(error_model="numpy", nogil=True, **ALGEBRA)
     def fill(
         motor: Array, width: float, p: Any, step: float, substeps: int, bristle: Array, motion: Array, signs: Array,
         out: Array,

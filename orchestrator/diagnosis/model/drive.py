@@ -25,7 +25,7 @@ def delivered_torque(plant: Plant, p: Array, requests: Array, step: float, held:
     requests = np.clip(requests, -limit, limit)
     rate = plant.value(p, drive.rate) if drive.rate else np.inf
     if rate < np.max(np.abs(np.diff(requests))) / step:
-        requests, _ = plant.followed(
+        requests, _ = plant.follow_requests(
             np.where(np.arange(p.size) == plant.index(drive.second_lag), 0.0, p), requests, step
         )
     lag = plant.value(p, drive.lag)

@@ -68,7 +68,7 @@ class TorqueBalance(ResidualModel):
         plant = model.plant
         self.plant, self.signals, self.settings, self.scaled = plant, signals, settings, True
         self.angular = angular
-        self.nominal = plant.extended(model.values)
+        self.nominal = plant.extend_values(model.values)
         self.step, self.size, self.cutoffs = signals.step, signals.size, signals.cutoffs
         self.channels = tuple(body.name for body in plant.bodies[: len(signals.angles)])
         self.edges = settings.fade if len(self.channels) > 1 else 0.3 * settings.fade
@@ -337,6 +337,6 @@ def balance_of(record: Record, model: Model, settings: DiagnosisSettings) -> Tor
     """Return the torque balances of a model beside a record."""
     plant = model.plant
     two = len(plant.bodies) > 1
-    inertia = None if two else plant.value(plant.extended(model.values), plant.bodies[0].inertia)
+    inertia = None if two else plant.value(plant.extend_values(model.values), plant.bodies[0].inertia)
     signals = prepare_signals(record, inertia, settings.band, two)
     return TorqueBalance(model, signals, settings.balance, angular=not in_metres(model))

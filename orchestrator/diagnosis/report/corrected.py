@@ -83,7 +83,7 @@ def start_values(plant: Plant, p: Array) -> dict[str, float]:
     Args:
         p: (parameters,) of the analysis.
     """
-    own = plant.own(p)
+    own = plant.fmu_values(p)
     return {
         entry.name: float(own[n]) + (1.0 if entry.name in plant.enumerations else 0.0)
         for n, entry in enumerate(plant.table)

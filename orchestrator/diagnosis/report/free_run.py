@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.report.simulation import RunSignals, Simulation
 from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.plants.description import Plant
-from orchestrator.plants.linear_run import moving
-from orchestrator.shared.cores import spread
-from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
+from orchestrator.plants.linear_run import state_places
+from orchestrator.shared.cores import map_on_threads
+from orchestrator.shared.inference.damped_fit import Damping, Linearised, fit_damped
 
 Array = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def _closest(model: Simulation, guess: Array, part: slice) -> FreeRun:
     plant, signals = model.plant, model.signals
     m = signals.channels
     measured, scale = model.measured[part, :m], signals.noise
-    free = moving(plant, model.p)
+    free = state_places(plant, model.p)
 
     def outputs(start: Array) -> Array:
         return model.run(start, part)[:, :m]
@@ -136,7 +136,7 @@ def _closest(model: Simulation, guess: Array, part: slice) -> FreeRun:
         return Linearised(J.T @ J, J.T @ error, cost(out), moved)
 
     damping = Damping(DAMPING, 0.0, lambda H: FADE * float(np.trace(H)), TRIES)
-    (start, out), _ = damped_fit(
+    (start, out), _ = fit_damped(
         (first, outputs(first)), linearise, damping, STEPS,
         lambda gain, after: gain == 0.0 or gain < ENOUGH * after,
     )  # fmt: skip
@@ -150,7 +150,7 @@ def _answers(
     plant: Plant,
 ) -> Array:  # fmt: skip
     nudged = [_followed(plant, _nudged(start, place, step)) for place, step in zip(free, steps, strict=True)]
-    moved = spread(outputs, nudged)
+    moved = map_on_threads(outputs, nudged)
     return np.column_stack([((new - out) / step).ravel() for new, step in zip(moved, steps, strict=True)])
 
 

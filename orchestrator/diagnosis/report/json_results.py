@@ -32,7 +32,7 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
     return DiagnoseFound(
         verdict=diagnosis.verdict,
         effects=tuple(effect_found(effect) for effect in diagnosis.effects),
-        play=None if play is None else play.found(),
+        play=None if play is None else play.to_result(),
         nuisances=tuple(NuisanceFound(n.name, n.grade.word, _values(n.parameters)) for n in diagnosis.nuisances),
         parameters={
             name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
@@ -42,7 +42,7 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
         remaining=RemainingFound(dict(diagnosis.left), tuple(dependence_found(one) for one in diagnosis.remaining)),
         learned_law=None if law is None else _law(law),
         analysis=_analysis(diagnosis),
-        trust=diagnosis.trust.found(),
+        trust=diagnosis.trust.to_result(),
         notes=diagnosis.notes,
         settings=as_tables(diagnosis.settings),
         candidates=steps_found(diagnosis.workings.search),

@@ -68,8 +68,8 @@ def build_with_law(diagnosis: Diagnosis, law: Dependence, source: str, directory
 def describe_law(diagnosis: Diagnosis, law: Dependence) -> dict[str, Any]:
     """Return a law as an FMU takes it, with the changes of parameters that belong to it."""
     plant = diagnosis.model.plant
-    before = plant.own(diagnosis.workings.final)
-    after = plant.own(_values_with_law(diagnosis, law)[: len(plant.names)])
+    before = plant.fmu_values(diagnosis.workings.final)
+    after = plant.fmu_values(_values_with_law(diagnosis, law)[: len(plant.names)])
     changes = {
         entry.name: float(after[n] - before[n])
         for n, entry in enumerate(plant.table)

@@ -187,7 +187,7 @@ class Simulation:
         """What is requested in each sample (n,), and what is at its beginning (n,)."""
         limit = self.p[self.plant.index(self.plant.drive.limit)]
         u = np.clip(self.signals.requests, -limit, limit)
-        mean, followed = self.plant.followed(self.p, u, self.signals.step)
+        mean, followed = self.plant.follow_requests(self.p, u, self.signals.step)
         return (u if self._kernel is None else mean), followed
 
     @cached_property
@@ -215,7 +215,7 @@ class Simulation:
     def _run_exactly(self, start: Array, asked: float, early: Array, late: Array, out: Array) -> None:
         _, first = self._dead_time
         memory = (float(start[7]), asked) if self.history else (0.0, UNASKED)
-        own = self.plant.own(self.p)
+        own = self.plant.fmu_values(self.p)
         self.plant.runner()((*start[:7].tolist(), *memory), own, early, late, first, self.signals.step, out)
 
 

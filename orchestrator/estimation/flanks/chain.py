@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 
-from orchestrator.shared.numba_cache import kept
+from orchestrator.shared.numba_cache import njit_on_disk
 
 STATES = 3
 OUTLIER = 1e-6  # share of points that may be anything, so that one bad row cannot rule
 ROOT_HALF = math.sqrt(0.5)
 
 
-@kept(nogil=True, error_model="numpy")
+@njit_on_disk(nogil=True, error_model="numpy")
 def densities(left, variance, alpha, mask, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` (n, 3) with the density of each point's twist in each state.
 
@@ -36,7 +36,7 @@ def densities(left, variance, alpha, mask, out):  # type: ignore[no-untyped-def]
         out[k, 1] = inside / (2.0 * alpha) + floor
 
 
-@kept(nogil=True, error_model="numpy")
+@njit_on_disk(nogil=True, error_model="numpy")
 def smooth(density, change, share, steps):  # type: ignore[no-untyped-def]
     """Return the log likelihood; fill each state's share at each point and the expected steps between states.
 

@@ -144,7 +144,7 @@ class FlankProblem:
         variance = max(float(weight @ spread) / max(float(weight.sum()), 1e-300), self.floor)
         return replace(fit, values=values, variance=variance, covariance=variance * inverse)
 
-    def refined(self, fit: FlankFit, mask: NDArray[np.bool_] | None = None, rounds: int | None = None) -> FlankFit:
+    def refine(self, fit: FlankFit, mask: NDArray[np.bool_] | None = None, rounds: int | None = None) -> FlankFit:
         """Return the maximum of the likelihood that expectation and maximisation reach from a fit.
 
         Args:
@@ -191,8 +191,8 @@ def best_fit(problem: FlankProblem) -> FlankFit:
         values = first.values.copy()
         values[ALPHA] = share * spread
         starts.append(replace(first, values=values, variance=max((share * spread / 3.0) ** 2, problem.floor)))
-    fits = [problem.refined(start, rounds=problem.settings.first_rounds) for start in starts]
-    return problem.refined(max(fits, key=lambda fit: fit.loglik))
+    fits = [problem.refine(start, rounds=problem.settings.first_rounds) for start in starts]
+    return problem.refine(max(fits, key=lambda fit: fit.loglik))
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,7 @@ def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Deviations, float]:
     for rows in np.array_split(np.arange(n), blocks):
         mask = np.ones(n, dtype=np.bool_)
         mask[rows] = False
-        without = problem.refined(fit, mask, problem.settings.block_rounds)
+        without = problem.refine(fit, mask, problem.settings.block_rounds)
         found.append((without.alpha, without.late, without.ratio))
     values = np.array(found)
     errors = np.sqrt((blocks - 1.0) / blocks * np.sum((values - values.mean(axis=0)) ** 2, axis=0))

@@ -95,7 +95,7 @@ def excitation_of(record: Record) -> list[Band]:
 
     if not record.has_torque:
         return []
-    filled = record.filled()
+    filled = record.fill_missing()
     length = min(filled.size // 4, max(64, round(8.0 / filled.step)))
     rate = 1.0 / filled.step
     frequency, power = welch(filled.u, rate, nperseg=length)
@@ -119,7 +119,7 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     """
     if record.theta_l is None or not record.has_torque:
         return None
-    filled = record.filled()
+    filled = record.fill_missing()
     assert filled.theta_l is not None
     reach = max(3, min(round(LONGEST_LAG / filled.step), filled.size // (4 * PARTS)))
     lags = []
@@ -143,7 +143,7 @@ def _residual_variance(motor: Array, load: Array) -> float:
 
 def reversals_of(record: Record) -> tuple[int | None, int]:
     """Return how often the torque and the motor's speed change sign, small wiggles apart."""
-    filled = record.filled()
+    filled = record.fill_missing()
     width = max(1, round(0.02 / record.step))
     speed = np.convolve(np.gradient(filled.theta_m, filled.step), np.ones(width) / width, "same")
     return _sign_changes(filled.u) if record.has_torque else None, _sign_changes(speed)

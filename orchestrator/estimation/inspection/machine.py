@@ -40,7 +40,7 @@ def is_of(record: Record, model: Model) -> bool:
     except RecordError:
         return False
     p = {name: entry.value for name, entry in model.parameters.items()}
-    record = record.filled()
+    record = record.fill_missing()
     same = record.theta_l is None or abs(_ratio(record)[0] / p["i"] - 1.0) < SAME_RATIO
     inertia, _, _ = momentum_balance(*smooth(record, p["tau"])[:3])
     relative = inertia / (p["J_m"] + p["J_l"] / p["i"] ** 2)
@@ -49,7 +49,7 @@ def is_of(record: Record, model: Model) -> bool:
 
 def rough_machine(record: Record) -> RoughMachine:
     """Return a machine that could have made the record; what the record does not show is assumed and called that."""
-    record = record.filled()
+    record = record.fill_missing()
     ratio, said = _ratio(record)
     values, origin = {"i": ratio}, {"i": said}
     if not record.has_torque:
@@ -126,7 +126,7 @@ def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]
     The balance of impulses over windows of a tenth of a second is fitted with inertia, viscous friction and a constant
     torque; what it leaves is the noise that an effect must stand out of.
     """
-    record = record.filled()
+    record = record.fill_missing()
     if not record.has_torque:
         return []
     p = {name: entry.value for name, entry in model.parameters.items()}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.errors import RecordError
-from orchestrator.estimation.design import Excitation, MachineLimits, bound_of_excitation, simple_candidates
+from orchestrator.estimation.design import Excitation, MachineLimits, error_bound_of_excitation, simple_candidates
 from orchestrator.estimation.innovations import affine_model, simulate
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
@@ -70,7 +70,7 @@ def sufficiency(record: Record, model: Model) -> Sufficiency:
     if why:
         return Sufficiency((), math.inf, record.size, (), math.inf, math.nan, why)
     rows = min(record.size, MOST_ROWS)
-    part = record.part(0, rows).filled()
+    part = record.part(0, rows).fill_missing()
     both = part.theta_l is not None
     noise = (
         measurement_noise(part, model, "theta_m"),
@@ -81,7 +81,7 @@ def sufficiency(record: Record, model: Model) -> Sufficiency:
     bounds = []
     for size in SIZES:
         traversed = _traversals(model, part, size) / longer**2 >= DEFAULT_SETTINGS.trust.least_traversals
-        bound = bound_of_excitation(model, part.time, part.u, size, noise, not both) if traversed else math.inf
+        bound = error_bound_of_excitation(model, part.time, part.u, size, noise, not both) if traversed else math.inf
         bounds.append((size, longer * bound))
     seen = [size for size, bound in bounds if bound < SEEN * size]
     smallest = _between(bounds) if seen else math.inf
@@ -121,7 +121,7 @@ def _other_sign(record: Record, model: Model) -> float:
 
     Within three standard deviations of the balance's own scatter a torque has no sign.
     """
-    record = record.filled()
+    record = record.fill_missing()
     p = {name: entry.value for name, entry in model.parameters.items()}
     impulse, speed, angle, width = smooth(record, p["tau"])
     rows = np.arange(0, speed.size, width)

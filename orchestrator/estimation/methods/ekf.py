@@ -10,11 +10,11 @@ import numpy as np
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
-from orchestrator.plants.compiled import compiled
+from orchestrator.plants.compiled import compile_module
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
-from orchestrator.shared.numba_cache import kept
+from orchestrator.shared.numba_cache import njit_on_disk
 from pyfmu_sources.backlash_estimator import FILTERS, SIZE, NoiseSettings
 
 UNMEASURED = 1e6  # rad, standard deviation that stands for an encoder that is absent
@@ -32,11 +32,11 @@ class OnlineTrace:
 @cache
 def _runner() -> Callable[..., None]:
     """Return the compiled loop over a record."""
-    source = compiled("backlash_estimator")
+    source = compile_module("backlash_estimator")
     begin, advance, measure = source.begin, source.advance, source.measure
     look, touching = source.combine, source.contact
 
-    @kept()
+    @njit_on_disk()
     def loop(u, theta_m, theta_l, model, settings, step, filters, alpha, deviation, contact):  # type: ignore[no-untyped-def]
         first = 0
         while first < u.size - 1 and not (theta_m[first] == theta_m[first] and theta_l[first] == theta_l[first]):

@@ -103,9 +103,9 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit
     if np.count_nonzero(np.diff(flanks)) < likelihood.settings.fit.enough_traversals:
         return None
     report("fitting the whole record", BEFORE_WHOLE)
-    likelihood = likelihood.changed(soft=short.soft, information=short.information)
+    likelihood = likelihood.with_options(soft=short.soft, information=short.information)
     if short.problem.unknowns[_split(short)[0][-1]].lower >= math.log(LEAST_WHERE_INEXACT[-1]):
-        likelihood = likelihood.changed(problem=with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT))
+        likelihood = likelihood.with_options(problem=with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT))
     torque, others = _split(likelihood)
     start = maximise(likelihood, first.point.theta, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
     best = _free_fit(start.likelihood, start, torque, others)
@@ -139,7 +139,7 @@ def _with_contact(best: GapFit, torque: list[int], others: list[int]) -> GapFit:
         return best
     if likelihood.problem.unknowns[torque[-1]].lower >= math.log(LEAST_WHERE_INEXACT[-1]):
         return best  # it has that already
-    likelihood = likelihood.changed(problem=with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT))
+    likelihood = likelihood.with_options(problem=with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT))
     start = best.point.theta.copy()
     start[torque] = np.maximum(start[torque], np.log(LEAST_WHERE_INEXACT))
     best = maximise(likelihood, start, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
@@ -181,13 +181,13 @@ def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int
     """
     found: list[tuple[GapFit, Likelihood]] = []
     blur = _levels(likelihood, BLURRED)
-    firsts, likelihood = _first_fits(likelihood.changed(soft=True), torque, others, np.log(blur[0]))
+    firsts, likelihood = _first_fits(likelihood.with_options(soft=True), torque, others, np.log(blur[0]))
     for first in firsts[:2]:
         known = likelihood.information.copy()
         known[np.ix_(first.free, first.free)] = first.information
-        blurred, likelihood = _continue(likelihood.changed(soft=True, information=known), first, blur[1:])
+        blurred, likelihood = _continue(likelihood.with_options(soft=True, information=known), first, blur[1:])
         found.append((blurred, likelihood))
-        sharp, likelihood = _sharpen(likelihood.changed(soft=False), blurred, torque, others)
+        sharp, likelihood = _sharpen(likelihood.with_options(soft=False), blurred, torque, others)
         found.append((sharp, likelihood))
         if _is_calm(likelihood, sharp):
             break

@@ -57,10 +57,10 @@ def _dry() -> tuple[Any, Any]:
     """Return the compiled levels of dry friction, and those to which distances of presliding belong."""
     from numba import njit
 
-    from orchestrator.plants.compiled import compiled
+    from orchestrator.plants.compiled import compile_module
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
-    source, bristles, whole = compiled("equations"), compiled("bristles"), _whole()
+    source, bristles, whole = compile_module("equations"), compile_module("bristles"), _whole()
     twist, contact_of, elastic, lever_arm = source.twist, source.contact_of, source.elastic_torque, source.lever_arm
     friction_m, friction_l, rest_m, rest_l = source.friction_m, source.friction_l, bristles.rest_m, bristles.rest_l
     alpha_at, loaded, wavy = dt.P_ALPHA, (dt.P_LOADED_M, dt.P_LOADED_L), (dt.P_WAVY_M, dt.P_WAVY_L)
@@ -87,11 +87,11 @@ def _flanks() -> tuple[Any, Any]:
     """Return, compiled, whether a model has teeth or end stops that meet, and whether any may within a time."""
     from numba import njit
 
-    from orchestrator.plants.compiled import compiled
+    from orchestrator.plants.compiled import compile_module
     from orchestrator.plants.sample import travel_bound
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
-    source, whole = compiled("equations"), _whole()
+    source, whole = compile_module("equations"), _whole()
     twist, twist_slope = source.twist, source.twist_slope
     alpha_at, onset_at, stops, far = dt.P_ALPHA, dt.COUNT + 2, (dt.P_STOP_LOWER, dt.P_STOP_UPPER), dt.BIG
 
@@ -118,17 +118,17 @@ def _flanks() -> tuple[Any, Any]:
 @cache
 def _stage() -> CompiledEquations:
     """Return the compiled equations, with the damping of teeth that meet growing with their penetration."""
-    from orchestrator.plants.compiled import compiled
-    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
+    from orchestrator.plants.compiled import compile_module
+    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 
-    source, whole = compiled("equations"), _whole()
+    source, whole = compile_module("equations"), _whole()
     rates, twist, contact_of = source.rates, source.twist, source.contact_of
     twist_rate, lever_arm = source.twist_rate, source.lever_arm
     alpha_at, end, set_in_at, lag_at = dt.P_ALPHA, dt.COUNT, dt.P_ONSET, dt.P_TAU
     damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
     friction, rest = _dry()
 
-    @kept(error_model="numpy", **ALGEBRA, **UNCOUNTED)
+    @njit_on_disk(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def smooth_stage(x: Any, signs: Any, p: Any, u: float) -> Any:
         full = whole(x, u)
         angle = twist(full, p)
@@ -148,15 +148,15 @@ def _stage() -> CompiledEquations:
 @cache
 def _runner() -> Any:
     """Return the compiled, event-located simulation."""
-    from orchestrator.plants.compiled import compiled
-    from orchestrator.shared.numba_cache import kept
+    from orchestrator.plants.compiled import compile_module
+    from orchestrator.shared.numba_cache import njit_on_disk
 
-    source = compiled("drivetrain")
+    source = compile_module("drivetrain")
     advance, initial_mode, prepare, consistent = (
         source.advance, source.initial_mode, source.prepare, source.consistent_start,
     )  # fmt: skip
 
-    @kept(nogil=True)
+    @njit_on_disk(nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = consistent((start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0), p)
         x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], start[7], start[8])

@@ -28,12 +28,12 @@ def stage() -> CompiledEquations:
     """Return the compiled equations."""
     from numba import njit
 
-    from orchestrator.plants.compiled import compiled
+    from orchestrator.plants.compiled import compile_module
     from orchestrator.plants.sample import travel_bound
-    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
+    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 
-    source = compiled("servo_axis")
-    rates, level, breakaway = source.rates, source.friction, compiled("axis_equations").rest
+    source = compile_module("servo_axis")
+    rates, level, breakaway = source.rates, source.friction, compile_module("axis_equations").rest
     end, wavy, stops, far = ap.COUNT, ap.P_WAVY, (ap.P_STOP_LOWER, ap.P_STOP_UPPER), ap.BIG
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
@@ -54,7 +54,7 @@ def stage() -> CompiledEquations:
         way = travel_bound(x[1], rate[1], h)
         return abs(x[0] - p[stops[0]]) < way or abs(x[0] - p[stops[1]]) < way
 
-    @kept(error_model="numpy", **ALGEBRA, **UNCOUNTED)
+    @njit_on_disk(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def smooth_stage(x: Any, signs: Any, p: Any, u: float) -> Any:
         speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
@@ -65,13 +65,13 @@ def stage() -> CompiledEquations:
 @cache
 def runner() -> Any:
     """Return the compiled, event-located simulation."""
-    from orchestrator.plants.compiled import compiled
-    from orchestrator.shared.numba_cache import kept
+    from orchestrator.plants.compiled import compile_module
+    from orchestrator.shared.numba_cache import njit_on_disk
 
-    source = compiled("servo_axis")
+    source = compile_module("servo_axis")
     advance, initial_mode, begin = source.advance, source.initial_mode, source.start
 
-    @kept(nogil=True)
+    @njit_on_disk(nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = begin(start[0], start[1], start[4], p)
         x = (x[0], x[1], x[2], x[3], start[8])

@@ -104,10 +104,10 @@ def _search_sections(results: FmuDiagnosisFound) -> list[Section]:
     ]
     if tried:
         sections.append(table_of("Candidates", tried))
-    return [*sections, *_remaining_sections(results.remaining), *_delivery_sections(results.delivery)]
+    return [*sections, *_residual_sections(results.remaining), *_delivery_sections(results.delivery)]
 
 
-def _remaining_sections(remaining: FmuRemainingFound) -> list[Section]:
+def _residual_sections(remaining: FmuRemainingFound) -> list[Section]:
     """Return what the final model leaves of each output, and what that follows."""
     facts: list[tuple[str, Cell]] = [
         (f"share of the power of {name} [%]", None if share is None else 100.0 * share)

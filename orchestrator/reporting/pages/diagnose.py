@@ -72,7 +72,7 @@ def build(source: ResultDocument) -> Report:
     sections += _torque_left([*results.test, *([results.validation] if results.validation else [])])
     sections += _figure(source, "missing_torque", "Missing torque", MISSING)
     sections += _figure(source, "blocks", "Sizes block by block", BLOCKS)
-    sections += [*_remaining_sections(results.remaining), *_law_sections(source, results.learned_law)]
+    sections += [*_residual_sections(results.remaining), *_law_sections(source, results.learned_law)]
     metric = any(signal.unit == "m" for test in results.test for signal in test.misfit.values())
     sections += record_plots(source, "diagnose.csv", live.rows if live else (), metric)
     sections += plant_section(source, "diagnose.csv", live, metric=metric)
@@ -80,7 +80,7 @@ def build(source: ResultDocument) -> Report:
     sections += sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"})
     return Report(
         title="Diagnosis",
-        summary=" ".join(filter(None, [sentence, _effect_names(results.effects), _closed_loop_note(results.test)])),
+        summary=" ".join(filter(None, [sentence, _effect_names(results.effects), _note_on_closed_loop(results.test)])),
         badge=trust_badge(results.trust, label, badge),
         sections=tuple(sections),
         origin=source.origin(("corrected model", results.model), ("time taken [s]", results.seconds)),
@@ -118,7 +118,7 @@ def _effect_names(effects: Sequence[EffectFound]) -> str:
     return f"The model lacks {listed}." if named else ""
 
 
-def _closed_loop_note(tests: Sequence[TestFound]) -> str:
+def _note_on_closed_loop(tests: Sequence[TestFound]) -> str:
     parts = []
     for test in tests[:1]:
         for signal, g in test.misfit.items():
@@ -220,7 +220,7 @@ def _figure(source: ResultDocument, name: str, title: str, note: str) -> list[Se
     return [Picture(title, path, note)] if path.is_file() else []
 
 
-def _remaining_sections(remaining: RemainingFound) -> list[Section]:
+def _residual_sections(remaining: RemainingFound) -> list[Section]:
     """Return what no effect explains, and which signals it follows."""
     facts = tuple(
         (f"torque at the {site}, rms, where the model was fitted [%]", share and 100.0 * math.sqrt(share))

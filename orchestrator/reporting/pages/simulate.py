@@ -21,7 +21,7 @@ def build(source: ResultDocument) -> Report:
     results = source.results
     file = Path(str((source.document.get("arguments") or {}).get("file") or results.get("file") or "")).name
     if not table:
-        return _written_page(source, file) if source.command == "ssp" and file else generic.build(source)
+        return _page_of_export(source, file) if source.command == "ssp" and file else generic.build(source)
     if "alpha" in results:
         sections, summary = _pair(source, read(results, PairFound), table)
     else:
@@ -41,7 +41,7 @@ def _what_ran(file: str, results: SignalsFound, table: Columns) -> str:
     return f"The system in {file} was run from 0 to {end:g} s in steps{step}{named}."
 
 
-def _written_page(source: ResultDocument, file: str) -> Report:
+def _page_of_export(source: ResultDocument, file: str) -> Report:
     """Return the page of an SSP file that was written, not run."""
     results = source.results
     components = ", ".join(str(name) for name in results.get("components") or ())

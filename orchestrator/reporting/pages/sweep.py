@@ -132,7 +132,7 @@ def _influences(table: Columns, units: Mapping[str, str]) -> list[Section]:
     alpha, estimate, noise = (numbers(table[n]) for n in ("alpha", "estimate", "noise"))
     error = [None if a is None or e is None else 100.0 * (e - a) / a for a, e in zip(alpha, estimate, strict=True)]
     found: list[Section] = []
-    for name in _varied_columns(table, units):
+    for name in _parameter_columns(table, units):
         if name in OWN:
             continue
         x, categories = _axis(table[name])
@@ -149,7 +149,7 @@ def _influences(table: Columns, units: Mapping[str, str]) -> list[Section]:
 
 def _signals(table: Columns, units: Mapping[str, str]) -> list[Section]:
     """Return each signal's results against each varied parameter, for sweeps of any scenario."""
-    varied = _varied_columns(table, units)
+    varied = _parameter_columns(table, units)
     signals: dict[str, list[str]] = {}
     for column in (n for n in units if n in table):
         head, _, what = column.rpartition(".")
@@ -168,7 +168,7 @@ def _signals(table: Columns, units: Mapping[str, str]) -> list[Section]:
     return made[:MOST_PLOTS]
 
 
-def _varied_columns(table: Columns, units: Mapping[str, str]) -> list[str]:
+def _parameter_columns(table: Columns, units: Mapping[str, str]) -> list[str]:
     return [n for n in table if n not in units and n not in {"case", "status", "message"}]
 
 

@@ -54,7 +54,9 @@ def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
     return found
 
 
-def bound_values(element: etree._Element, place: str, folder: Path, problems: list[Problem]) -> list[tuple[str, Given]]:
+def parameter_values(
+    element: etree._Element, place: str, folder: Path, problems: list[Problem]
+) -> list[tuple[str, Given]]:
     """Return names, prefix included, and values of an element's parameter bindings, in their order."""
     found: list[tuple[str, Given]] = []
     bindings = element.findall(f"{tag('ssd', 'ParameterBindings')}/{tag('ssd', 'ParameterBinding')}")

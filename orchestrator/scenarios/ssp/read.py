@@ -30,7 +30,7 @@ from orchestrator.scenarios.ssp.common import (
     tag,
 )
 from orchestrator.scenarios.ssp.flow import Flow, Node, Structure, instance_names
-from orchestrator.scenarios.ssp.parameters import Given, bound_values, own_value, read_units
+from orchestrator.scenarios.ssp.parameters import Given, own_value, parameter_values, read_units
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.scratch import Scratch
 
@@ -42,7 +42,7 @@ _GIVERS = ("output", "calculatedParameter", "constant", "local")
 
 
 @contextmanager
-def opened_ssp(
+def open_ssp(
     path: Path,
     inputs: Mapping[str, Signal] | None = None,
     step: float | None = None,
@@ -161,7 +161,7 @@ def _component(element: etree._Element, name: str, structure: Structure) -> None
 
 
 def _bind(element: etree._Element, path: str, structure: Structure) -> None:
-    for name, value in bound_values(element, f"$.{path or 'System'}", structure.folder, structure.problems):
+    for name, value in parameter_values(element, f"$.{path or 'System'}", structure.folder, structure.problems):
         # The innermost binding is read first and the outer one wins, as the standard has it.
         owner, parameter = path, name
         while (owner, parameter) not in structure.kinds:

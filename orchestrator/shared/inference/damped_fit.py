@@ -46,7 +46,7 @@ class Damping:
     tries: int
 
 
-def damped_fit(
+def fit_damped(
     start: T,
     linearise: Callable[[T], Linearised[T] | None],
     damping: Damping,

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from orchestrator.shared.isolation.limits import Setup
-from orchestrator.shared.isolation.walls import bound, enclose, follow_parent
+from orchestrator.shared.isolation.walls import enclose, follow_parent, limit_process
 
 _LENGTH = struct.Struct(">Q")
 ANSWER, REFUSAL = 0, 1
@@ -29,7 +29,7 @@ def main() -> None:
     assert isinstance(setup, Setup)
     follow_parent(setup.parent)
     sys.path[:] = setup.path
-    bound(setup.limits)
+    limit_process(setup.limits)
     walls = enclose(setup.read, setup.write) if setup.walls else None
     _serve(link, setup, None if walls is None else [walls.landlock, walls.seccomp])
     os._exit(0)  # threads or exit handlers of what was loaded must not keep the process alive

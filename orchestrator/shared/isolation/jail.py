@@ -157,7 +157,7 @@ class Jail:
         """Return the child's resident memory in bytes; 0 where the system does not tell."""
         return resident_memory(self.pid)[0]
 
-    def printed_bytes(self) -> int:
+    def output_size(self) -> int:
         """Return how much the child has printed."""
         return os.fstat(self._log.fileno()).st_size
 

@@ -38,7 +38,7 @@ class Strays:
         if not self.mark:
             return False
         found, end = False, time.monotonic() + _PATIENCE
-        while strays := self._adopted_children():
+        while strays := self._find_children():
             found = True
             for pid in strays:
                 with contextlib.suppress(OSError):
@@ -48,7 +48,7 @@ class Strays:
                 break
         return found
 
-    def _adopted_children(self) -> list[int]:
+    def _find_children(self) -> list[int]:
         """Children of this process that carry the mark, save for those that have ended."""
         mark = f"{_NAME}={self.mark[_NAME]}".encode()
         found = []

@@ -31,7 +31,7 @@ class Walls:
     seccomp: bool
 
     @property
-    def missing(self) -> str:
+    def not_enforced(self) -> str:
         """What is not enforced, in words; empty when everything is."""
         lacks = []
         if not self.landlock:
@@ -43,7 +43,7 @@ class Walls:
     @property
     def in_words(self) -> str:
         """What is enforced, or what is not, for a result file."""
-        return self.missing or "files, network, processes"
+        return self.not_enforced or "files, network, processes"
 
 
 def support() -> Walls:
@@ -59,7 +59,7 @@ def follow_parent(parent: int) -> None:
             os._exit(1)
 
 
-def bound(limits: Limits) -> None:
+def limit_process(limits: Limits) -> None:
     """Set the limits that the kernel keeps: processor time, address space, size of files, descriptors, no core file.
 
     Args:

@@ -22,7 +22,7 @@ from orchestrator.diagnosis.fmu.system import read_system
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.diagnosis.settings import DiagnosisSettings, FmuSettings
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.scenarios.ssp.read import opened_ssp
+from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import FmuCalibrationFound, FmuDiagnosisFound
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
@@ -109,7 +109,7 @@ def test_the_command_delivers_a_system_that_reproduces_the_fit(made, tmp_path):
     assert [e["name"] for e in results["effects"]] == ["quadratic_drag"]
     assert set(results) == set(FmuDiagnosisFound.__struct_fields__)
     assert results["delivery"][0]["difference_over_noise"] == 0.0
-    with opened_ssp(out / "corrected.ssp") as corrected:
+    with open_ssp(out / "corrected.ssp") as corrected:
         assert corrected.system.execution_order() == ("quadratic_drag_1", "plant")  # as in the fit
     assert {p.name for p in out.iterdir()} >= {"corrected.ssp", "report.html", "diagnose.csv", "diagnose_signals.png"}
 

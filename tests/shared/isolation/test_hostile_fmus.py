@@ -10,7 +10,7 @@ from tests.support.hostile_fmus import BEHAVIOURS, World, verdict
 
 pytestmark = [
     pytest.mark.skipif(not have_compiler(), reason="there is no C compiler"),
-    pytest.mark.skipif(bool(support().missing), reason="this kernel has no walls"),
+    pytest.mark.skipif(bool(support().not_enforced), reason="this kernel has no walls"),
 ]
 SOME = [
     ("simulate", "load", "exit"),
