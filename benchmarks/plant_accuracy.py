@@ -9,8 +9,9 @@ from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.compiled import compile_module
-from orchestrator.plants.reference import ReferencePlant, linear_solution, reference_solution
+from orchestrator.plants.reference import ReferencePlant
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters
+from tests.support.reference_runs import linear_solution, reference_solution
 
 H, STEPS = 1e-3, 2000
 SIGNALS = ("theta_m", "omega_m", "theta_l", "omega_l", "T_m")

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.masters.memory import peak_memory
 from benchmarks.masters.scaling import chain
 from orchestrator.building.build import ensure_built
 from orchestrator.engine import DesignCases, LocalProcesses, Progress, parse_design, run_cases, write_csv
@@ -25,7 +26,6 @@ from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.scenario import scenario_of_pair
 from orchestrator.scenarios.sweep import scenario_work
-from orchestrator.shared.operating_system import peak_memory
 
 CASES = (10, 100, 1_000, 10_000)
 CASE_STEPS = 100

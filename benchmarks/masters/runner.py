@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 from benchmarks.masters.job import read_job
+from benchmarks.masters.memory import peak_memory
 from benchmarks.masters.tools import TOOLS
-from orchestrator.shared.operating_system import peak_memory
 
 RUNS = 3
 

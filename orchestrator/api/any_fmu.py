@@ -1,6 +1,5 @@
 """What any FMU misses, from measured records."""
 
-import csv
 import time
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -8,10 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-
 from orchestrator.api.arguments import choose_settings
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.diagnosis_results import AnyDiagnosisResult
+from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.fmu.corrected_ssp import write_corrected
 from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnose_records
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
@@ -20,21 +18,20 @@ from orchestrator.diagnosis.fmu.report import FmuDiagnosis, misfit_on_record, st
 from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
 from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, steps_found, test_found
 from orchestrator.diagnosis.report.summary import summarise_fmu
-from orchestrator.diagnosis.result import GradedEffect, TestMisfit
+from orchestrator.diagnosis.result import TestMisfit
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.tables import column_names
 from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import ParameterFound
 from orchestrator.shared.settings import as_tables
-from orchestrator.shared.trust import Trust
 
 Progress = Callable[[str], None]
-STAGES = ("nominal", "parameters", "final", "noise")
 
 
 @dataclass(frozen=True, repr=False)
-class FmuDiagnosisResult(Result):
+class FmuDiagnosisResult(AnyDiagnosisResult):
     """What records say of an FMU.
 
     Attributes:
@@ -45,38 +42,13 @@ class FmuDiagnosisResult(Result):
         delivered: the corrected system, once it has been written.
     """
 
-    command: ClassVar[str] = "diagnose"
     replaces: ClassVar[tuple[str, ...]] = ("corrected.ssp",)
+    signal_word: ClassVar[str] = "output"
     diagnosis: FmuDiagnosis
     validation: TestMisfit | None
     seconds: float
     arguments: Mapping[str, Any] = field(default_factory=dict)
     delivered: list[DeliveredFound] = field(default_factory=list)
-
-    @property
-    def verdict(self) -> str:
-        """One of "none", "parameters", "effects" and "unknown"."""
-        return self.diagnosis.verdict
-
-    @property
-    def effects(self) -> tuple[GradedEffect, ...]:
-        """The effects around the FMU, surest first: grade, and parameters with intervals and units."""
-        return self.diagnosis.effects
-
-    @property
-    def test(self) -> tuple[TestMisfit, ...]:
-        """Misfits on test data, which nothing was fitted to: of the nominal, the re-fitted and the final model."""
-        return self.diagnosis.test
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What to bear in mind, a sentence each."""
-        return self.diagnosis.notes
-
-    @property
-    def trust(self) -> Trust:
-        """How far the result can be trusted."""
-        return self.diagnosis.trust
 
     def summary(self) -> Iterator[str]:
         """Yield what was found, one sentence a line.
@@ -85,9 +57,7 @@ class FmuDiagnosisResult(Result):
             Verdict, effects, what is left, notes and trust.
         """
         yield from summarise_fmu(self.diagnosis)
-        yield from (f"Note: {note}" for note in self.notes)
-        yield f"Trust: {self.trust.level.word}"
-        yield from (f"  {reason}" for reason in self.trust.reasons)
+        yield from self._closing_lines()
 
     def blocks(self) -> Sequence[Block]:
         """Return the summary, and the tables of parameters, candidates and misfits."""
@@ -126,14 +96,11 @@ class FmuDiagnosisResult(Result):
         from orchestrator.diagnosis.fmu.report import draw_signals
 
         problem, stages, test = stage_runs(self.diagnosis.workings)
-        header, columns = ["time", *problem.inputs], [problem.data.time, *problem.data.inputs.T]
+        columns = {"time": problem.data.time} | dict(zip(problem.inputs, problem.data.inputs.T, strict=True))
         for k, name in enumerate(problem.outputs):
-            header += [name, *(f"{name}_{stage}" for stage in stages)]
-            columns += [problem.data.outputs[:, k], *(y[:, k] for y in stages.values())]
-        with (folder / "diagnose.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(header)
-            writer.writerows([f"{v:.9g}" for v in row] for row in np.column_stack(columns))
+            columns[name] = problem.data.outputs[:, k]
+            columns |= {f"{name}_{stage}": values[:, k] for stage, values in stages.items()}
+        write_columns(folder / "diagnose.csv", columns, "{:.9g}".format)
         draw_signals(folder / "diagnose_signals.png", problem, stages, test)
         if self.verdict != "unknown":
             workings = self.diagnosis.workings
@@ -160,16 +127,7 @@ def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
     ]
     if rows:
         yield table("Parameters", ("name", "nominal", "re-fitted", "standard error", "unit"), rows)
-    for title, tests in (
-        ("Misfit on test data", diagnosis.test),
-        ("Misfit on the other record", (diagnosis.validation,)),
-    ):
-        cells: list[tuple[str, ...]] = [
-            (test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit)
-            for test in tests if test is not None for one in test.signals
-        ]  # fmt: skip
-        if cells:
-            yield table(title, ("record", "output", "as given", "re-fitted", "with effects", "noise", "unit"), cells)
+    yield from diagnosis._misfit_tables()
 
 
 def read_records(records: Sequence[Path | str], given: Map, settings: DiagnosisSettings) -> list[FmuRecord]:

@@ -1,19 +1,19 @@
 """A diagnosis as it is shown, drawn, written and built."""
 
-import csv
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import msgspec
 
+from orchestrator.api.diagnosis_results import AnyDiagnosisResult
 from orchestrator.api.law import law_result, law_words
 from orchestrator.api.live import live_corrected_model
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.report.corrected import (
     BeforeAfter,
     before_and_after,
@@ -24,17 +24,15 @@ from orchestrator.diagnosis.report.corrected import (
 from orchestrator.diagnosis.report.json_results import diagnosis_found, test_found
 from orchestrator.diagnosis.report.law_export import LawRun, build_with_law, run_with_law
 from orchestrator.diagnosis.report.summary import summarise
-from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit
+from orchestrator.diagnosis.result import Diagnosis, TestMisfit
 from orchestrator.errors import OutputError
 from orchestrator.records.record import Record
+from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound
-from orchestrator.shared.trust import Trust
-
-STAGES = ("nominal", "parameters", "final", "noise")
 
 
 @dataclass(frozen=True, repr=False)
-class DiagnosisResult(Result):
+class DiagnosisResult(AnyDiagnosisResult):
     """What records say of a model.
 
     Attributes:
@@ -47,7 +45,6 @@ class DiagnosisResult(Result):
         with_law: the corrected FMU has the learned law, off until ``effects.learned_law.on`` is 1.
     """
 
-    command: ClassVar[str] = "diagnose"
     diagnosis: Diagnosis
     record: Record
     validation: TestMisfit | None
@@ -55,31 +52,6 @@ class DiagnosisResult(Result):
     arguments: Mapping[str, Any] = field(default_factory=dict)
     more: tuple[Record, ...] = ()
     with_law: bool = False
-
-    @property
-    def verdict(self) -> str:
-        """One of "none", "parameters", "effects" and "unknown"."""
-        return self.diagnosis.verdict
-
-    @property
-    def effects(self) -> tuple[GradedEffect, ...]:
-        """The effects that the model misses, surest first: grade, and parameters with intervals and units."""
-        return self.diagnosis.effects
-
-    @property
-    def test(self) -> tuple[TestMisfit, ...]:
-        """Misfits on test data, which nothing was fitted to: of the nominal, the re-fitted and the final model."""
-        return self.diagnosis.test
-
-    @property
-    def trust(self) -> Trust:
-        """How far the corrected model can be trusted."""
-        return self.diagnosis.trust
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What to bear in mind, a sentence each."""
-        return self.diagnosis.notes
 
     def build(self, out: Path | str) -> Path:
         """Build the corrected plant as an FMU, with the learned law where that was asked for, and check it.
@@ -150,17 +122,9 @@ class DiagnosisResult(Result):
         shown = {"": runs.measured, "_before": runs.before, "_after": runs.after}
         if self.law_run is not None:
             shown["_with_law"] = self.law_run.outputs
-        header = ["time", "u"] + [f"{name}{suffix}" for name in names for suffix in shown]
-        columns = [runs.time, runs.u]
-        for n in range(len(names)):
-            columns += [values[:, n] for values in shown.values()]
-        try:
-            with Path(path).open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file, lineterminator="\n")
-                writer.writerow(header)
-                writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
-        except OSError as error:
-            raise OutputError(f"cannot write {path}: {error.strerror}") from None
+        columns = {"time": runs.time, "u": runs.u}
+        columns |= {f"{name}{k}": values[:, n] for n, name in enumerate(names) for k, values in shown.items()}
+        write_columns(Path(path), columns, "{:.9g}".format)
 
     def summary(self) -> Iterator[str]:
         """Yield what was found, one sentence a line.
@@ -174,14 +138,11 @@ class DiagnosisResult(Result):
             yield f"Learned law: of what is left at the {d.law.site}, {d.law.words}"
         if self.with_law:
             yield law_words(d, self.law_run if "_simulation" in self.__dict__ else None)
-        for note in d.notes:
-            yield f"Note: {note}"
-        yield f"Trust: {self.trust.level.word}"
-        yield from (f"  {reason}" for reason in self.trust.reasons)
+        yield from self._closing_lines()
 
     def blocks(self) -> Sequence[Block]:
         """Return the summary, and the tables of misfits."""
-        return [*self.summary(), *_tables(self)]
+        return [*self.summary(), *self._misfit_tables(), *_torque_table(self)]
 
     def results(self, place: Path) -> DiagnoseFound:
         """Return what ``diagnose.json`` says; the corrected FMU is in ``place``."""
@@ -214,18 +175,7 @@ class DiagnosisResult(Result):
         self.plot(folder / "diagnose_signals.png")
 
 
-def _tables(diagnosis: DiagnosisResult) -> Iterator[Block]:
-    for title, shown in (
-        ("Misfit on test data", diagnosis.test),
-        ("Misfit on the other record", (diagnosis.validation,)),
-    ):
-        signals = [(test, one) for test in shown if test is not None for one in test.signals]
-        rows = [
-            [test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit]
-            for test, one in signals
-        ]
-        if rows:
-            yield table(title, ("record", "signal", "as given", "re-fitted", "with effects", "noise", "unit"), rows)
+def _torque_table(diagnosis: DiagnosisResult) -> Iterator[Block]:
     tests = [test for test in (*diagnosis.test, diagnosis.validation) if test is not None]
     torque = [(test.source, test.torque) for test in tests if test.torque]
     if torque:

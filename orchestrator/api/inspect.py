@@ -87,7 +87,7 @@ class InspectResult(Result):
         Args:
             path: a PNG, SVG or PDF file.
         """
-        from orchestrator.estimation.inspection.figures import draw_record
+        from orchestrator.estimation.figures import draw_record
 
         draw_record(Path(path), self.record, list(self.excitation))
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import choose_experiment, not_negative
-from orchestrator.api.shown import Block, Result, table, write_columns
+from orchestrator.api.shown import Block, Result, table
 from orchestrator.building.build import ensure_built
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import Value
@@ -20,6 +20,7 @@ from orchestrator.paired.calibration import GapEstimate
 from orchestrator.paired.cosimulation import FMUS, LoopRun
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.pair import PairRun, with_settings
+from orchestrator.shared.output import write_columns
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import GapFound, PairFound
 

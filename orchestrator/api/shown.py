@@ -129,22 +129,3 @@ def _html(block: Block) -> str:
     head = "".join(f"<th>{escape(name)}</th>" for name in block.columns)
     rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in block.rows)
     return f"<table><caption>{escape(block.title)}</caption><tr>{head}</tr>{rows}</table>"
-
-
-def write_columns(path: Path, columns: Mapping[str, Any]) -> None:
-    """Write arrays as CSV with exact numbers.
-
-    Args:
-        columns: arrays of shape (n,) by heading, in their order.
-    """
-    import csv
-
-    from orchestrator.errors import OutputError
-
-    try:
-        with path.open("w", encoding="utf-8", newline="") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror}") from None

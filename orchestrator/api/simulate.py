@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.shown import Block, Result, table, write_columns
+from orchestrator.api.shown import Block, Result, table
 from orchestrator.errors import ScenarioError
 from orchestrator.master import result as master
 from orchestrator.master.signals import Constant
@@ -17,6 +17,7 @@ from orchestrator.scenarios.isolated import Safety, describe_walls
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.operating_system import LIMITS
+from orchestrator.shared.output import write_columns
 from orchestrator.shared.results import EventsFound, RemarkFound, SignalFound, SignalsFound, WallsFound
 
 Array = NDArray[np.float64]

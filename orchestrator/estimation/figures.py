@@ -1,4 +1,4 @@
-"""Figures of an estimate, drawn with matplotlib's object interface (no global state, no display)."""
+"""Figures of an estimate and of a record, drawn with matplotlib's object interface (no global state, no display)."""
 
 import math
 from pathlib import Path
@@ -9,20 +9,22 @@ from matplotlib.figure import Figure
 
 from orchestrator.estimation.design import Excitation
 from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.inspection.channels import Band
 from orchestrator.estimation.profile import Profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
+from orchestrator.shared.drawing import BLUE, GREY, ORANGE, shade_gap
 from orchestrator.shared.inference.normal import NORMAL_95
 
-BLUE, ORANGE, GREY, SHADE = "#2166ac", "#d6604d", "#555555", "#f4d58d"
 DPI = 130
 SHOWN_SECONDS = 4.0
+MOST_POINTS = 4000  # of a channel
 
 
-def _figure(rows: int, size: tuple[float, float]) -> tuple[Figure, list]:
+def _figure(rows: int, size: tuple[float, float], share_x: bool = True) -> tuple[Figure, list]:
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    return figure, list(np.atleast_1d(figure.subplots(rows, 1, sharex=rows > 1)))
+    return figure, list(np.atleast_1d(figure.subplots(rows, 1, sharex=share_x and rows > 1)))
 
 
 def draw_fit(path: Path, record: Record, estimate: Estimate, ratio: float) -> None:
@@ -49,7 +51,7 @@ def draw_fit(path: Path, record: Record, estimate: Estimate, ratio: float) -> No
     axes[2].set_ylabel("one-step error [mrad]")
     axes[2].set_xlabel("time [s]")
     for axis in axes:
-        _shade(axis, t, contacts[span])
+        shade_gap(axis, t, contacts[span])
         axis.legend(loc="upper right", fontsize=8)
         axis.grid(alpha=0.25)
         axis.margins(x=0.0)
@@ -63,13 +65,6 @@ def _liveliest(record: Record, contacts: Array) -> slice:
     counts = changes[width - 1 :] - changes[: record.size - width + 1]
     start = int(np.argmax(counts))
     return slice(start, start + width)
-
-
-def _shade(axis, time: Array, contacts: Array) -> None:  # type: ignore[no-untyped-def]
-    free = np.concatenate([[False], contacts == 0, [False]])
-    edges = np.flatnonzero(free[1:] != free[:-1])
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        axis.axvspan(time[first], time[min(last, time.size - 1)], color=SHADE, alpha=0.6, linewidth=0.0)
 
 
 def draw_profile(path: Path, profile: Profile, estimate: Estimate, limit: float) -> None:
@@ -141,3 +136,23 @@ def draw_design(path: Path, time: Array, best: Excitation) -> None:
     axis.grid(alpha=0.25)
     axis.margins(x=0.0)
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def draw_record(path: Path, record: Record, bands: list[Band]) -> None:
+    """Draw the channels over time, what is missing left blank, and the excitation by frequency."""
+    signals = [("u", "torque [N.m]", record.u)] if record.has_torque else []
+    signals.append(("theta_m", "motor [rad]", record.theta_m))
+    if record.theta_l is not None:
+        signals.append(("theta_l", "load [rad]", record.theta_l))
+    figure, axes = _figure(len(signals) + 1, (9.0, 2.0 * (len(signals) + 1)), share_x=False)
+    every = max(1, record.size // MOST_POINTS)
+    for axis, (_, label, values) in zip(axes, signals, strict=False):
+        axis.plot(record.time[::every], values[::every], linewidth=0.8)
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+    axes[len(signals) - 1].set_xlabel("time [s]")
+    names = [f"{band.low:g}-{band.high:g}" for band in bands]
+    axes[-1].bar(names, [100.0 * band.share for band in bands])
+    axes[-1].set_ylabel("torque power [%]")
+    axes[-1].set_xlabel("band [Hz]")
+    figure.savefig(path, dpi=DPI)

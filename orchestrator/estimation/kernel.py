@@ -3,7 +3,8 @@
 ``mats`` (3, 5, 5), ``b_u`` (5,) and ``b_1`` (3, 5) are the affine modes, index 0: flank -1, 1: free, 2: flank +1;
 ``phi``, ``gain_u`` and ``gain_1`` the same over a sample ``h`` [s]; ``normal`` (5,) takes the twist from the state.
 ``jump`` (5,) is how the state changes at once when the teeth touch at flank +1; at flank -1, and when they part, it
-is the opposite.
+is the opposite. ``x`` (5,) is the state, ``total`` (5, 5) is filled with its Jacobian, ``u`` is the torque [N.m] of a
+sample or (n,), ``alpha`` the half-gap [rad].
 """
 
 import math
@@ -18,13 +19,7 @@ MOST_EVENTS = 20  # in one sample
 
 @njit_on_disk(nogil=True)
 def transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped-def]
-    """Fill the exact transition over ``h`` of ``x' = a x + b_u u + b_1`` from its Taylor series.
-
-    Args:
-        a: (5, 5) matrix of one mode.
-        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
-        h: [s].
-    """
+    """Fill the exact transition over ``h`` of ``x' = a x + b_u u + b_1`` from its Taylor series."""
     for r in range(5):
         for c in range(5):
             phi[r, c] = 1.0 if r == c else 0.0
@@ -141,20 +136,7 @@ def _cut_at(mats, b_u, b_1, normal, edge, hit, left, u, x, part, y):  # type: ig
 
 @njit_on_disk(nogil=True)
 def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x, total, end):  # type: ignore[no-untyped-def]
-    """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch.
-
-    Args:
-        mats: (modes, 5, 5) matrices.
-        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
-        normal: (5,) the twist as a row: ``normal @ x``.
-        alpha: half-gap [rad].
-        jump: (5,) what an impulse at the flank does to the state.
-        h: [s].
-        u: torque [N.m], of a sample or (n,).
-        x: (5,) state.
-        total: (5, 5) filled with the Jacobian.
-        end: (5,) scratch.
-    """
+    """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch."""
     d = normal[0] * x[0] + normal[2] * x[2]
     flank = 2
     if alpha > 0.0:
@@ -220,15 +202,7 @@ def advance_blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type
     """Advance ``x`` over ``h`` with the dead zone averaged over the twist's distribution (Booton 1954).
 
     Args:
-        mats: (modes, 5, 5) matrices.
-        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
-        normal: (5,) the twist as a row: ``normal @ x``.
-        alpha: half-gap [rad].
         cov: (5, 5) covariance of the state.
-        h: [s].
-        u: torque [N.m], of a sample or (n,).
-        x: (5,) state.
-        total: (5, 5) filled with the Jacobian.
     """
     variance = 0.0
     for r in range(0, 3, 2):
@@ -278,13 +252,6 @@ def run_free(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x0,
     """Fill ``states`` (n, 5) with the run from ``x0`` under ``u`` (n,), nothing measured.
 
     Args:
-        mats: (modes, 5, 5) matrices.
-        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
-        normal: (5,) the twist as a row: ``normal @ x``.
-        alpha: half-gap [rad].
-        jump: (5,) what an impulse at the flank does to the state.
-        h: [s].
-        u: torque [N.m], of a sample or (n,).
         x0: (5,) first state.
         states: (n, 5) filled.
     """
@@ -322,13 +289,6 @@ def run_filter(  # type: ignore[no-untyped-def]
     (0,) where it is known.
 
     Args:
-        mats: (modes, 5, 5) matrices.
-        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
-        normal: (5,) the twist as a row: ``normal @ x``.
-        alpha: half-gap [rad].
-        jump: (5,) what an impulse at the flank does to the state.
-        h: [s].
-        u: torque [N.m], of a sample or (n,).
         u_variance: of the torque [N^2.m^2].
         y: (n, outputs) measured angles [rad].
         variance: (outputs,) of the measurement [rad^2].

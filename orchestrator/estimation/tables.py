@@ -1,8 +1,7 @@
 """The curves behind an estimate as CSV, for plots elsewhere and for the report."""
 
-import csv
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
+from orchestrator.shared.output import write_columns
 
 
 def write_tables(directory: Path, record: Record, estimates: Iterable[Estimate], ratio: float) -> None:
@@ -42,8 +42,4 @@ def _fit_columns(record: Record, estimate: Estimate, ratio: float) -> dict[str, 
 
 
 def _write(path: Path, columns: Mapping[str, Array]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        rows: Iterable[Sequence[float]] = zip(*(values.tolist() for values in columns.values()), strict=True)
-        writer.writerows(["" if math.isnan(value) else f"{value:.10g}" for value in row] for row in rows)
+    write_columns(path, columns, lambda value: "" if math.isnan(value) else f"{value:.10g}")

@@ -12,11 +12,10 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from orchestrator.paired.cosimulation import LoopRun
+from orchestrator.shared.drawing import BLUE, GREY, ORANGE, shade_gap
 
 Array = NDArray[np.float64]
-BLUE, ORANGE, GREY = "#2166ac", "#d6604d", "#555555"
 MOST_POINTS = 2000  # of a noise level: more are a blot, and take minutes
-SHADE = "#f4d58d"
 DPI = 150
 # Inches around the panels, for labels at the left and below and a title above; where labels stand; between panels.
 LEFT, BOTTOM, RIGHT, TOP, LABEL, GAP = 1.0, 0.5, 0.2, 0.35, 0.2, 0.12
@@ -45,21 +44,11 @@ def draw_pair(path: Path, with_gap: LoopRun, without_gap: LoopRun, reference: Ar
     axes[2].set_ylabel("torque [N.m]")
     axes[2].set_xlabel("time [s]")
     for axis in axes:
-        _shade_gap(axis, time, with_gap["contact"])
+        shade_gap(axis, time, with_gap["contact"], "in the gap")
         axis.legend(loc="best", fontsize=8, framealpha=0.9)
         axis.margins(x=0.0)
         axis.grid(alpha=0.25)
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
-
-
-def _shade_gap(axis: Axes, time: Array, contact: Array) -> None:
-    """Shade the spans of time in which no teeth touch."""
-    free = np.concatenate([[False], contact == 0, [False]])
-    edges = np.flatnonzero(free[1:] != free[:-1])
-    label: str | None = "in the gap"
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
-        axis.axvspan(time[first], time[min(last, len(time) - 1)], color=SHADE, alpha=0.6, linewidth=0.0, label=label)
-        label = None
 
 
 def draw_estimates(

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
 
 from orchestrator.errors import SimulationError
 from orchestrator.plants.design import DrivetrainValues
@@ -54,61 +53,6 @@ class ReferencePlant(DrivetrainValues):
         )
 
 
-def linear_solution(plant: ReferencePlant, u: Array, h: float, start: Array, T_l: float = 0.0) -> Array:
-    """Return the exact states, shape (n + 1, 5), of a gear without gap: ``expm`` of the augmented matrix.
-
-    Args:
-        u: requested torque [N.m] of each of the n samples.
-        h: sample time [s].
-        start: start state, 5 values.
-        T_l: load torque [N.m].
-
-    Returns:
-        Angles [rad], speeds [rad/s] and the motor's torque [N.m].
-    """
-    augmented = np.zeros((8, 8))
-    augmented[:5, :5] = plant.matrix(touching=True)
-    augmented[:5, 5:] = plant.inputs(touching=True)
-    step = expm(augmented * h)
-    states = np.empty((len(u) + 1, 5))
-    states[0] = start
-    for n, torque in enumerate(u):
-        states[n + 1] = step[:5, :5] @ states[n] + step[:5, 5:] @ (torque, T_l, 0.0)
-    return states
-
-
-def reference_solution(
-    plant: ReferencePlant,
-    u: Array,
-    h: float,
-    start: Array | None = None,
-    T_l: float = 0.0,
-    rtol: float = 1e-12,
-    atol: float = 1e-14,
-) -> Array:
-    """Return the states ``(theta_m, omega_m, theta_l, omega_l, T_m)``, shape (n + 1, 5), at the samples.
-
-    Args:
-        u: requested torque [N.m] of each of the n samples, held.
-        h: sample time [s].
-        start: start state, 5 values; default zero.
-        T_l: load torque [N.m].
-
-    Returns:
-        Angles [rad], speeds [rad/s] and the motor's torque [N.m].
-    """
-    x = np.zeros(6)
-    if start is not None:
-        x[:5] = start
-    flank = first_flank(plant, x)
-    states = np.empty((len(u) + 1, 5))
-    states[0] = x[:5]
-    for n, torque in enumerate(u):
-        x, flank = reference_sample(plant, x, flank, float(torque), T_l, h, rtol, atol)
-        states[n + 1] = x[:5]
-    return states
-
-
 def first_flank(plant: ReferencePlant, x: Array) -> int:
     """Return the flank (-1, 0, 1) at which a state of at least 3 values starts.
 
@@ -127,7 +71,7 @@ def first_flank(plant: ReferencePlant, x: Array) -> int:
 def reference_sample(
     plant: ReferencePlant, x: Array, flank: int, u: float, T_l: float, h: float, rtol: float, atol: float
 ) -> tuple[Array, int]:
-    """Return state (6 values: the five of ``reference_solution`` and the shaft's own twist) and flank after ``h``.
+    """Return state (``(theta_m, omega_m, theta_l, omega_l, T_m)`` and the shaft's own twist) and flank after ``h``.
 
     Args:
         x: state at the start, 6 values.

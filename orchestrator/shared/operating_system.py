@@ -87,19 +87,6 @@ def memory_usage() -> int:
         return 0
 
 
-def peak_memory() -> int:
-    """Return the largest memory of this process; ``ru_maxrss`` would start from that of its parent.
-
-    Returns:
-        KiB; 0 where the system does not tell.
-    """
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
-            if line.startswith("VmHWM:"):
-                return int(line.split()[1])
-    return 0
-
-
 def set_limits(limits: Mapping[str, int]) -> None:
     """Set limits that the kernel keeps for this process, as far as it has and allows them."""
     if _resource is None:

@@ -1,12 +1,13 @@
 """Result directories that are written whole or not at all."""
 
+import csv
 import errno
 import json
 import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -78,6 +79,23 @@ def write_text(path: Path, text: str) -> None:
     except BaseException:
         Path(part).unlink(missing_ok=True)
         raise
+
+
+def write_columns(path: Path, columns: Mapping[str, Any], cell: Callable[[Any], Any] | None = None) -> None:
+    """Write arrays of shape (n,) as CSV under their headings.
+
+    Args:
+        columns: arrays by heading, in their order.
+        cell: what is written of a value (default: the value, exactly).
+    """
+    try:
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow(columns)
+            rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+            writer.writerows(rows if cell is None else (map(cell, row) for row in rows))
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}") from None
 
 
 def _remove_abandoned(directory: Path) -> None:

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.plants.compiled import compile_module
-from orchestrator.plants.reference import ReferencePlant, linear_solution, reference_solution
+from orchestrator.plants.reference import ReferencePlant
 from pyfmu_sources import drivetrain, linear_mode
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, NAMES, parameters, with_values
+from tests.support.reference_runs import linear_solution, reference_solution
 
 H = 1e-3
 SIZES = (0.002, 0.02, 0.1)

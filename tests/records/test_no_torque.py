@@ -7,7 +7,7 @@ import pytest
 
 import orchestrator as oc
 from orchestrator.records.columns import Column
-from orchestrator.records.record import write_record
+from tests.support.written_record import write_record
 
 TIME = 0.01 * np.arange(600)
 ANGLE = np.sin(TIME)

@@ -17,9 +17,9 @@ from orchestrator.records.record import (
     quantisation_step,
     read_record,
     record_from_columns,
-    write_record,
 )
 from tests.support.independent_plant import make_record, write_csv
+from tests.support.written_record import write_record
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data" / "hidden-effects"
 

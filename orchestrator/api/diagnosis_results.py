@@ -1,0 +1,59 @@
+"""What results of a diagnosis have in common, be the model ours or any FMU."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+from orchestrator.api.shown import Block, Result, table
+from orchestrator.diagnosis.result import DiagnosisOutcome, GradedEffect, TestMisfit
+from orchestrator.shared.trust import Trust
+
+STAGES = ("nominal", "parameters", "final", "noise")
+
+
+class AnyDiagnosisResult(Result):
+    """Verdict, effects, misfits, trust and notes of a diagnosis."""
+
+    command: ClassVar[str] = "diagnose"
+    signal_word: ClassVar[str] = "signal"
+    diagnosis: DiagnosisOutcome
+    validation: TestMisfit | None
+
+    @property
+    def verdict(self) -> str:
+        """One of "none", "parameters", "effects" and "unknown"."""
+        return self.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[GradedEffect, ...]:
+        """The effects that the model misses, surest first: grade, and parameters with intervals and units."""
+        return self.diagnosis.effects
+
+    @property
+    def test(self) -> tuple[TestMisfit, ...]:
+        """Misfits on test data, which nothing was fitted to: of the nominal, the re-fitted and the final model."""
+        return self.diagnosis.test
+
+    @property
+    def trust(self) -> Trust:
+        """How far the corrected model can be trusted."""
+        return self.diagnosis.trust
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to bear in mind, a sentence each."""
+        return self.diagnosis.notes
+
+    def _closing_lines(self) -> Iterator[str]:
+        yield from (f"Note: {note}" for note in self.notes)
+        yield f"Trust: {self.trust.level.word}"
+        yield from (f"  {reason}" for reason in self.trust.reasons)
+
+    def _misfit_tables(self) -> Iterator[Block]:
+        for title, tests in (("Misfit on test data", self.test), ("Misfit on the other record", (self.validation,))):
+            rows = [
+                (test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit)
+                for test in tests if test is not None for one in test.signals
+            ]  # fmt: skip
+            if rows:
+                head = ("record", self.signal_word, "as given", "re-fitted", "with effects", "noise", "unit")
+                yield table(title, head, rows)
