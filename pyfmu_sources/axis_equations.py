@@ -10,6 +10,8 @@ same, the model file states the unit.
     J speed' = drive + ripple(position) - b speed - sign(speed) friction(|speed|) - drag speed |speed|
                - difference |speed| - load_torque - gravity(position) - spring(position) - stops(position, speed) - T_l
     tau drive' = u - drive          (tau = 0: drive = u)
+
+In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
 from .bristles import bent_sign, has_settled, leaving_speed
@@ -99,23 +101,14 @@ def filtered(p: Parameters) -> bool:
 
 
 def drive_torque(x: State, p: Parameters, u: float) -> float:
-    """Return the drive's torque [N.m]: the state behind the lag, or the (filtered) request itself without one.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-    """
+    """Return the drive's torque [N.m]: the state behind the lag, or the (filtered) request itself without one."""
     if p[P_TAU] > 0.0:
         return x[2]
     return x[4] if filtered(p) and x[4] != UNASKED else u
 
 
 def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
-    """Return the torque on the axis [N.m] of all but dry friction.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return the torque on the axis [N.m] of all but dry friction."""
     torque = drive_torque(x, p, u) + torque_ripple(x[0], p[P_RIPPLE], p[P_RIPPLE_N], p[P_RIPPLE_PHASE])
     if p[P_RIPPLE_2] != 0.0 or p[P_RIPPLE_3] != 0.0:
         torque += torque_ripple(x[0], p[P_RIPPLE_2], 2.0 * p[P_RIPPLE_N], p[P_RIPPLE_2_PHASE])
@@ -194,8 +187,6 @@ def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> Stat
 
     Args:
         mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
     """
     if mode != 0:
         return rates(x, float(mode), p, u, T_l)
@@ -211,10 +202,6 @@ def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> Stat
 def slip_at_rest(x: State, p: Parameters, u: float, T_l: float) -> int:
     """Return the direction in which an axis at rest starts to slide, 0 when friction holds it.
 
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-
     Returns:
         -1, 0 or 1.
     """
@@ -227,11 +214,7 @@ def slip_at_rest(x: State, p: Parameters, u: float, T_l: float) -> int:
 
 
 def initial_mode(x: State, p: Parameters, u: float) -> int:
-    """Return the direction of sliding (0: none) in which a simulation starts from ``x``, asked for ``u`` [N.m].
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-    """
+    """Return the direction of sliding (0: none) in which a simulation starts from ``x``, asked for ``u`` [N.m]."""
     if builds_up(p):
         return 0
     if x[1] != 0.0:

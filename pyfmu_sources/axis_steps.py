@@ -1,4 +1,8 @@
-"""A single axis between its events: steps of a Runge-Kutta method, and when within one of them an event falls."""
+"""A single axis between its events: steps of a Runge-Kutta method, and when within one of them an event falls.
+
+In all functions: ``mode``: direction of sliding, 0: none; ``u``: requested torque [N.m], delayed and saturated
+already; ``T_l``: load torque [N.m]; ``h``: length of the step [s].
+"""
 
 from math import exp, sqrt
 
@@ -48,14 +52,7 @@ THERE = 1e-14  # of the torque: a drive that is no farther from its request has 
 
 
 def longest_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> float:
-    """Return a step [s] that resolves all rates well (a Runge-Kutta step errs by its 5th power).
-
-    Args:
-        mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-    """
+    """Return a step [s] that resolves all rates well (a Runge-Kutta step errs by its 5th power)."""
     rate = (p[P_B] + abs(p[P_DIRECTION]) + 2.0 * p[P_DRAG] * abs(x[1])) / p[P_J]
     if p[P_RIPPLE] != 0.0:
         rate = max(rate, p[P_RIPPLE_N] * (abs(x[1]) + sqrt(abs(p[P_RIPPLE]) / (p[P_RIPPLE_N] * p[P_J] + TINY))))
@@ -68,11 +65,7 @@ def longest_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: fl
 
 
 def step_of_lag(x: State, p: Parameters, u: float) -> float:
-    """Return a step [s] that resolves the drive's lag: one that has come close to its request asks for no short ones.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-    """
+    """Return a step [s] that resolves the drive's lag: one that has come close to its request asks for no short one."""
     if filtered(p):
         return SHARE * p[P_TAU]
     torque = abs(x[2]) + abs(u)
@@ -88,9 +81,6 @@ def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float, most:
     A long step may not come near that speed.
 
     Args:
-        mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
         most: step that everything else allows [s].
     """
     fall = abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / p[P_J]
@@ -110,11 +100,7 @@ def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float, most:
 
 
 def further_rate(x: State, mode: int, p: Parameters) -> float:
-    """Return the fastest rate [1/s] of bristle, filter, harmonics, spring, end stops and varying inertia.
-
-    Args:
-        mode: direction of sliding, 0: none.
-    """
+    """Return the fastest rate [1/s] of bristle, filter, harmonics, spring, end stops and varying inertia."""
     rate = 0.0
     if mode == 0 and builds_up(p):
         stiffness = rest(p) / p[P_PRESLIDING]
@@ -137,11 +123,7 @@ def further_rate(x: State, mode: int, p: Parameters) -> float:
 
 
 def along(x: State, h: float, r: State) -> State:
-    """Return ``x + h r``.
-
-    Args:
-        h: length of the step [s].
-    """
+    """Return ``x + h r``."""
     return (x[0] + h * r[0], x[1] + h * r[1], x[2] + h * r[2], x[3] + h * r[3], x[4] + h * r[4])
 
 
@@ -149,7 +131,6 @@ def driven(x: State, after: State, p: Parameters, u: float, h: float) -> State:
     """Return the state ``after`` with the drive's torque as it is then: ``u + (drive - u) exp(-h / tau)``.
 
     Args:
-        u: requested torque [N.m], delayed and saturated already.
         h: time between both [s].
     """
     if p[P_TAU] <= 0.0 or filtered(p):
@@ -158,14 +139,7 @@ def driven(x: State, after: State, p: Parameters, u: float, h: float) -> State:
 
 
 def smooth_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> State:
-    """Return the state after one classical Runge-Kutta step in one direction of sliding.
-
-    Args:
-        mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-    """
+    """Return the state after one classical Runge-Kutta step in one direction of sliding."""
     a = mode_rates(x, mode, p, u, T_l)
     b = mode_rates(driven(x, along(x, 0.5 * h, a), p, u, 0.5 * h), mode, p, u, T_l)
     c = mode_rates(driven(x, along(x, 0.5 * h, b), p, u, 0.5 * h), mode, p, u, T_l)
@@ -185,10 +159,6 @@ def slowing_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: fl
     """Return when within ``h`` [s] an axis that slides falls to the speed ``least`` [rad/s] (bisection).
 
     Args:
-        mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
         least: [rad/s].
     """
     low, high = 0.0, h
@@ -202,26 +172,14 @@ def slowing_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: fl
 
 
 def held(x: State, p: Parameters, u: float, T_l: float, h: float) -> State:
-    """Return the state after ``h`` [s] at rest: the drive's torque alone moves.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-    """
+    """Return the state after ``h`` [s] at rest: the drive's torque alone moves."""
     if filtered(p):
         return smooth_step((x[0], 0.0, x[2], x[3], x[4]), 0, p, u, T_l, h)
     return driven(x, (x[0], 0.0, x[2], x[3], x[4]), p, u, h)
 
 
 def breaking_time(x: State, p: Parameters, u: float, T_l: float, h: float) -> float:
-    """Return when within ``h`` [s] the growing torque of the drive breaks an axis away that sticks (bisection).
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-    """
+    """Return when within ``h`` [s] the growing torque of the drive breaks an axis away that sticks (bisection)."""
     low, high = 0.0, h
     for _ in range(50):
         middle = 0.5 * (low + high)
@@ -233,14 +191,7 @@ def breaking_time(x: State, p: Parameters, u: float, T_l: float, h: float) -> fl
 
 
 def stop_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> float:
-    """Return when within ``h`` [s] an axis reaches or leaves an end stop (bisection).
-
-    Args:
-        mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-    """
+    """Return when within ``h`` [s] an axis reaches or leaves an end stop (bisection)."""
     low, high = 0.0, h
     begin = past_stop(x, p)
     for _ in range(50):

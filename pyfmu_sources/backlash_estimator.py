@@ -10,6 +10,8 @@ A filter is a flat sequence ``f`` of ``SIZE`` floats, changed in place: nine sta
 the logarithm of the filter's weight. The states are
 ``(theta_m, omega_m, theta_l, omega_l, T_m, T_l, alpha, kappa, offset)``: ``kappa`` the relative error of the
 stiffness, ``offset`` the twist [rad] in mid-gap. ``m`` is the tuple ``(J_m, J_l, k, c, b_m, b_l, i, tau)``.
+
+In all functions: ``f``: the filter, changed in place; ``theta_m``: motor angle [rad]; ``theta_l``: load angle [rad].
 """
 
 from math import erfc, exp, log, sqrt
@@ -75,7 +77,6 @@ def start(
     """Set filter ``number`` (0 to ``FILTERS`` - 1) at the first measured angles [rad].
 
     Args:
-        f: the filter, changed in place.
         noise_m: standard deviation of the motor's angle [rad].
         offset_spread: standard deviation of the twist in mid-gap [rad].
     """
@@ -122,7 +123,6 @@ def predict(f: Filter, m: Model, u: float, h: float, s: SettingValues) -> None:
     """Advance a filter by ``h`` [s] with the torque request ``u`` [N.m] held.
 
     Args:
-        f: the filter, changed in place.
         u: requested torque [N.m].
         h: step [s], short beside the shaft's oscillation.
     """
@@ -286,12 +286,7 @@ def contact(f: Filter, i: float) -> int:
 
 
 def begin(filters: Filters, theta_m: float, theta_l: float, s: SettingValues) -> None:
-    """Set all filters at the first measured angles [rad] with the settings ``s``.
-
-    Args:
-        theta_m: motor angle [rad].
-        theta_l: load angle [rad].
-    """
+    """Set all filters at the first measured angles [rad] with the settings ``s``."""
     for n in range(FILTERS):
         start(filters[n], n, theta_m, theta_l, s[0], s[1], s[6], s[7])
 
@@ -313,12 +308,7 @@ def advance(filters: Filters, m: Model, s: SettingValues, u: float, h: float) ->
 
 
 def measure(filters: Filters, s: SettingValues, theta_m: float, theta_l: float) -> None:
-    """Take both measured angles [rad] into all filters.
-
-    Args:
-        theta_m: motor angle [rad].
-        theta_l: load angle [rad].
-    """
+    """Take both measured angles [rad] into all filters."""
     for n in range(FILTERS):
         if filters[n][WEIGHT] > FORGOTTEN:
             correct(filters[n], 0, theta_m, s[0] * s[0])

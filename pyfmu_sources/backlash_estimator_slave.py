@@ -88,27 +88,13 @@ class BacklashEstimator(SampledSlave):
         real = self.real
         n = FIRST_MODEL
         self._model = (
-            real[n],
-            real[n + 1],
-            real[n + 2],
-            real[n + 3],
-            real[n + 4],
-            real[n + 5],
-            real[n + 6],
-            real[n + 7],
-        )
+            real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6], real[n + 7],
+        )  # fmt: skip
         n = FIRST_SETTING
         self._settings = (
-            real[n],
-            real[n + 1],
-            real[n + 2],
-            real[n + 3],
-            real[n + 4],
-            real[n + 5],
-            real[n + 6],
-            real[n + 7],
+            real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6], real[n + 7],
             real[n + 8],
-        )
+        )  # fmt: skip
 
     def begin(self) -> None:
         """Start all filters at the first measurement."""

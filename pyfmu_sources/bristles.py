@@ -7,6 +7,9 @@ the torque of the shaft builds up at this stiffness, too, with 1 N.m of it in th
 is set-valued, for its reach goes to zero with that torque. The bristle ``z`` is a state while it bends; once it has
 settled, the part slides at the friction of its speed, without the stiff equation of the bristle, until it slows down.
 The elastic backlash models have it; rigid teeth do not.
+
+In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it;
+``bristle``: its bending [rad]; ``reach``: bending at which it slides [rad].
 """
 
 from .drivetrain_parameters import (
@@ -78,11 +81,7 @@ def has_friction_l(p: Parameters) -> bool:
 
 
 def capacity_m(x: State, contact: int, p: Parameters) -> float:
-    """Return the breakaway torque [N.m] of the motor.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the breakaway torque [N.m] of the motor."""
     level = unloaded_m(p)
     if p[P_LOADED_M] == 0.0 and p[P_WAVY_M] == 0.0:
         return level
@@ -92,11 +91,7 @@ def capacity_m(x: State, contact: int, p: Parameters) -> float:
 
 
 def capacity_l(x: State, contact: int, p: Parameters) -> float:
-    """Return the breakaway torque [N.m] of the load.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the breakaway torque [N.m] of the load."""
     level = unloaded_l(p)
     if p[P_LOADED_L] == 0.0 and p[P_WAVY_L] == 0.0:
         return level
@@ -106,20 +101,12 @@ def capacity_l(x: State, contact: int, p: Parameters) -> float:
 
 
 def carried_m(x: State, contact: int, p: Parameters) -> float:
-    """Return the shaft's torque on the motor [N.m] that its friction depends on; rigid teeth leave it out.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the shaft's torque on the motor [N.m] that its friction depends on; rigid teeth leave it out."""
     return 0.0 if is_rigid(p) or p[P_LOADED_M] == 0.0 else elastic_torque(x, contact, p) * lever_arm(x, p)
 
 
 def carried_l(x: State, contact: int, p: Parameters) -> float:
-    """Return the shaft's torque on the load [N.m] that its friction depends on; rigid teeth leave it out.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the shaft's torque on the load [N.m] that its friction depends on; rigid teeth leave it out."""
     return 0.0 if is_rigid(p) or p[P_LOADED_L] == 0.0 else elastic_torque(x, contact, p)
 
 
@@ -164,20 +151,12 @@ def leaving_speed_l(p: Parameters) -> float:
 
 
 def reach_m(x: State, contact: int, p: Parameters) -> float:
-    """Return the bending [rad] at which the motor's bristle slides at its speed.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the bending [rad] at which the motor's bristle slides at its speed."""
     return p[P_PRESLIDING_M] * friction_m(x, carried_m(x, contact, p), p) / rest_m(p)
 
 
 def reach_l(x: State, contact: int, p: Parameters) -> float:
-    """Return the bending [rad] at which the load's bristle slides at its speed.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the bending [rad] at which the load's bristle slides at its speed."""
     return p[P_PRESLIDING_L] * friction_l(x, carried_l(x, contact, p), p) / rest_l(p)
 
 
@@ -185,9 +164,7 @@ def bent_sign(bristle: float, rate: float, reach: float, stiffness: float, dampi
     """Return the direction of friction (-1 to 1 without damping) of a bristle that bends at ``rate`` [rad/s].
 
     Args:
-        bristle: its bending [rad].
         rate: [rad/s].
-        reach: bending at which it slides [rad].
         stiffness: of the bristle [N.m/rad].
         damping: of the bristle [N.m.s/rad].
     """
@@ -200,9 +177,7 @@ def has_settled(bristle: float, speed: float, reach: float, leaving: float, fall
     """Tell whether a bristle has settled at the reach of a part that slides.
 
     Args:
-        bristle: its bending [rad].
         speed: of the part [rad/s].
-        reach: bending at which it slides [rad].
         leaving: speed below which the bristle must be followed [rad/s].
     """
     side = 1.0 if speed > 0.0 else -1.0
@@ -223,11 +198,7 @@ def bent(x: State, z_m: float, z_l: float) -> State:
 
 
 def resting_bristles(x: State, contact: int, p: Parameters) -> State:
-    """Return the state as a simulation starts: bristles of what moves have settled, others are straight.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the state as a simulation starts: bristles of what moves have settled, others are straight."""
     z_m = 0.0
     z_l = 0.0
     if builds_up_m(p) and x[1] != 0.0:

@@ -1,15 +1,14 @@
-"""What happens at a contact event: which mode follows, and how the state jumps."""
+"""What happens at a contact event: which mode follows, and how the state jumps.
+
+In all functions: ``side``: flank, -1 or 1; ``flank``: that is reached, -1 or 1; ``push_m``: torque on the motor
+without the shaft's [N.m]; ``push``: torque on motor and load as one body, load side [N.m]; ``held_m``: dry friction
+that holds a motor at rest [N.m]; ``held``: dry friction, load side, that holds motor and load as one body [N.m].
+"""
 
 from .backlash_models import BOUNCING, HELD, RIGID
 from .bristles import resting_bristles
 from .drive_request import UNASKED
-from .drivetrain_parameters import (
-    NONE,
-    P_ALPHA,
-    P_J_M,
-    P_MODEL,
-    P_RESTITUTION,
-)
+from .drivetrain_parameters import NONE, P_ALPHA, P_J_M, P_MODEL, P_RESTITUTION
 from .equations import (
     Parameters,
     State,
@@ -59,21 +58,13 @@ def collide(x: State, restitution: float, p: Parameters) -> State:
 
 
 def on_flank(x: State, side: int, p: Parameters) -> State:
-    """Return the state with the load moved to the flank ``side`` of rigid teeth and both at one speed.
-
-    Args:
-        side: flank, -1 or 1.
-    """
+    """Return the state with the load moved to the flank ``side`` of rigid teeth and both at one speed."""
     theta_l = x[2] + twist(x, p) - side * p[P_ALPHA]
     return collide((x[0], x[1], theta_l, x[3], x[4], x[5], x[6], 0.0, x[8], x[9], x[10], x[11]), 0.0, p)
 
 
 def joined(x: State, side: int, p: Parameters) -> State:
-    """Return a state of rigid teeth in contact as it must be: at the flank and at one speed; mostly ``x`` itself.
-
-    Args:
-        side: flank, -1 or 1.
-    """
+    """Return a state of rigid teeth in contact as it must be: at the flank and at one speed; mostly ``x`` itself."""
     apart = abs(twist(x, p) - side * p[P_ALPHA])
     sliding = abs(twist_rate(x, p))
     if apart <= NOT_JOINED * (1.0 + abs(x[2])) and sliding <= NOT_JOINED * (1.0 + abs(x[3])):
@@ -137,15 +128,7 @@ def after_event(
 def play_engaged(
     x: State, flank: int, push_m: float, push: float, p: Parameters, held_m: float, held: float
 ) -> tuple[State, int]:
-    """Return state and contact of the play model (eq. 2.5) when the motor reaches a ``flank``.
-
-    Args:
-        flank: that is reached, -1 or 1.
-        push_m: torque on the motor without the shaft's [N.m].
-        push: torque on motor and load as one body, load side [N.m].
-        held_m: dry friction that holds a motor at rest [N.m].
-        held: dry friction, load side, that holds motor and load as one body [N.m].
-    """
+    """Return state and contact of the play model (eq. 2.5) when the motor reaches a ``flank``."""
     after = collide(x, 0.0, p)
     if flank * after[1] > RESTING_SPEED:
         return (after, flank)
@@ -153,15 +136,7 @@ def play_engaged(
 
 
 def play_reversed(x: State, flank: int, push_m: float, push: float, held_m: float, held: float) -> tuple[State, int]:
-    """Return state and contact of the play model at standstill: part, rest against the flank, or go on.
-
-    Args:
-        flank: that is reached, -1 or 1.
-        push_m: torque on the motor without the shaft's [N.m].
-        push: torque on motor and load as one body, load side [N.m].
-        held_m: dry friction that holds a motor at rest [N.m].
-        held: dry friction, load side, that holds motor and load as one body [N.m].
-    """
+    """Return state and contact of the play model at standstill: part, rest against the flank, or go on."""
     if flank * push_m <= -held_m:
         return (x, 0)
     return (x, flank if flank * push > held else 2 * flank)

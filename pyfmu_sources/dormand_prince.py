@@ -2,6 +2,9 @@
 
 Source: Dormand and Prince, J. Comput. Appl. Math. 6, 1980. The torque of a drive that follows a held request has a
 closed form, from which stages take it: a drive that is far quicker than its machine asks for no short steps.
+
+In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m]; ``h``:
+length of the step [s].
 """
 
 from math import exp, sqrt
@@ -16,12 +19,7 @@ SLOW = 0.01  # of the drive's lag: its torque is smooth within a shorter step
 
 
 def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
-    """Return the derivative of ``x`` in ``mode``; what sticks does not move.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return the derivative of ``x`` in ``mode``; what sticks does not move."""
     still_m = mode[1] == 0
     still_l = mode[2] == 0
     if not still_m and not still_l:
@@ -31,63 +29,30 @@ def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Sta
     still_m = still_m and not builds_up_m(p)
     still_l = still_l and not builds_up_l(p)
     return (
-        0.0 if still_m else r[0],
-        0.0 if still_m else r[1],
-        0.0 if still_l else r[2],
-        0.0 if still_l else r[3],
-        r[4],
-        r[5],
-        r[6],
-        r[7],
-        bends_m,
-        bends_l,
-        r[10],
-        r[11],
-    )
+        0.0 if still_m else r[0], 0.0 if still_m else r[1], 0.0 if still_l else r[2], 0.0 if still_l else r[3], r[4],
+        r[5], r[6], r[7], bends_m, bends_l, r[10], r[11],
+    )  # fmt: skip
 
 
 def ahead(x: State, f: float, k: State) -> State:
     """Return ``x + f k``."""
     return (
-        x[0] + f * k[0],
-        x[1] + f * k[1],
-        x[2] + f * k[2],
-        x[3] + f * k[3],
-        x[4] + f * k[4],
-        x[5] + f * k[5],
-        x[6] + f * k[6],
-        x[7] + f * k[7],
-        x[8] + f * k[8],
-        x[9] + f * k[9],
-        x[10] + f * k[10],
-        x[11] + f * k[11],
-    )
+        x[0] + f * k[0], x[1] + f * k[1], x[2] + f * k[2], x[3] + f * k[3], x[4] + f * k[4], x[5] + f * k[5],
+        x[6] + f * k[6], x[7] + f * k[7], x[8] + f * k[8], x[9] + f * k[9], x[10] + f * k[10], x[11] + f * k[11],
+    )  # fmt: skip
 
 
 def combine(a: float, k: State, b: float, m: State) -> State:
     """Return ``a k + b m``."""
     return (
-        a * k[0] + b * m[0],
-        a * k[1] + b * m[1],
-        a * k[2] + b * m[2],
-        a * k[3] + b * m[3],
-        a * k[4] + b * m[4],
-        a * k[5] + b * m[5],
-        a * k[6] + b * m[6],
-        a * k[7] + b * m[7],
-        a * k[8] + b * m[8],
-        a * k[9] + b * m[9],
-        a * k[10] + b * m[10],
-        a * k[11] + b * m[11],
-    )
+        a * k[0] + b * m[0], a * k[1] + b * m[1], a * k[2] + b * m[2], a * k[3] + b * m[3], a * k[4] + b * m[4],
+        a * k[5] + b * m[5], a * k[6] + b * m[6], a * k[7] + b * m[7], a * k[8] + b * m[8], a * k[9] + b * m[9],
+        a * k[10] + b * m[10], a * k[11] + b * m[11],
+    )  # fmt: skip
 
 
 def is_quick(p: Parameters, h: float) -> bool:
-    """Tell whether a drive moves within a step, and follows the request itself: not a filtered or limited one.
-
-    Args:
-        h: length of the step [s].
-    """
+    """Tell whether a drive moves within a step, and follows the request itself: not a filtered or limited one."""
     return h > SLOW * p[P_TAU] and p[P_FILTER] <= 0.0 and p[P_RATE] >= BIG
 
 
@@ -95,37 +60,21 @@ def driven(x: State, after: State, quick: bool, p: Parameters, u: float, h: floa
     """Return the state ``after`` with the torque of a quick drive as it is then: ``u + (T_m - u) exp(-h / tau)``.
 
     Args:
-        u: requested torque [N.m], delayed and saturated already.
         h: time between both [s].
     """
     if not quick:
         return after
     torque = u + (x[4] - u) * exp(-h / p[P_TAU])
     return (
-        after[0],
-        after[1],
-        after[2],
-        after[3],
-        torque,
-        after[5],
-        after[6],
-        after[7],
-        after[8],
-        after[9],
-        after[10],
+        after[0], after[1], after[2], after[3], torque, after[5], after[6], after[7], after[8], after[9], after[10],
         after[11],
-    )
+    )  # fmt: skip
 
 
 def runge_kutta(
     x: State, k1: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float
 ) -> tuple[State, State, float]:
     """Return the state after one Dormand-Prince step, its derivative there and the scaled error.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
 
     Returns:
         The three; an error below 1 is within the tolerance.

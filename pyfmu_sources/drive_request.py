@@ -1,4 +1,8 @@
-"""What a drive makes of a request: its limit, its lag and its largest rate."""
+"""What a drive makes of a request: its limit, its lag and its largest rate.
+
+In all functions: ``u``: what it follows [N.m]; ``request``: behind the lag, at the beginning [N.m];
+``time_constant``: of the lag [s]; 0: none.
+"""
 
 from math import exp
 
@@ -7,11 +11,7 @@ RAMP_END = 1e-4  # s, of a request that is reached: any time constant, as nothin
 
 
 def saturated(u: float, limit: float) -> float:
-    """Return the torque that a drive with a symmetric ``limit`` delivers for the request ``u`` [N.m].
-
-    Args:
-        u: what it follows [N.m].
-    """
+    """Return the torque that a drive with a symmetric ``limit`` delivers for the request ``u`` [N.m]."""
     if u > limit:
         return limit
     if u < -limit:
@@ -23,24 +23,13 @@ def request_rate(request: float, u: float, time_constant: float, limit: float) -
     """Return the rate [N.m/s] of a request that follows ``u`` [N.m] with a lag, never faster than ``limit``.
 
     Without a lag the request must not be reached inside a step: :func:`ramp_time` tells when it is.
-
-    Args:
-        request: behind the lag, at the beginning [N.m].
-        u: what it follows [N.m].
-        time_constant: of the lag [s]; 0: none.
     """
     rate = (u - request) / max(time_constant, RAMP_END)
     return saturated(rate, limit)
 
 
 def ramp_time(request: float, u: float, time_constant: float, limit: float) -> float:
-    """Return how long [s] a request that follows ``u`` [N.m] still changes at its ``limit`` [N.m/s].
-
-    Args:
-        request: behind the lag, at the beginning [N.m].
-        u: what it follows [N.m].
-        time_constant: of the lag [s]; 0: none.
-    """
+    """Return how long [s] a request that follows ``u`` [N.m] still changes at its ``limit`` [N.m/s]."""
     return max(0.0, abs(u - request) / limit - time_constant)
 
 
@@ -48,9 +37,6 @@ def ramp_target(request: float, u: float, time_constant: float, limit: float, du
     """Return a request [N.m] so far away that what follows it changes at its ``limit`` for ``duration`` [s].
 
     Args:
-        request: behind the lag, at the beginning [N.m].
-        u: what it follows [N.m].
-        time_constant: of the lag [s]; 0: none.
         duration: [s].
     """
     reach = 2.0 * limit * (duration + max(time_constant, RAMP_END))
@@ -58,13 +44,7 @@ def ramp_target(request: float, u: float, time_constant: float, limit: float, du
 
 
 def ramp_end(request: float, u: float, time_constant: float, limit: float) -> float:
-    """Return the request [N.m] at which a ramp towards ``u`` [N.m] ends.
-
-    Args:
-        request: behind the lag, at the beginning [N.m].
-        u: what it follows [N.m].
-        time_constant: of the lag [s]; 0: none.
-    """
+    """Return the request [N.m] at which a ramp towards ``u`` [N.m] ends."""
     return u - limit * time_constant if u > request else u + limit * time_constant
 
 
@@ -73,8 +53,6 @@ def followed_request(request: float, u: float, time_constant: float, limit: floa
 
     Args:
         request: at the beginning [N.m].
-        u: what it follows [N.m].
-        time_constant: of the lag [s]; 0: none.
         limit: largest rate [N.m/s].
         h: duration [s].
     """

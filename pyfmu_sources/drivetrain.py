@@ -2,6 +2,9 @@
 
 A step of ``h`` seconds with held inputs goes to the exact linear solution when no nonlinear effect is on
 (:mod:`linear_mode`), else to the integrator with event location (:mod:`smooth_mode`).
+
+In all functions: ``h``: length of the step [s]; ``u``: requested torque [N.m], delayed and saturated already;
+``T_l``: load torque [N.m]; ``table``: ``prepare(p, h)`` of the same ``p`` and ``h``.
 """
 
 from math import exp
@@ -35,17 +38,7 @@ from .drivetrain_parameters import (
     P_STOP_UPPER,
 )
 from .dry_friction import shaft_torque, slips
-from .equations import (
-    Mode,
-    Parameters,
-    State,
-    backlash_model,
-    contact_of,
-    is_rigid,
-    rates,
-    twist,
-    twist_rate,
-)
+from .equations import Mode, Parameters, State, backlash_model, contact_of, is_rigid, rates, twist, twist_rate
 from .event_numbers import NO_EVENT, TOO_MUCH
 from .linear_mode import law_of
 from .linear_steps import Table, advance_linear, leap, linear_to_event
@@ -53,23 +46,10 @@ from .smooth_mode import advance_smooth, advance_smooth_to_event, refused
 from .transition import relaxation_rate, transition
 
 __all__ = [
-    "Mode",
-    "Parameters",
-    "State",
-    "Table",
-    "advance",
-    "advance_to_event",
-    "consistent_start",
-    "contact_of",
-    "has_nonlinear_effect",
-    "initial_mode",
-    "prepare",
-    "rates",
-    "reported_contact",
-    "shaft_torque",
-    "twist",
+    "Mode", "Parameters", "State", "Table", "advance", "advance_to_event", "consistent_start", "contact_of",
+    "has_nonlinear_effect", "initial_mode", "prepare", "rates", "reported_contact", "shaft_torque", "twist",
     "twist_rate",
-]
+]  # fmt: skip
 
 
 def has_nonlinear_effect(p: Parameters) -> bool:
@@ -83,11 +63,7 @@ def has_nonlinear_effect(p: Parameters) -> bool:
 
 
 def prepare(p: Parameters, h: float) -> Table:
-    """Return what steps of ``h`` [s] need again and again: the transition matrices and the relaxation.
-
-    Args:
-        h: length of the step [s].
-    """
+    """Return what steps of ``h`` [s] need again and again: the transition matrices and the relaxation."""
     kappa = relaxation_rate(p)
     nonlinear = has_nonlinear_effect(p)
     if nonlinear or is_rigid(p):
@@ -121,10 +97,7 @@ def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float,
     """Return state and mode after ``h`` [s] with the inputs held.
 
     Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
         h: step [s], positive.
-        table: ``prepare(p, h)`` of the same ``p`` and ``h``.
     """
     if table[4]:
         if x[11] == UNASKED and (p[P_FILTER] > 0.0 or p[P_RATE] < BIG):
@@ -140,13 +113,7 @@ def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float,
 
 
 def advance_ramp(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, Mode]:
-    """Return state and mode after ``h`` [s] of a drive limited in its rate; the end of a ramp is met exactly.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-    """
+    """Return state and mode after ``h`` [s] of a drive limited in its rate; the end of a ramp is met exactly."""
     before = x[11]
     ramp = min(h, ramp_time(before, u, p[P_FILTER], p[P_RATE]))
     if ramp > 0.0:
@@ -165,10 +132,7 @@ def advance_to_event(
     """Return :func:`advance` up to the first event, which has not had its effect yet.
 
     Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
         h: step [s], positive.
-        table: ``prepare(p, h)`` of the same ``p`` and ``h``.
 
     Returns:
         State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
@@ -191,11 +155,6 @@ def ramp_to_event(
     x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float
 ) -> tuple[State, Mode, float, int]:
     """Return :func:`advance_ramp` up to the first event.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
 
     Returns:
         State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).

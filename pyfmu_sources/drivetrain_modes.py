@@ -1,6 +1,8 @@
 """The drivetrain as model exchange sees it: state derivatives, event indicators, what follows at an event.
 
 The laws and their guards are those of :mod:`smooth_events`; here they are without the integrator, which is the host's.
+
+In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
 from .dormand_prince import mode_rates
@@ -24,12 +26,7 @@ LITTLE = 1e-6
 
 
 def state_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
-    """Return the time derivative of ``x`` in ``mode``; the states of an extra inertia that is not there stand still.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return the time derivative of ``x`` in ``mode``; the states of an extra inertia that is not there stand still."""
     r = mode_rates(x, mode, p, u, T_l)
     if p[P_RES_J] > 0.0:
         return r
@@ -41,7 +38,6 @@ def rates_and_outputs(x: State, mode: Mode, p: Parameters, u: float, T_l: float)
 
     Args:
         u: requested torque [N.m].
-        T_l: load torque [N.m].
     """
     shaft = shaft_torque(x, mode, p, T_l)
     outputs = (x[0] + p[P_OFFSET_M], x[2] + p[P_OFFSET_L], x[1], x[3], x[4], shaft)
@@ -49,12 +45,7 @@ def rates_and_outputs(x: State, mode: Mode, p: Parameters, u: float, T_l: float)
 
 
 def indicator(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: float) -> float:
-    """Return the event indicator ``which`` (0, 1: contact; 2: motor's friction; 3: load's), 1 if it is not in use.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return the event indicator ``which`` (0, 1: contact; 2: motor's friction; 3: load's), 1 if it is not in use."""
     value = guard(x, mode, which, p, u, T_l)
     if value >= NEVER:
         return 1.0
@@ -62,12 +53,7 @@ def indicator(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: fl
 
 
 def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Indicators:
-    """Return all event indicators; the mode ends when one turns negative.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return all event indicators; the mode ends when one turns negative."""
     return (
         indicator(x, mode, 0, p, u, T_l),
         indicator(x, mode, 1, p, u, T_l),
@@ -88,10 +74,6 @@ def asked_first(x: State, u: float) -> State:
 def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Outputs:
     """Return the derivatives of the outputs of :func:`rates_and_outputs`; that of T_shaft is a central difference.
 
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-
     Returns:
         The derivatives, SI units per second.
     """
@@ -108,19 +90,9 @@ def beside(x: State, r: State, h: float) -> State:
         h: time [s].
     """
     return (
-        x[0] + h * r[0],
-        x[1] + h * r[1],
-        x[2] + h * r[2],
-        x[3] + h * r[3],
-        x[4] + h * r[4],
-        x[5] + h * r[5],
-        x[6] + h * r[6],
-        x[7] + h * r[7],
-        x[8] + h * r[8],
-        x[9] + h * r[9],
-        x[10] + h * r[10],
-        x[11],
-    )
+        x[0] + h * r[0], x[1] + h * r[1], x[2] + h * r[2], x[3] + h * r[3], x[4] + h * r[4], x[5] + h * r[5],
+        x[6] + h * r[6], x[7] + h * r[7], x[8] + h * r[8], x[9] + h * r[9], x[10] + h * r[10], x[11],
+    )  # fmt: skip
 
 
 def after_events(
@@ -130,7 +102,6 @@ def after_events(
 
     Args:
         u: requested torque [N.m], saturated already.
-        T_l: load torque [N.m].
     """
     if which != NO_EVENT:
         x, mode = switched(x, mode, which, events, p, u, T_l)

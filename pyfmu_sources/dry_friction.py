@@ -2,6 +2,10 @@
 
 Teeth in rigid contact turn as one body: friction of both holds it, and it sticks or slides as one. Everywhere else
 each part has its own direction. ``slip`` is 0 while a part sticks; a part without friction never does.
+
+In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it;
+``T_l``: load torque [N.m]; ``push``: torque without friction [N.m]; ``capacity``: breakaway torque [N.m]; ``side``:
+flank, -1 or 1.
 """
 
 from .backlash_models import HELD
@@ -15,10 +19,7 @@ from .bristles import (
     leaving_speed_l,
     leaving_speed_m,
 )
-from .drivetrain_parameters import (
-    P_ALPHA,
-    P_MODEL,
-)
+from .drivetrain_parameters import P_ALPHA, P_MODEL
 from .equations import (
     Mode,
     Parameters,
@@ -52,43 +53,26 @@ def direction(value: float) -> int:
 
 
 def push_on_motor(x: State, contact: int, p: Parameters) -> float:
-    """Return the torque [N.m] on a motor without dry friction and without a rigid contact.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the torque [N.m] on a motor without dry friction and without a rigid contact."""
     if is_rigid(p):
         return motor_torque(x, 0.0, 0.0, p)
     return motor_torque(x, 0.0, 0.0, p) - elastic_torque(x, contact, p) * lever_arm(x, p)
 
 
 def push_on_load(x: State, contact: int, p: Parameters, T_l: float) -> float:
-    """Return the torque [N.m] on a load without dry friction and without a rigid contact.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        T_l: load torque [N.m].
-    """
+    """Return the torque [N.m] on a load without dry friction and without a rigid contact."""
     if is_rigid(p):
         return load_torque(x, 0.0, 0.0, p, T_l)
     return load_torque(x, 0.0, 0.0, p, T_l) + elastic_torque(x, contact, p)
 
 
 def push_on_both(x: State, p: Parameters, T_l: float) -> float:
-    """Return the torque [N.m], load side, on motor and load in rigid contact without dry friction.
-
-    Args:
-        T_l: load torque [N.m].
-    """
+    """Return the torque [N.m], load side, on motor and load in rigid contact without dry friction."""
     return gear(x, p) * motor_torque(x, 0.0, 0.0, p) + load_torque(x, 0.0, 0.0, p, T_l)
 
 
 def slip_after_stop(push: float, capacity: float) -> int:
     """Return the direction in which a part that stands still starts to slide, or 0 when it sticks.
-
-    Args:
-        push: torque without friction [N.m].
-        capacity: breakaway torque [N.m].
 
     Returns:
         -1, 0 or 1.
@@ -101,8 +85,6 @@ def slip_of(speed: float, push: float, capacity: float, dry: bool) -> int:
 
     Args:
         speed: [rad/s].
-        push: torque without friction [N.m].
-        capacity: breakaway torque [N.m].
 
     Returns:
         -1, 0 or 1.
@@ -113,12 +95,7 @@ def slip_of(speed: float, push: float, capacity: float, dry: bool) -> int:
 
 
 def slips(x: State, contact: int, p: Parameters, T_l: float) -> tuple[int, int]:
-    """Return the directions of sliding of motor and load that follow from speeds and torques at ``contact``.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        T_l: load torque [N.m].
-    """
+    """Return the directions of sliding of motor and load that follow from speeds and torques at ``contact``."""
     if is_rigid(p) and contact != 0:
         dry = has_friction_m(p) or has_friction_l(p)
         slip = slip_of(x[1], push_on_both(x, p, T_l), capacity_of_both(x, p), dry)
@@ -133,11 +110,7 @@ def slips(x: State, contact: int, p: Parameters, T_l: float) -> tuple[int, int]:
 
 
 def friction_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> float:
-    """Return the guard of the dry friction of motor (2) or load (3); negative ends the mode.
-
-    Args:
-        T_l: load torque [N.m].
-    """
+    """Return the guard of the dry friction of motor (2) or load (3); negative ends the mode."""
     contact = mode[0]
     play = int(p[P_MODEL]) in HELD
     if is_rigid(p) and contact != 0:
@@ -170,10 +143,6 @@ def held_flank_room(x: State, side: int, p: Parameters, T_l: float) -> float:
 
     The force between parts that both stick is not determined; any that leaves motor and load within their friction is
     possible. Teeth part where none of those presses them together.
-
-    Args:
-        side: flank, -1 or 1.
-        T_l: load torque [N.m].
     """
     ratio = abs(gear(x, p))
     from_motor = ratio * (side * motor_torque(x, 0.0, 0.0, p) + capacity_m(x, 0, p))
@@ -181,12 +150,7 @@ def held_flank_room(x: State, side: int, p: Parameters, T_l: float) -> float:
 
 
 def held_torque(x: State, side: int, p: Parameters, T_l: float) -> float:
-    """Return the torque [N.m] on the load of teeth in rigid contact whose parts stick: the middle of what may be.
-
-    Args:
-        side: flank, -1 or 1.
-        T_l: load torque [N.m].
-    """
+    """Return the torque [N.m] on the load of teeth in rigid contact whose parts stick: the middle of what may be."""
     largest = held_flank_room(x, side, p, T_l)
     ratio = abs(gear(x, p))
     least = max(
@@ -198,11 +162,7 @@ def held_torque(x: State, side: int, p: Parameters, T_l: float) -> float:
 
 
 def shaft_torque(x: State, mode: Mode, p: Parameters, T_l: float) -> float:
-    """Return the torque [N.m] that the shaft exerts on the load, whatever the model.
-
-    Args:
-        T_l: load torque [N.m].
-    """
+    """Return the torque [N.m] that the shaft exerts on the load, whatever the model."""
     contact = mode[0]
     if contact == 0:
         return 0.0

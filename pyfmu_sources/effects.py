@@ -2,6 +2,9 @@
 
 Each is a plain function of floats. An effect whose amplitude is zero returns exactly zero, so that a plant with
 every effect off is the thesis's plant to the last bit.
+
+In all functions: ``angle`` [rad]; ``speed`` [rad/s]; ``theta_m``: motor angle [rad]; ``phase``: at angle zero [rad];
+``stiffness`` [N.m/rad]; ``cubic`` [N.m/rad3].
 """
 
 from math import cos, exp, sin
@@ -10,20 +13,12 @@ LARGEST = 1.7976931348623157e308
 
 
 def sine(angle: float) -> float:
-    """Return the sine, and 0 for an angle that is not finite: a trial step that overflows is refused, not raised.
-
-    Args:
-        angle: [rad].
-    """
+    """Return the sine, and 0 for an angle that is not finite: a trial step that overflows is refused, not raised."""
     return sin(angle) if abs(angle) <= LARGEST else 0.0
 
 
 def cosine(angle: float) -> float:
-    """Return the cosine, and 0 for an angle that is not finite.
-
-    Args:
-        angle: [rad].
-    """
+    """Return the cosine, and 0 for an angle that is not finite."""
     return cos(angle) if abs(angle) <= LARGEST else 0.0
 
 
@@ -40,7 +35,6 @@ def sliding_friction(speed: float, coulomb: float, sliding: float, breakaway: fl
     (Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, with exponent 2).
 
     Args:
-        speed: [rad/s].
         coulomb: Coulomb friction [N.m].
         sliding: Stribeck's part at high speed [N.m].
         breakaway: Stribeck's part at rest [N.m].
@@ -53,24 +47,14 @@ def sliding_friction(speed: float, coulomb: float, sliding: float, breakaway: fl
 
 
 def torque_ripple(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the torque [N.m] that a position-dependent ripple adds at the motor angle ``theta_m`` [rad].
-
-    Args:
-        theta_m: motor angle [rad].
-        phase: at angle zero [rad].
-    """
+    """Return the torque [N.m] that a position-dependent ripple adds at the motor angle ``theta_m`` [rad]."""
     if amplitude == 0.0:
         return 0.0
     return amplitude * sine(cycles_per_rev * theta_m + phase)
 
 
 def periodic(angle: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return ``amplitude sin(cycles_per_rev angle + phase)``, in the unit of the amplitude.
-
-    Args:
-        angle: [rad].
-        phase: at angle zero [rad].
-    """
+    """Return ``amplitude sin(cycles_per_rev angle + phase)``, in the unit of the amplitude."""
     if amplitude == 0.0:
         return 0.0
     return amplitude * sine(cycles_per_rev * angle + phase)
@@ -78,10 +62,6 @@ def periodic(angle: float, amplitude: float, cycles_per_rev: float, phase: float
 
 def periodic_slope(angle: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
     """Return the derivative of :func:`periodic` by the angle.
-
-    Args:
-        angle: [rad].
-        phase: at angle zero [rad].
 
     Returns:
         The derivative, in the unit of the amplitude a radian.
@@ -110,9 +90,6 @@ def spring_torque(angle: float, stiffness: float, cubic: float, rest: float) -> 
     """Return the torque [N.m] against a part of a spring or a cable that is at rest at the angle ``rest`` [rad].
 
     Args:
-        angle: [rad].
-        stiffness: [N.m/rad].
-        cubic: [N.m/rad3].
         rest: [rad].
     """
     if stiffness == 0.0 and cubic == 0.0:
@@ -130,11 +107,8 @@ def end_stop_torque(
     ``stiffness d (1 + dissipation v)``; it never pulls.
 
     Args:
-        angle: [rad].
-        speed: [rad/s].
         lower: angle of the lower stop [rad].
         upper: angle of the upper stop [rad].
-        stiffness: [N.m/rad].
         dissipation: [s/rad].
     """
     if angle > upper:
@@ -189,7 +163,6 @@ def gravity_torque(theta_l: float, amplitude: float, phase: float) -> float:
 
     Args:
         theta_l: load angle [rad].
-        phase: at angle zero [rad].
     """
     if amplitude == 0.0:
         return 0.0
@@ -213,7 +186,6 @@ def directional_friction(speed: float, difference: float) -> float:
     ``b speed + difference |speed|`` is ``(b + difference) speed`` forward and ``(b - difference) speed`` backward.
 
     Args:
-        speed: [rad/s].
         difference: [N.m.s/rad].
     """
     return difference * abs(speed)
@@ -223,8 +195,6 @@ def resonance_torque(angle: float, speed: float, inertia: float, frequency: floa
     """Return the torque [N.m] that drives a sprung inertia which lags the load by ``angle`` and ``speed``.
 
     Args:
-        angle: [rad].
-        speed: [rad/s].
         inertia: that is sprung [kg.m2].
         frequency: its own, undamped [rad/s].
     """
@@ -235,36 +205,21 @@ def resonance_torque(angle: float, speed: float, inertia: float, frequency: floa
 
 
 def twist_error(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the twist [rad] that an eccentric gear adds at the motor angle ``theta_m`` [rad].
-
-    Args:
-        theta_m: motor angle [rad].
-        phase: at angle zero [rad].
-    """
+    """Return the twist [rad] that an eccentric gear adds at the motor angle ``theta_m`` [rad]."""
     if amplitude == 0.0:
         return 0.0
     return amplitude * sine(cycles_per_rev * theta_m + phase)
 
 
 def twist_error_slope(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the derivative of :func:`twist_error` by ``theta_m`` [rad/rad].
-
-    Args:
-        theta_m: motor angle [rad].
-        phase: at angle zero [rad].
-    """
+    """Return the derivative of :func:`twist_error` by ``theta_m`` [rad/rad]."""
     if amplitude == 0.0:
         return 0.0
     return amplitude * cycles_per_rev * cosine(cycles_per_rev * theta_m + phase)
 
 
 def twist_error_curvature(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the second derivative of :func:`twist_error` by ``theta_m`` [rad/rad2].
-
-    Args:
-        theta_m: motor angle [rad].
-        phase: at angle zero [rad].
-    """
+    """Return the second derivative of :func:`twist_error` by ``theta_m`` [rad/rad2]."""
     if amplitude == 0.0:
         return 0.0
     return -amplitude * cycles_per_rev * cycles_per_rev * sine(cycles_per_rev * theta_m + phase)
@@ -278,7 +233,6 @@ def hardening_torque(twist: float, cubic: float, stiffness: float, sharpness: fl
 
     Args:
         twist: [rad].
-        cubic: [N.m/rad3].
         stiffness: of small twists [N.m/rad]; without one there is no fifth power.
         sharpness: [1].
     """

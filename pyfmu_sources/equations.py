@@ -14,6 +14,10 @@ Conventions, the same in every function:
 - ``u`` [N.m] and ``T_l`` [N.m] are held over a step of ``h`` [s].
 
 Torques are positive when they drive motor or load forward; ``T_l`` and the loads' effects act against the load.
+
+In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it;
+``transmitted``: torque of the shaft that friction depends on [N.m]; ``sign_m``: direction of the motor's dry
+friction, -1 to 1; ``T_l``: load torque [N.m].
 """
 
 from .backlash_models import GRADUAL, HELD, NEVER_PULLING, OWN_CONTACT, PLAIN_WHEN_CLOSED, RIGID
@@ -186,11 +190,7 @@ def contact_of(angle: float, alpha: float) -> int:
 
 
 def elastic_torque(x: State, contact: int, p: Parameters) -> float:
-    """Return the load-side shaft torque [N.m] of an elastic model at the flank ``contact`` (eq. 2.6, mended).
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return the load-side shaft torque [N.m] of an elastic model at the flank ``contact`` (eq. 2.6, mended)."""
     if contact == 0:
         return 0.0
     offset = 0.0 if backlash_model(p) == NONE else contact * p[P_ALPHA]
@@ -209,11 +209,7 @@ def elastic_torque(x: State, contact: int, p: Parameters) -> float:
 
 
 def friction_m(x: State, transmitted: float, p: Parameters) -> float:
-    """Return the magnitude of the motor's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it.
-
-    Args:
-        transmitted: torque of the shaft that friction depends on [N.m].
-    """
+    """Return the magnitude of the motor's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it."""
     level = sliding_friction(x[1], p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M], p[P_STRIBECK_SPEED_M])
     if p[P_LOADED_M] == 0.0 and p[P_WAVY_M] == 0.0:
         return level
@@ -221,11 +217,7 @@ def friction_m(x: State, transmitted: float, p: Parameters) -> float:
 
 
 def friction_l(x: State, transmitted: float, p: Parameters) -> float:
-    """Return the magnitude of the load's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it.
-
-    Args:
-        transmitted: torque of the shaft that friction depends on [N.m].
-    """
+    """Return the magnitude of the load's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it."""
     level = sliding_friction(x[3], p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L], p[P_STRIBECK_SPEED_L])
     if p[P_LOADED_L] == 0.0 and p[P_WAVY_L] == 0.0:
         return level
@@ -247,12 +239,7 @@ def ripple(theta_m: float, p: Parameters) -> float:
 
 
 def motor_torque(x: State, transmitted: float, sign_m: float, p: Parameters) -> float:
-    """Return the torque on the motor [N.m] without the shaft's: drive, ripple, viscous and dry friction.
-
-    Args:
-        transmitted: torque of the shaft that friction depends on [N.m].
-        sign_m: direction of the motor's dry friction, -1 to 1.
-    """
+    """Return the torque on the motor [N.m] without the shaft's: drive, ripple, viscous and dry friction."""
     torque = x[4] + ripple(x[0], p) - p[P_B_M] * x[1] - sign_m * friction_m(x, transmitted, p)
     if p[P_DIRECTION_M] != 0.0:
         torque -= directional_friction(x[1], p[P_DIRECTION_M])
@@ -260,12 +247,7 @@ def motor_torque(x: State, transmitted: float, sign_m: float, p: Parameters) -> 
 
 
 def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l: float) -> float:
-    """Return the torque on the load [N.m] without the shaft's: external, friction, gravity, drag, springs, stops.
-
-    Args:
-        transmitted: torque of the shaft that friction depends on [N.m].
-        T_l: load torque [N.m].
-    """
+    """Return the torque on the load [N.m] without the shaft's: external, friction, gravity, drag, springs, stops."""
     against = T_l + p[P_LOAD_TORQUE] + p[P_B_L] * x[3] + sign_l * friction_l(x, transmitted, p)
     against += gravity_torque(x[2], p[P_GRAVITY], p[P_GRAVITY_PHASE]) + quadratic_drag(x[3], p[P_DRAG])
     if p[P_RES_J] > 0.0:
@@ -297,12 +279,7 @@ def gear(x: State, p: Parameters) -> float:
 
 
 def rigid_acceleration(x: State, sign_m: float, sign_l: float, p: Parameters, T_l: float) -> float:
-    """Return the load's acceleration [rad/s2] while gear and load turn as one body.
-
-    Args:
-        sign_m: direction of the motor's dry friction, -1 to 1.
-        T_l: load torque [N.m].
-    """
+    """Return the load's acceleration [rad/s2] while gear and load turn as one body."""
     i = gear(x, p)
     drive = i * motor_torque(x, 0.0, sign_m, p) + load_torque(x, 0.0, sign_l, p, T_l)
     if p[P_ECC] != 0.0:
@@ -321,7 +298,6 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
     Args:
         sign_m: direction of the motor's dry friction, -1 to 1; a smooth approximation passes ``tanh(w/v)``.
         u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
     """
     wound_rate = 0.0
     if contact == 0 and x[7] != 0.0:
@@ -351,13 +327,7 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
 
 
 def rigid_rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, T_l: float) -> tuple[float, float]:
-    """Return both accelerations [rad/s2] of the rigid models (eqs. 2.3 to 2.5).
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        sign_m: direction of the motor's dry friction, -1 to 1.
-        T_l: load torque [N.m].
-    """
+    """Return both accelerations [rad/s2] of the rigid models (eqs. 2.3 to 2.5)."""
     if contact in (-2, 2):
         return (0.0, 0.0)
     if contact != 0:

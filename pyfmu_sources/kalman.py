@@ -65,14 +65,7 @@ def correct(x: Vector6, theta_m: float, theta_l: float, L: Gain, weight: Weight)
 
 
 def update(
-    x: Vector6,
-    u: float,
-    theta_m: float,
-    theta_l: float,
-    A: Matrix6,
-    B: Vector6,
-    L: Gain,
-    weight: Weight,
+    x: Vector6, u: float, theta_m: float, theta_l: float, A: Matrix6, B: Vector6, L: Gain, weight: Weight
 ) -> Update:
     """Return :func:`correct` after :func:`predict`: one sample of the filter.
 

@@ -1,6 +1,8 @@
 """A law learned from a record: a torque along straight lines between knots over one signal of a plant.
 
 The predictor of a diagnosis compiles :func:`straight`; an FMU holds a law as the flat tuple that ``L_*`` number.
+
+In all functions: ``clock``: time of the record that it was learned from [s].
 """
 
 from math import sqrt
@@ -54,11 +56,7 @@ def is_cyclic(law: Law) -> bool:
 
 
 def until_knot(law: Law, clock: float) -> float:
-    """Return how long a cyclic law runs straight on [s].
-
-    Args:
-        clock: time of the record that it was learned from [s].
-    """
+    """Return how long a cyclic law runs straight on [s]."""
     period = law[L_PERIOD]
     close = CLOSE * period
     s = (clock - law[L_SINCE]) % period
@@ -73,9 +71,6 @@ def until_knot(law: Law, clock: float) -> float:
 
 def law_torque(law: Law, clock: float, motion: Motion) -> float:
     """Return the torque of a law that acts, without its dry friction.
-
-    Args:
-        clock: time of the record that it was learned from [s].
 
     Returns:
         The torque [N.m]: against motor or load; on the shaft, with the elastic one.

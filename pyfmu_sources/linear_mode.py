@@ -6,23 +6,17 @@ a polynomial in which the next event is a root, found without ever stepping over
 needs no series: one product with the transition matrix, made once for each step size.
 
 ``x6 = (theta_m, omega_m, theta_l, omega_l, T_m, s)`` here, the part of the state that moves.
+
+In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it;
+``constant``: 1: with inputs and offsets; 0: the linear part alone; ``u``: requested torque [N.m], delayed and
+saturated already; ``T_l``: load torque [N.m].
 """
 
 from math import sqrt
 from typing import Annotated
 
 from .backlash_models import BOUNCING, HELD
-from .drivetrain_parameters import (
-    NONE,
-    P_ALPHA,
-    P_B_L,
-    P_B_M,
-    P_I,
-    P_J_L,
-    P_J_M,
-    P_MODEL,
-    P_TAU,
-)
+from .drivetrain_parameters import NONE, P_ALPHA, P_B_L, P_B_M, P_I, P_J_L, P_J_M, P_MODEL, P_TAU
 from .equations import Parameters, backlash_model, is_rigid, shaft_damping, shaft_stiffness, teeth_never_pull
 
 State6 = tuple[float, float, float, float, float, float]
@@ -44,11 +38,7 @@ REACHED = 0.01
 
 
 def law_of(contact: int, p: Parameters) -> Law:
-    """Return (kind, stiffness, damping, offset) of the linear law that holds at ``contact``.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return (kind, stiffness, damping, offset) of the linear law that holds at ``contact``."""
     if is_rigid(p):
         if contact in (-2, 2):
             return (AT_REST, 0.0, 0.0, 0.0)
@@ -63,13 +53,7 @@ def law_of(contact: int, p: Parameters) -> Law:
 
 
 def linear_rates(x: State6, constant: float, law: Law, p: Parameters, u: float, T_l: float) -> State6:
-    """Return ``x'`` for ``constant`` = 1 and its linear part for ``constant`` = 0 (``s`` left to its decay).
-
-    Args:
-        constant: 1: with inputs and offsets; 0: the linear part alone.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return ``x'`` for ``constant`` = 1 and its linear part for ``constant`` = 0 (``s`` left to its decay)."""
     kind, stiffness, damping, offset = law
     i = p[P_I]
     lag = (constant * u - x[4]) / p[P_TAU]
@@ -90,8 +74,6 @@ def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float
     """Return the Taylor coefficients of the state, scaled so that time runs from 0 to 1 over ``step`` [s].
 
     Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
         step: over which it is expanded [s].
         kappa: rate at which a parted shaft unwinds [1/s].
     """
@@ -126,9 +108,6 @@ def evaluate(coefficients: Coefficients, time: float) -> State6:
 def guard_count(contact: int, p: Parameters) -> int:
     """Return how many ways the mode ``contact`` can end.
 
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-
     Returns:
         0, 1 or 2.
     """
@@ -141,12 +120,6 @@ def guard(x: State6, constant: float, contact: int, which: int, p: Parameters, u
     """Return the guard ``which`` of the mode ``contact``; the mode ends when it turns negative.
 
     Guards are affine in the state; ``constant`` = 0 asks for their linear part.
-
-    Args:
-        constant: 1: with inputs and offsets; 0: the linear part alone.
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
     """
     model = int(p[P_MODEL])
     i = p[P_I]
@@ -171,11 +144,7 @@ def guard(x: State6, constant: float, contact: int, which: int, p: Parameters, u
 
 
 def guard_tolerance(x: State6, contact: int, p: Parameters) -> float:
-    """Return how far below zero rounding alone can take a guard.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-    """
+    """Return how far below zero rounding alone can take a guard."""
     angles = GUARD_ROUNDINGS * EPSILON * (1.0 + abs(x[0] / p[P_I]) + abs(x[2]) + p[P_ALPHA])
     if contact != 0 and teeth_never_pull(p):
         return angles * max(1.0, shaft_stiffness(p))
@@ -185,13 +154,7 @@ def guard_tolerance(x: State6, contact: int, p: Parameters) -> float:
 
 
 def first_event(coefficients: Coefficients, contact: int, p: Parameters, u: float, T_l: float) -> tuple[float, int]:
-    """Return (time in [0, 1], guard) of the first event of a scaled Taylor series, or (1, -1).
-
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return (time in [0, 1], guard) of the first event of a scaled Taylor series, or (1, -1)."""
     earliest = 1.0
     which = -1
     tolerance = guard_tolerance(coefficients[0], contact, p)

@@ -1,4 +1,9 @@
-"""The drivetrain without nonlinear effects: one product with a matrix, or steps from contact event to contact event."""
+"""The drivetrain without nonlinear effects: one product with a matrix, or steps from contact event to contact event.
+
+In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it;
+``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m]; ``h``: length of the step
+[s]; ``kappa``: rate at which a parted shaft unwinds [1/s].
+"""
 
 from .backlash_models import NEVER_PULLING
 from .contact import after_event
@@ -25,10 +30,6 @@ def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, 
     An event is ruled out when both ends are farther from it than the speeds at both ends could carry.
 
     Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
         table: ``prepare(p, h)`` of the same ``p`` and ``h``.
     """
     i = p[P_I]
@@ -85,14 +86,7 @@ def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, 
 def advance_linear(
     x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, kappa: float
 ) -> tuple[State, Mode]:
-    """Return state and mode after ``h`` [s] of the exact linear solution, events located; NaN for too much work.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-        kappa: rate at which a parted shaft unwinds [1/s].
-    """
+    """Return state and mode after ``h`` [s] of the exact linear solution, events located; NaN for too much work."""
     contact = mode[0]
     elapsed = 0.0
     events = 0
@@ -116,11 +110,6 @@ def linear_to_event(
     """Return the exact linear solution at its next event, or at the end of a step.
 
     Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-        kappa: rate at which a parted shaft unwinds [1/s].
         elapsed: time since the beginning of the step at which ``x`` is [s].
     """
     most = MAX_PIECES + int(MAX_PIECES_PER_SECOND * h)

@@ -5,6 +5,10 @@
 
 The motor's motion over a step is a polynomial, so that the solution within one contact is a power series, and the next
 contact event a root of a power series, found as in :mod:`linear_mode`.
+
+In all functions: ``p``: inertia, stiffness, damping, friction, gear ratio and half-gap; ``theta_m``: motor angle
+[rad]; ``contact``: flank that touches: -1, 0 or 1; ``omega_m``: motor speed [rad/s]; ``T_l``: load torque [N.m];
+``begin``: in the motion's time [s]; ``end``: in the motion's time [s].
 """
 
 from math import sqrt
@@ -70,8 +74,6 @@ def settled(x: State, contact: int, p: Parameters, theta_m: float, speed: float)
 
     Args:
         contact: flank that touched: -1, 0 or 1.
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        theta_m: motor angle [rad].
         speed: derivative of the twist [rad/s].
 
     Returns:
@@ -110,24 +112,12 @@ def change(contact: int, follows: int) -> int:
 
 
 def rounding(x: State, p: Parameters, theta_m: float) -> float:
-    """Return how far off a twist may be by rounding [rad].
-
-    Args:
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        theta_m: motor angle [rad].
-    """
+    """Return how far off a twist may be by rounding [rad]."""
     return GUARD_ROUNDINGS * EPSILON * (1.0 + abs(theta_m / p[P_I]) + abs(x[0]) + p[P_ALPHA])
 
 
 def shaft_torque(x: State, contact: int, p: Parameters, theta_m: float, omega_m: float) -> float:
-    """Return the torque of the shaft on the load [N.m].
-
-    Args:
-        contact: flank that touches: -1, 0 or 1.
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        theta_m: motor angle [rad].
-        omega_m: motor speed [rad/s].
-    """
+    """Return the torque of the shaft on the load [N.m]."""
     if contact == 0:
         return 0.0
     wound = theta_m / p[P_I] - x[0] - contact * p[P_ALPHA]
@@ -137,27 +127,13 @@ def shaft_torque(x: State, contact: int, p: Parameters, theta_m: float, omega_m:
 def rates_and_outputs(
     x: State, contact: int, p: Parameters, theta_m: float, omega_m: float, T_l: float
 ) -> tuple[State, Outputs]:
-    """Return the derivatives, and the outputs theta_l, omega_l and T_shaft.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1.
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        theta_m: motor angle [rad].
-        omega_m: motor speed [rad/s].
-        T_l: load torque [N.m].
-    """
+    """Return the derivatives, and the outputs theta_l, omega_l and T_shaft."""
     torque = shaft_torque(x, contact, p, theta_m, omega_m)
     return ((x[1], (torque - T_l - p[P_B] * x[1]) / p[P_J]), (x[0], x[1], torque))
 
 
 def guards(x: State, contact: int, p: Parameters, theta_m: float) -> tuple[float, float]:
-    """Return how far the contact is from its end at either flank [rad]; 1 for a guard that is not in use.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1.
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        theta_m: motor angle [rad].
-    """
+    """Return how far the contact is from its end at either flank [rad]; 1 for a guard that is not in use."""
     if p[P_ALPHA] == 0.0:
         return (1.0, 1.0)
     d = theta_m / p[P_I] - x[0]
@@ -187,9 +163,6 @@ def solution(
     """Return the state at the first event within ``step`` [s], at what share of it, and the guard.
 
     Args:
-        contact: flank that touches: -1, 0 or 1.
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        T_l: load torque [N.m].
         step: short enough for the series [s].
     """
     touches = 1.0 if contact != 0 else 0.0
@@ -240,26 +213,14 @@ def value(series: Series, time: float) -> float:
 
 
 def fastest(p: Parameters) -> float:
-    """Return a rate [1/s] that none of the motion exceeds.
-
-    Args:
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-    """
+    """Return a rate [1/s] that none of the motion exceeds."""
     return sqrt(p[P_K] / p[P_J]) + (p[P_C] + p[P_B]) / p[P_J]
 
 
 def advance_to_event(
     x: State, contact: int, p: Parameters, motion: Motion, T_l: float, begin: float, end: float
 ) -> tuple[State, float, int]:
-    """Return the state at the first event of a motion between two times, the time, and the guard.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1.
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        T_l: load torque [N.m].
-        begin: in the motion's time [s].
-        end: in the motion's time [s].
-    """
+    """Return the state at the first event of a motion between two times, the time, and the guard."""
     longest = 1.0 / fastest(p)
     time = begin
     there = moved(motion, begin)
@@ -283,15 +244,7 @@ def advance_to_event(
 def advance(
     x: State, contact: int, p: Parameters, motion: Motion, T_l: float, begin: float, end: float
 ) -> tuple[State, int]:
-    """Return state and contact at the end of a motion, all events inside; NaN where there are far too many.
-
-    Args:
-        contact: flank that touches: -1, 0 or 1.
-        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        T_l: load torque [N.m].
-        begin: in the motion's time [s].
-        end: in the motion's time [s].
-    """
+    """Return state and contact at the end of a motion, all events inside; NaN where there are far too many."""
     time = begin
     for _ in range(MOST_EVENTS):
         x, time, which = advance_to_event(x, contact, p, motion, T_l, time, end)

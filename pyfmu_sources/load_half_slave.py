@@ -1,4 +1,7 @@
-"""The FMU ``LoadHalf``: adapter from FMI to :mod:`load_half`."""
+"""The FMU ``LoadHalf``: adapter from FMI to :mod:`load_half`.
+
+In all functions: ``time`` [s]; ``step`` [s].
+"""
 
 from __future__ import annotations
 
@@ -87,12 +90,7 @@ class LoadHalf(SlaveBase):
         self._write()
 
     def advance(self, time: float, step: float) -> None:
-        """Move on with the inputs held.
-
-        Args:
-            time: [s].
-            step: [s].
-        """
+        """Move on with the inputs held."""
         self._check(step)
         motion = held_motion(self.real[THETA_M], self.real[OMEGA_M])
         x, contact = load_half.advance(self._x, self._contact, self._p, motion, self.real[T_L], 0.0, step)
@@ -100,10 +98,6 @@ class LoadHalf(SlaveBase):
 
     def advance_to_event(self, time: float, step: float) -> float:
         """Move on with the inputs held, up to the first event.
-
-        Args:
-            time: [s].
-            step: [s].
 
         Returns:
             How far it is [s].
@@ -126,10 +120,6 @@ class LoadHalf(SlaveBase):
 
     def advance_along(self, time: float, step: float, to_event: bool) -> float:
         """Move on along the motion through the three nodes, and leave its last point as the inputs.
-
-        Args:
-            time: [s].
-            step: [s].
 
         Returns:
             How far it is [s].
@@ -206,11 +196,7 @@ class LoadHalf(SlaveBase):
         return (one + room, other + room)
 
     def update(self, time: float) -> None:
-        """Give an event its effect, and settle the contact at the inputs of the moment.
-
-        Args:
-            time: [s].
-        """
+        """Give an event its effect, and settle the contact at the inputs of the moment."""
         if self._event != NO_EVENT:
             self._contact = load_half.after(self._contact, self._event)
             self._event = NO_EVENT

@@ -3,6 +3,8 @@
     J_m theta_m'' + b_m theta_m' = T_m - T_shaft / i,    tau T_m' + T_m = u
 
 With the inputs held the solution is a power series; a step is cut so that the series reaches the last bit.
+
+In all functions: ``u``: requested torque [N.m]; ``T_shaft``: torque of the shaft on the load [N.m].
 """
 
 Parameters = tuple[float, float, float, float]
@@ -14,12 +16,7 @@ TERMS = 20
 
 
 def rates_and_outputs(x: State, p: Parameters, u: float, T_shaft: float) -> tuple[State, Outputs]:
-    """Return the derivatives, and the outputs theta_m, omega_m and T_m.
-
-    Args:
-        u: requested torque [N.m].
-        T_shaft: torque of the shaft on the load [N.m].
-    """
+    """Return the derivatives, and the outputs theta_m, omega_m and T_m."""
     acceleration = (x[2] - T_shaft / p[P_I] - p[P_B] * x[1]) / p[P_J]
     return ((x[1], acceleration, (u - x[2]) / p[P_TAU]), (x[0], x[1], x[2]))
 
@@ -28,8 +25,6 @@ def advance(x: State, p: Parameters, u: float, T_shaft: float, h: float) -> Stat
     """Return the state after ``h`` [s] with the inputs held.
 
     Args:
-        u: requested torque [N.m].
-        T_shaft: torque of the shaft on the load [N.m].
         h: length of the step [s].
     """
     count = 1 + int(h * (p[P_B] / p[P_J] + 1.0 / p[P_TAU]))

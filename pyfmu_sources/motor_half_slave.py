@@ -1,4 +1,7 @@
-"""The FMU ``MotorHalf``: adapter from FMI to :mod:`motor_half`."""
+"""The FMU ``MotorHalf``: adapter from FMI to :mod:`motor_half`.
+
+In all functions: ``time`` [s]; ``step`` [s].
+"""
 
 from __future__ import annotations
 
@@ -62,12 +65,7 @@ class MotorHalf(SlaveBase):
         self._write()
 
     def advance(self, time: float, step: float) -> None:
-        """Move on with the inputs held.
-
-        Args:
-            time: [s].
-            step: [s].
-        """
+        """Move on with the inputs held."""
         p = self._p
         if step * (p[1] / p[0] + 1.0 / p[3]) > MOST_PIECES:
             raise StepRefusedError(f"a step must take at most {MOST_PIECES!r} pieces, but is {step!r} s long")
@@ -79,10 +77,6 @@ class MotorHalf(SlaveBase):
 
     def advance_to_event(self, time: float, step: float) -> float:
         """Move on: nothing happens to a motor by itself.
-
-        Args:
-            time: [s].
-            step: [s].
 
         Returns:
             How far it is [s].
@@ -104,11 +98,7 @@ class MotorHalf(SlaveBase):
         return self.derivatives()
 
     def update(self, time: float) -> None:
-        """Write the outputs at an event, which leaves the state as it is.
-
-        Args:
-            time: [s].
-        """
+        """Write the outputs at an event, which leaves the state as it is."""
         self._write()
 
     def observe(self) -> None:

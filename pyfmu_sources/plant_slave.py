@@ -2,6 +2,8 @@
 
 A step ends at its communication point and has all its events inside, or (FMI 3.0) at the first event, of which the
 outputs then show the moment before; ``update`` gives it its effect.
+
+In all functions: ``time`` [s]; ``step`` [s].
 """
 
 from __future__ import annotations
@@ -54,12 +56,7 @@ class PlantSlave(SlaveBase):
         return self._request() if self._dead_time() == 0.0 else self._acting
 
     def advance(self, time: float, step: float) -> None:
-        """Integrate with the inputs held; a dead time splits the step where an older request takes over.
-
-        Args:
-            time: [s].
-            step: [s].
-        """
+        """Integrate with the inputs held; a dead time splits the step where an older request takes over."""
         u = self._request()
         if self._dead_time() == 0.0:
             x, mode = self._moved(self._x, self._mode, u, time, step)
@@ -69,10 +66,6 @@ class PlantSlave(SlaveBase):
 
     def advance_to_event(self, time: float, step: float) -> float:
         """Integrate like ``advance``, up to the first event.
-
-        Args:
-            time: [s].
-            step: [s].
 
         Returns:
             How far it is [s]: ``step`` where there is no event.

@@ -1,6 +1,9 @@
 """The single axis as the adapters and the orchestrator use it: start, advance, read.
 
 Its equations are in :mod:`axis_equations`, its integration steps in :mod:`axis_steps`.
+
+In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m]; ``mode``:
+direction of sliding, 0: none.
 """
 
 from .axis_equations import (
@@ -29,19 +32,9 @@ from .drivetrain_parameters import BIG
 from .servo_axis_parameters import P_FILTER, P_RATE, P_WAVY
 
 __all__ = [
-    "State",
-    "advance",
-    "advance_to_event",
-    "drive_torque",
-    "friction",
-    "inertia",
-    "initial_mode",
-    "mode_rates",
-    "past_stop",
-    "rates",
-    "sliding_torque",
-    "start",
-]
+    "State", "advance", "advance_to_event", "drive_torque", "friction", "inertia", "initial_mode", "mode_rates",
+    "past_stop", "rates", "sliding_torque", "start",
+]  # fmt: skip
 
 # Integration steps that one communication step may take, and how many more for each second of it.
 MAX_STEPS = 20000
@@ -54,8 +47,6 @@ def advance(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) 
     The state is NaN where damping, lag or ripple are so quick that no sensible number of steps resolves them.
 
     Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
         h: step [s], positive.
     """
     if x[4] == UNASKED and filtered(p):
@@ -77,9 +68,6 @@ def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h:
     """Return :func:`advance` for a request whose ramp does not end inside the step.
 
     Args:
-        mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
         h: length of the step [s].
     """
     elapsed = 0.0
@@ -96,8 +84,6 @@ def advance_to_event(
     """Return :func:`advance` up to the first event, its effect included.
 
     Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
         h: step [s], positive.
 
     Returns:
@@ -127,9 +113,6 @@ def request_to_event(
     An axis that breaks away is still at rest; its direction follows from the torque of what comes next.
 
     Args:
-        mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
         h: length of the step [s].
         elapsed: time since the beginning of the step at which ``x`` is [s].
     """

@@ -2,6 +2,9 @@
 
 The laws are those of :mod:`axis_equations`; here they are without its integrator, which is the host's. Between events
 the direction of sliding and the end stop that is touched do not change.
+
+In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m]; ``mode``:
+direction of sliding, 0: none.
 """
 
 from .axis_equations import (
@@ -36,9 +39,6 @@ ROOMS = 2.0
 def decided(x: State, mode: int, p: Parameters, u: float) -> int:
     """Return the direction of sliding, from the state and the request if nothing has decided it yet.
 
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-
     Returns:
         -1, 0 or 1.
     """
@@ -57,7 +57,6 @@ def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) 
 
     Args:
         u: requested torque [N.m].
-        T_l: load torque [N.m].
     """
     asked = saturated(u, p[P_LIMIT])
     outputs = (x[0] + p[P_OFFSET], x[1], drive_torque(x, p, asked))
@@ -65,21 +64,12 @@ def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) 
 
 
 def slipping_room(x: State, mode: int) -> float:
-    """Return how far below zero the friction's indicator may fall by rounding.
-
-    Args:
-        mode: direction of sliding, 0: none.
-    """
+    """Return how far below zero the friction's indicator may fall by rounding."""
     return 1e-12 * (1.0 + abs(x[2])) if mode == 0 else 1e-14
 
 
 def slipping(x: State, mode: int, p: Parameters, u: float, T_l: float) -> float:
     """Return how far dry friction is from the end of its mode, in N.m (it sticks) or rad/s (it slides).
-
-    Args:
-        mode: direction of sliding, 0: none.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
 
     Returns:
         The distance; 1 where the mode cannot end: no dry friction, or a bristle that bends.
@@ -115,15 +105,9 @@ def indicators(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: flo
     """Return both event indicators: dry friction and end stops; the mode ends when one turns negative.
 
     Args:
-        mode: direction of sliding, 0: none.
         stop: end stop at which the axis is: -1, 0 (none) or 1.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
     """
-    return (
-        slipping(x, mode, p, u, T_l) + ROOMS * slipping_room(x, mode),
-        to_stop(x, stop, p) + ROOMS * stop_room(x),
-    )
+    return (slipping(x, mode, p, u, T_l) + ROOMS * slipping_room(x, mode), to_stop(x, stop, p) + ROOMS * stop_room(x))
 
 
 def after_events(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: float) -> tuple[State, int, int]:
@@ -131,7 +115,6 @@ def after_events(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: f
 
     Args:
         u: requested torque [N.m], saturated already.
-        T_l: load torque [N.m].
     """
     mode = decided(x, mode, p, u)
     if slipping(x, mode, p, u, T_l) < -slipping_room(x, mode):

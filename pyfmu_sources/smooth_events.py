@@ -2,6 +2,8 @@
 
 Dry friction is set-valued: a sliding part whose speed reaches zero sticks when the torque on it stays below the
 breakaway torque, else it slides on the other way.
+
+In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
 from .backlash_models import BOUNCING, HELD
@@ -42,23 +44,14 @@ GUARDS = 4
 
 
 def guard(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: float) -> float:
-    """Return guard ``which`` of ``mode`` (0, 1: contact; 2: motor's friction; 3: load's); negative ends it.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return guard ``which`` of ``mode`` (0, 1: contact; 2: motor's friction; 3: load's); negative ends it."""
     if which in (MOTOR, LOAD):
         return friction_guard(x, mode, which, p, T_l)
     return contact_guard(x, mode, which, p, T_l)
 
 
 def contact_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> float:
-    """Return the guard of the contact; the same conditions as in the linear solution.
-
-    Args:
-        T_l: load torque [N.m].
-    """
+    """Return the guard of the contact; the same conditions as in the linear solution."""
     contact = mode[0]
     model = backlash_model(p)
     if model == NONE or (is_rigid(p) and p[P_ALPHA] == 0.0) or (which == 1 and contact in (-1, 1)):
@@ -98,12 +91,7 @@ def guard_room(x: State, mode: Mode, which: int, p: Parameters) -> float:
 
 
 def violated(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> int:
-    """Return the guard that ``x`` violates most, relative to its room, or -1.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return the guard that ``x`` violates most, relative to its room, or -1."""
     worst = -1
     depth = 1.0
     for which in range(GUARDS):
@@ -117,12 +105,7 @@ def violated(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> int:
 
 
 def switched(x: State, mode: Mode, which: int, events: int, p: Parameters, u: float, T_l: float) -> tuple[State, Mode]:
-    """Return state and mode after the guard ``which`` has ended ``mode``.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return state and mode after the guard ``which`` has ended ``mode``."""
     contact, slip_m, slip_l = mode
     if which == MOTOR and is_rigid(p) and contact != 0:
         if slip_m != 0:
@@ -157,12 +140,7 @@ def switched(x: State, mode: Mode, which: int, events: int, p: Parameters, u: fl
 
 
 def settled(x: State, mode: Mode, events: int, p: Parameters, u: float, T_l: float) -> tuple[State, Mode, int]:
-    """Return state and mode once no guard is violated any more at this moment.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return state and mode once no guard is violated any more at this moment."""
     for _ in range(2 * GUARDS):
         which = violated(x, mode, p, u, T_l)
         if which < 0:
@@ -173,11 +151,7 @@ def settled(x: State, mode: Mode, events: int, p: Parameters, u: float, T_l: flo
 
 
 def joined_body(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State, Mode]:
-    """Return state and mode with rigid teeth in contact at one flank, one speed and one direction of friction.
-
-    Args:
-        T_l: load torque [N.m].
-    """
+    """Return state and mode with rigid teeth in contact at one flank, one speed and one direction of friction."""
     contact = mode[0]
     if contact == 0 or not is_rigid(p):
         return (x, mode)

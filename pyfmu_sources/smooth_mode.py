@@ -2,6 +2,9 @@
 
 Between two events the right-hand side is smooth, so the integrator (:mod:`dormand_prince`) keeps its order; the events
 are those of :mod:`smooth_events`.
+
+In all functions: ``h``: length of the step [s]; ``u``: requested torque [N.m], delayed and saturated already;
+``T_l``: load torque [N.m].
 """
 
 from .bristles import settled_slips
@@ -23,9 +26,6 @@ WORK_OF_EVENT = 15
 def dipped(x: State, k1: State, after: State, k7: State, mode: Mode, p: Parameters, h: float) -> float:
     """Return the moment inside a step at which a twist or a speed turns back, or 0 when none does.
 
-    Args:
-        h: length of the step [s].
-
     Returns:
         The moment [s].
     """
@@ -44,13 +44,7 @@ def dipped(x: State, k1: State, after: State, k7: State, mode: Mode, p: Paramete
 
 
 def locate(x: State, k1: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, float, int]:
-    """Return (state, time, guard) at which the first guard turns negative inside a step that ends beyond it.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-    """
+    """Return (state, time, guard) at which the first guard turns negative inside a step that ends beyond it."""
     low = 0.0
     high = h
     beyond = x
@@ -80,13 +74,7 @@ def refused(x: State) -> State:
 
 
 def advance_smooth(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, Mode]:
-    """Return state and mode after ``h`` [s] with the inputs held; NaN where no step size resolves the motion.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-    """
+    """Return state and mode after ``h`` [s] with the inputs held; NaN where no step size resolves the motion."""
     elapsed = 0.0
     work = 0
     x, mode = joined_body(x, mode, p, T_l)
@@ -107,11 +95,6 @@ def advance_smooth_to_event(
 ) -> tuple[State, Mode, float, int]:
     """Return :func:`advance_smooth` up to the first event, which has not had its effect yet.
 
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-
     Returns:
         State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
     """
@@ -127,9 +110,6 @@ def smooth_to_event(
     """Return the solution at its next event, or at the end of a step.
 
     Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
         elapsed: time since the beginning of the step at which ``x`` is [s].
     """
     k1 = mode_rates(x, mode, p, u, T_l)

@@ -1,4 +1,7 @@
-"""The transition matrix of a linear mode: a step without an event is one product with it."""
+"""The transition matrix of a linear mode: a step without an event is one product with it.
+
+In all functions: ``h``: length of the step [s].
+"""
 
 from math import ceil, sqrt
 
@@ -38,7 +41,6 @@ def propagate(x: State6, law: Law, p: Parameters, u: float, T_l: float, h: float
     Args:
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-        h: length of the step [s].
     """
     count = max(1, ceil(h * fastest_rate(law, p)))
     for _ in range(count):
@@ -47,11 +49,7 @@ def propagate(x: State6, law: Law, p: Parameters, u: float, T_l: float, h: float
 
 
 def transition(law: Law, p: Parameters, h: float) -> Transition:
-    """Return the five rows by which ``(twist, omega_m, omega_l, T_m, u, T_l)`` moves the state in ``h`` [s].
-
-    Args:
-        h: length of the step [s].
-    """
+    """Return the five rows by which ``(twist, omega_m, omega_l, T_m, u, T_l)`` moves the state in ``h`` [s]."""
     free = (law[0], law[1], law[2], 0.0)
     doublings = 0
     while h * fastest_rate(law, p) > MOST_PIECES and doublings < MOST_DOUBLINGS:

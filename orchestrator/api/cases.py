@@ -89,13 +89,7 @@ class RunOptions:
             journal = folder / "sweep.journal"
         try:
             sweep = run_cases(
-                cases,
-                work,
-                journal,
-                open_pool=open_pool,
-                limits=limits,
-                resume=self.resume,
-                on_progress=self.progress,
+                cases, work, journal, open_pool=open_pool, limits=limits, resume=self.resume, on_progress=self.progress
             )
         except BaseException:
             if folder is not None:

@@ -13,12 +13,7 @@ from orchestrator.api.arguments import choose_experiment, choose_settings
 from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
-from orchestrator.engine import (
-    DesignCases,
-    Row,
-    Status,
-    Sweep,
-)
+from orchestrator.engine import DesignCases, Row, Status, Sweep
 from orchestrator.engine.work import file_hash
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import Calibration

@@ -18,15 +18,9 @@ from orchestrator.paired.thesis.recompute import gain_comparisons, table_compari
 from orchestrator.shared.results.thesis import Comparison, Erratum, TableComparison, ThesisFound, ThesisTable
 
 TABLE_HEAD = (
-    "alpha [rad]",
-    "S",
-    "estimate",
-    "by the quadratic",
-    "error [%]",
-    "recomputed [%]",
-    "our estimate",
+    "alpha [rad]", "S", "estimate", "by the quadratic", "error [%]", "recomputed [%]", "our estimate",
     "our error [%]",
-)
+)  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)

@@ -1,4 +1,7 @@
-"""Builds native FMUs: the same slaves, translated to C and compiled, so that they need no Python at run time."""
+"""Builds native FMUs: the same slaves, translated to C and compiled, so that they need no Python at run time.
+
+In all functions: ``fmi``: version of FMI, 2 or 3.
+"""
 
 from __future__ import annotations
 
@@ -28,11 +31,7 @@ NO_COMPILER = "native FMUs need a C compiler: install one (cc), or `pip install 
 
 
 def native_directory(fmi: int = 2) -> Path:
-    """Return where native FMUs live: ``native/`` beside the others, because they have the same names.
-
-    Args:
-        fmi: version of FMI, 2 or 3.
-    """
+    """Return where native FMUs live: ``native/`` beside the others, because they have the same names."""
     return default_directory(fmi) / "native"
 
 
@@ -47,7 +46,6 @@ def ensure_native(
 
     Args:
         here: for this platform alone, with the local compiler where there is one: a second instead of half a minute.
-        fmi: version of FMI, 2 or 3.
     """
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = native_directory(fmi) if directory is None else directory
@@ -75,11 +73,7 @@ def native_remark() -> str | None:
 
 
 def native_fingerprint(recipe: Recipe, compiler: Compiler, fmi: int = 2) -> str:
-    """Return what changes whenever a native build would.
-
-    Args:
-        fmi: version of FMI, 2 or 3.
-    """
+    """Return what changes whenever a native build would."""
     options = {
         "fmi": fmi,
         "name": recipe.name,
@@ -97,18 +91,9 @@ def native_fingerprint(recipe: Recipe, compiler: Compiler, fmi: int = 2) -> str:
 def _builder_files() -> tuple[Path, ...]:
     here = Path(__file__).parent
     names = (
-        "archive",
-        "arrays",
-        "compilers",
-        "documentation",
-        "fmi3_description",
-        "fmi3_files",
-        "native_build",
-        "native_description",
-        "native_sources",
-        "reference_files",
-        "stamping",
-    )
+        "archive", "arrays", "compilers", "documentation", "fmi3_description", "fmi3_files", "native_build",
+        "native_description", "native_sources", "reference_files", "stamping",
+    )  # fmt: skip
     translation = Path(orchestrator.building.translation.__file__).parent
     files = [*(here / f"{name}.py" for name in names), *sorted(translation.glob("*.py")), *sorted(RUNTIME.glob("*.h"))]
     return (*files, *DATA_FILES)
@@ -125,11 +110,7 @@ def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int) 
 
 
 def _native_members(recipe: Recipe, compiler: Compiler, fingerprint: str, fmi: int) -> dict[str, bytes]:
-    """Return the members of the archive.
-
-    Args:
-        fmi: version of FMI, 2 or 3.
-    """
+    """Return the members of the archive."""
     cls = slave_class(recipe, fmi)
     sources = c_sources(recipe, cls, PLACEHOLDER, fmi)
     folders = {target: target.folders(fmi) for target in compiler.targets}

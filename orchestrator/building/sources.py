@@ -136,16 +136,9 @@ def fingerprint(recipe: Recipe, launcher: str) -> str:
 @cache
 def _builder_files() -> tuple[Path, ...]:
     names = (
-        "archive",
-        "documentation",
-        "launcher",
-        "reference_files",
-        "reference_runs",
-        "sources",
-        "stamping",
-        "starts",
+        "archive", "documentation", "launcher", "reference_files", "reference_runs", "sources", "stamping", "starts",
         "worker",
-    )
+    )  # fmt: skip
     files = [HERE / f"{name}.py" for name in names]
     files += sorted(path for path in (*HERE.glob("native/*.[ch]"), *HERE.glob("data/*")) if path.is_file())
     return tuple(path for path in (*files, HERE.parent / "plants" / "design.py") if path.exists())

@@ -41,12 +41,7 @@ def _controller() -> dict[str, float]:
     values = DrivetrainValues()
     regulator = design_regulator(five_state_model(values), np.diag(STATE_WEIGHTS), TORQUE_WEIGHT, SAMPLE_TIME)
     gains = {f"K[{n}]": gain for n, gain in enumerate(regulator.gains, start=1)}
-    return gains | {
-        "i": values.i,
-        "compliance": 1.0 / values.k,
-        "u_max": TORQUE_LIMIT,
-        "sample_time": SAMPLE_TIME,
-    }
+    return gains | {"i": values.i, "compliance": 1.0 / values.k, "u_max": TORQUE_LIMIT, "sample_time": SAMPLE_TIME}
 
 
 def _estimator() -> dict[str, float]:

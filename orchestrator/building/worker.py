@@ -109,10 +109,7 @@ def _complete(
     kept["documentation/licenses/PythonFMU.txt"] = pythonfmu_license()
     stamp(description, fingerprint)
     guid = content_guid(description, kept)
-    return kept | {
-        "modelDescription.xml": final_text(description, guid),
-        "resources/guid.txt": guid.encode() + b"\n",
-    }
+    return kept | {"modelDescription.xml": final_text(description, guid), "resources/guid.txt": guid.encode() + b"\n"}
 
 
 def pythonfmu_license() -> bytes:

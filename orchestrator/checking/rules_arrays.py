@@ -1,4 +1,7 @@
-"""Rules of FMI 3.0 about arrays, structural parameters, clocks and clocked variables."""
+"""Rules of FMI 3.0 about arrays, structural parameters, clocks and clocked variables.
+
+In all functions: ``d``: the description of an FMU of FMI 3.0.
+"""
 
 import math
 from collections.abc import Iterator
@@ -10,11 +13,7 @@ _PERIODIC = ("constant", "fixed", "tunable")
 
 
 def check_arrays(d: Description) -> Iterator[Finding]:
-    """Findings about dimensions, numbers of start values and structural parameters.
-
-    Args:
-        d: the description of an FMU of FMI 3.0.
-    """
+    """Findings about dimensions, numbers of start values and structural parameters."""
     for v in d.variables:
         for dimension in v.dimensions:
             yield from _dimension(d, v, dimension.size, dimension.reference)
@@ -57,11 +56,7 @@ def _dimension(d: Description, v: DescribedVariable, size: int | None, reference
 
 
 def check_clocks(d: Description) -> Iterator[Finding]:
-    """Findings about clocks and clocked variables.
-
-    Args:
-        d: the description of an FMU of FMI 3.0.
-    """
+    """Findings about clocks and clocked variables."""
     clocks = {v.reference: v for v in d.variables if v.kind == "Clock"}
     cosimulation = d.interface("CoSimulation")
     if clocks and cosimulation is not None and not cosimulation.flag("hasEventMode"):

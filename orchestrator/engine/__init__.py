@@ -14,28 +14,7 @@ from orchestrator.engine.table import require_parquet, write_csv, write_parquet
 from orchestrator.engine.work import Work
 
 __all__ = [
-    "Case",
-    "CaseLimits",
-    "Cases",
-    "DesignCases",
-    "Interrupted",
-    "JournalFullError",
-    "LocalProcesses",
-    "OpenPool",
-    "Outcome",
-    "Progress",
-    "ResultColumn",
-    "Row",
-    "Status",
-    "Sweep",
-    "Tls",
-    "Work",
-    "choose_pool",
-    "choose_tls",
-    "draws",
-    "parse_design",
-    "require_parquet",
-    "run_cases",
-    "write_csv",
-    "write_parquet",
-]
+    "Case", "CaseLimits", "Cases", "DesignCases", "Interrupted", "JournalFullError", "LocalProcesses", "OpenPool",
+    "Outcome", "Progress", "ResultColumn", "Row", "Status", "Sweep", "Tls", "Work", "choose_pool", "choose_tls",
+    "draws", "parse_design", "require_parquet", "run_cases", "write_csv", "write_parquet",
+]  # fmt: skip

@@ -197,8 +197,7 @@ class Journal:
             was = header["definition"]
             keys = sorted(k for k in {*was, *wanted} if was.get(k) != wanted.get(k)) or ["cases"]
             raise ScenarioError(
-                f"`resume` must continue the sweep of {self.path}, but this one differs in: {', '.join(keys)}",
-                "resume",
+                f"`resume` must continue the sweep of {self.path}, but this one differs in: {', '.join(keys)}", "resume"
             )
 
     def _lines(self) -> Iterator[tuple[int, bytes]]:

@@ -6,6 +6,8 @@ excitations that only a perfect model can use. Square pulses and multisines of s
 spectrum of a multisine and how hard its peaks are clipped are searched for, by an evolution strategy of one parent and
 one child whose step follows its success (Rechenberg 1973): the bound jumps wherever a contact comes or goes, so that
 its slope is of no use.
+
+In all functions: ``duration``: of the record [s]; ``rate``: sampling rate [Hz].
 """
 
 import math
@@ -70,8 +72,6 @@ def design(
 
     Args:
         alpha: half-gap that shall be measured, or the smallest that shall be seen [rad].
-        duration: of the record [s].
-        rate: sampling rate [Hz].
     """
     for name, value in (("torque", limits.torque), ("speed", limits.speed), ("alpha", alpha), ("rate", rate)):
         if not (math.isfinite(value) and value > 0.0):
@@ -106,8 +106,6 @@ def simple_candidates(
 
     Args:
         alpha: half-gap that shall be measured [rad].
-        duration: of the record [s].
-        rate: sampling rate [Hz].
     """
     time = np.arange(round(duration * rate)) / rate
     task = _Task(time, model, alpha, limits, motor_only)

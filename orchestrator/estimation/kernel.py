@@ -5,6 +5,8 @@
 ``jump`` (5,) is how the state changes at once when the teeth touch at flank +1; at flank -1, and when they part, it
 is the opposite. ``x`` (5,) is the state, ``total`` (5, 5) is filled with its Jacobian, ``u`` is the torque [N.m] of a
 sample or (n,), ``alpha`` the half-gap [rad].
+
+In all functions: ``x0``: (5,) first state; ``states``: (n, 5) filled.
 """
 
 import math
@@ -249,12 +251,7 @@ def advance_blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type
 
 @njit_on_disk(nogil=True)
 def run_free(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x0, states):  # type: ignore[no-untyped-def]
-    """Fill ``states`` (n, 5) with the run from ``x0`` under ``u`` (n,), nothing measured.
-
-    Args:
-        x0: (5,) first state.
-        states: (n, 5) filled.
-    """
+    """Fill ``states`` (n, 5) with the run from ``x0`` under ``u`` (n,), nothing measured."""
     x = x0.copy()
     total = np.empty((5, 5))
     end = np.empty(5)
@@ -293,10 +290,8 @@ def run_filter(  # type: ignore[no-untyped-def]
         y: (n, outputs) measured angles [rad].
         variance: (outputs,) of the measurement [rad^2].
         intensity: (2,) of the torque noise at motor and load.
-        x0: (5,) first state.
         errors: (n, outputs) filled.
         variances: (n, outputs) filled.
-        states: (n, 5) filled.
         contacts: (n,) filled, or (0,).
     """
     n, outputs = y.shape

@@ -3,6 +3,8 @@
 The unknowns are one vector: the uncertain linear parameters (in prior standard deviations from nominal), alpha, the
 initial state, and the logarithms of the noise levels. Scores and the Fisher information come from finite differences
 of the innovations; steps are Fisher scoring with Levenberg's damping. See ``docs/estimation.md``.
+
+In all functions: ``theta``: (unknowns,); ``free``: (k,) indices of the free unknowns.
 """
 
 import math
@@ -122,22 +124,14 @@ class Likelihood:
         return 1e-3 if self.soft else START_DAMPING
 
     def parameters(self, theta: Array) -> tuple[float, ...]:
-        """Return the parameter tuple ``p`` of a vector.
-
-        Args:
-            theta: (unknowns,).
-        """
+        """Return the parameter tuple ``p`` of a vector."""
         p = list(self.problem.base)
         for place, name in self._places:
             p[name] = float(theta[place])
         return tuple(p)
 
     def noise(self, theta: Array) -> NoiseLevels:
-        """Return the noise levels of a vector.
-
-        Args:
-            theta: (unknowns,).
-        """
+        """Return the noise levels of a vector."""
         measured = [math.exp(min(max(theta[n], LEAST_LOG_NOISE), LARGEST_LOG_NOISE)) for n in self._noise]
         motor, load = (math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._torque)
         return NoiseLevels((measured[0], measured[-1]), (motor, load))
@@ -160,11 +154,7 @@ class Likelihood:
         return innovations(model, u, outputs, record.step, x0, noise, keep, self.soft, record.u_deviation)
 
     def at(self, theta: Array) -> Point:
-        """Return the likelihood at ``theta``; infinite where the filter diverges.
-
-        Args:
-            theta: (unknowns,).
-        """
+        """Return the likelihood at ``theta``; infinite where the filter diverges."""
         result = self.run(theta)
         deviance = result.deviance
         if not math.isfinite(deviance):
@@ -177,9 +167,6 @@ class Likelihood:
 
         Differences are taken along the columns of a factor of the covariance that the last information implies, a
         hundredth of a standard deviation far: the unknowns themselves may be correlated to one part in 1e9.
-
-        Args:
-            free: (k,) indices of the free unknowns.
         """
         base = point.result
         error, spread, back = self._differences(point, free)
@@ -195,9 +182,6 @@ class Likelihood:
 
     def scores(self, point: Point, free: NDArray[np.int64]) -> Array:
         """Return what each row adds to the gradient (k,) of half the objective, without the prior.
-
-        Args:
-            free: (k,) indices of the free unknowns.
 
         Returns:
             Shape (n, k).
@@ -253,11 +237,7 @@ class Likelihood:
 
 
 def maximise(
-    likelihood: Likelihood,
-    start: Array,
-    free: Sequence[int],
-    iterations: int = 30,
-    tolerance: float = 1e-2,
+    likelihood: Likelihood, start: Array, free: Sequence[int], iterations: int = 30, tolerance: float = 1e-2
 ) -> GapFit:
     """Return the maximum of the likelihood reached from ``start`` over the ``free`` unknowns.
 

@@ -17,8 +17,7 @@ class MaximisationSettings(Settings, frozen=True):
     ] = 2.7
     steps_per_level: Annotated[int, setting("scoring steps at one level of torque noise", ge=1)] = 10
     about_as_good: Annotated[
-        float,
-        setting("objective within which a smaller size is tried too: much noise hides that others are too large"),
+        float, setting("objective within which a smaller size is tried too: much noise hides that others are too large")
     ] = 15.0
     different: Annotated[float, setting("ratio from which two sizes are fitted apart", ge=1)] = 1.5
     flat_information: Annotated[
@@ -39,8 +38,7 @@ class GapVerdictSettings(Settings, frozen=True):
     """Whether a gap is seen, and whether the model explains the record."""
 
     notable_torque_noise: Annotated[
-        float,
-        setting("torque noise over the drive's torque [s^0.5] that a right model never reaches"),
+        float, setting("torque noise over the drive's torque [s^0.5] that a right model never reaches")
     ] = 1e-3
     notable_autocorrelation: Annotated[
         float, share("autocorrelation of one-step errors that such a model never reaches")

@@ -151,9 +151,7 @@ def _noise_below(calibration: Calibration) -> float:
 
 
 def load_or_calibrate(
-    experiment: Experiment,
-    progress: Callable[[str], None] | None = None,
-    settings: MapSettings = DEFAULT_SETTINGS,
+    experiment: Experiment, progress: Callable[[str], None] | None = None, settings: MapSettings = DEFAULT_SETTINGS
 ) -> Calibration:
     """Return the calibration of ``experiment``: the one that comes with these sources, or the user's, or a new one."""
     name = f"{_digest(experiment, settings)}.json"

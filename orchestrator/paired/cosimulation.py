@@ -1,4 +1,7 @@
-"""The paired loops as systems of FMUs: three slaves for one loop, six for both."""
+"""The paired loops as systems of FMUs: three slaves for one loop, six for both.
+
+In all functions: ``alpha``: half-gap [rad]; zero for the loop without a gap.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -67,12 +70,7 @@ def loop_values(experiment: Experiment) -> LoopValues:
     """Return the parameters of a loop without a gap, designed once for each experiment."""
     e, v = experiment, experiment.values
     gains = {f"K[{n}]": gain for n, gain in enumerate(e.regulator().gains, start=1)}
-    controller = gains | {
-        "i": v.i,
-        "compliance": 1.0 / v.k,
-        "u_max": e.torque_limit,
-        "sample_time": e.sample_time,
-    }
+    controller = gains | {"i": v.i, "compliance": 1.0 / v.k, "u_max": e.torque_limit, "sample_time": e.sample_time}
     plant: dict[str, float | str] = {
         "J_m": v.J_m, "J_l": v.J_l, "k": v.k, "c": v.c, "b_m": v.b_m, "b_l": v.b_l, "i": v.i, "tau": v.tau,
         "alpha": 0.0, "backlash_model": "none",
@@ -186,7 +184,6 @@ class LoopSession:
         """Return the run of a loop whose half-gap is ``alpha`` [rad].
 
         Args:
-            alpha: half-gap [rad]; zero for the loop without a gap.
             errors: errors [rad] of both encoders at the communication points; default none.
         """
         values = plant_values(self._experiment, alpha) | dict(start or {})
@@ -198,10 +195,6 @@ class LoopSession:
 
 
 def plant_values(experiment: Experiment, alpha: float) -> dict[str, Value]:
-    """Return the parameters of the plant with a half-gap ``alpha`` [rad].
-
-    Args:
-        alpha: half-gap [rad]; zero for the loop without a gap.
-    """
+    """Return the parameters of the plant with a half-gap ``alpha`` [rad]."""
     model = experiment.backlash_model if alpha else "none"
     return {"plant.alpha": alpha, "plant.backlash_model": model}

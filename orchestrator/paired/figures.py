@@ -1,4 +1,8 @@
-"""Figures of paired runs and sweeps, drawn with matplotlib's object interface (no global state, no display)."""
+"""Figures of paired runs and sweeps, drawn with matplotlib's object interface (no global state, no display).
+
+In all functions: ``actual``: (n,) half-gaps [rad]; ``estimated``: (n,) [rad]; ``noise``: (n,) encoder noise of each
+case [rad].
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -57,11 +61,8 @@ def draw_estimates(
     """Draw estimated against actual half-gap, and below it their relative deviation, each with its interval.
 
     Args:
-        actual: (n,) half-gaps [rad].
-        estimated: (n,) [rad].
         lower: (n,) ends of the intervals [rad].
         upper: (n,) ends of the intervals [rad].
-        noise: (n,) encoder noise of each case [rad].
     """
     figure, axes = _figure(2, (6.6, 7.4))
     ends = np.array([actual.min(), actual.max()])
@@ -107,13 +108,7 @@ def _decimal_ticks(axis: Axis) -> None:
 
 
 def draw_errors(path: Path, actual: Array, estimated: Array, noise: Array, title: str) -> None:
-    """Draw the error in percent against the actual half-gap, one colour for each noise level.
-
-    Args:
-        actual: (n,) half-gaps [rad].
-        estimated: (n,) [rad].
-        noise: (n,) encoder noise of each case [rad].
-    """
+    """Draw the error in percent against the actual half-gap, one colour for each noise level."""
     figure, (axis,) = _figure(1, (7.0, 4.2))
     percent = 100.0 * np.abs(estimated - actual) / actual
     floor = 1e-7

@@ -1,4 +1,7 @@
-"""A plant as a described object: what it measures, where torques act, its speeds and twist, its events, its effects."""
+"""A plant as a described object: what it measures, where torques act, its speeds and twist, its events, its effects.
+
+In all functions: ``p``: the parameters of the analysis, (n,).
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -179,19 +182,11 @@ class Plant:
         return self._index[name]
 
     def value(self, p: Array, name: str) -> float:
-        """Return the value of a parameter.
-
-        Args:
-            p: the parameters of the analysis, (n,).
-        """
+        """Return the value of a parameter."""
         return float(p[self.index(name)])
 
     def ratio(self, p: Array) -> float:
-        """Return the gear ratio: angle of the motor over that of the load; 1.0 without a gear.
-
-        Args:
-            p: the parameters of the analysis, (n,).
-        """
+        """Return the gear ratio: angle of the motor over that of the load; 1.0 without a gear."""
         return self.value(p, self.shaft.ratio) if self.shaft else 1.0
 
     def extend_values(self, values: Sequence[float]) -> Array:
@@ -199,11 +194,7 @@ class Plant:
         return np.array([*values, *(entry.default for entry in self.nuisances)])
 
     def fmu_values(self, p: Array) -> Array:
-        """Return the FMU's parameters (n,) of the ``p`` of the analysis.
-
-        Args:
-            p: the parameters of the analysis, (n,).
-        """
+        """Return the FMU's parameters (n,) of the ``p`` of the analysis."""
         return self.realised(p) if self.realised else np.asarray(p[: len(self.table)])
 
     def follow_requests(self, p: Array, u: Array, h: float) -> tuple[Array, Array]:
@@ -234,9 +225,6 @@ class Plant:
     def jacobian(self, p: Array) -> Array:
         """Return the matrix of the linear plant, by differences of its own (linear) rates.
 
-        Args:
-            p: the parameters of the analysis, (n,).
-
         Returns:
             Shape (states, states), in the order of ``states``.
         """
@@ -250,11 +238,7 @@ class Plant:
         return np.array(columns).T
 
     def request_column(self, p: Array) -> Array:
-        """Return (states,): what a unit request of the drive does to the rates of the linear plant.
-
-        Args:
-            p: the parameters of the analysis, (n,).
-        """
+        """Return (states,): what a unit request of the drive does to the rates of the linear plant."""
         rate = self.stage().rates((0.0,) * STATES, (0.0, 0.0), self._plain(p), 1.0)
         return np.array([rate[s] for s in self.states])
 
@@ -269,7 +253,6 @@ class Plant:
         """Return how many Runge-Kutta steps a sample of ``h`` [s] needs.
 
         Args:
-            p: the parameters of the analysis, (n,).
             h: [s].
         """
         # The drive's lag does not count: it is solved exactly, and moved by nothing else.
@@ -278,9 +261,5 @@ class Plant:
         return max(1, math.ceil(h * float(np.max(np.abs(modes) / np.where(modes.imag == 0.0, FADING, STEP)))))
 
     def fastest(self, p: Array) -> float:
-        """Return the largest rate [1/s] of the linear plant's modes.
-
-        Args:
-            p: the parameters of the analysis, (n,).
-        """
+        """Return the largest rate [1/s] of the linear plant's modes."""
         return float(np.max(np.abs(np.linalg.eigvals(self.jacobian(p)))))

@@ -3,6 +3,8 @@
 Models are those of the thesis with its errata mended: the regulator works on the controllable five-state model, the
 estimator on six states with the load torque as an integrated disturbance. All gains are for a sampled system whose
 input is held over a sample. ``scipy.linalg`` is imported where it is used: worker processes design nothing.
+
+In all functions: ``sample_time`` [s].
 """
 
 from dataclasses import dataclass
@@ -157,9 +159,6 @@ def _uncontrollable_modes(A: Array, B: Array) -> list[complex]:
 def discretise(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
     """Return (A, B) of ``model`` with its input held over ``sample_time`` [s].
 
-    Args:
-        sample_time: [s].
-
     Returns:
         Matrices of shape (states, states) and (states, inputs).
     """
@@ -178,7 +177,6 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
 
     Args:
         Q: (states, states) weights of the states.
-        sample_time: [s].
     """
     from scipy.linalg import eigvals, solve, solve_discrete_are
 
@@ -210,7 +208,6 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
     Args:
         process: intensities of the white noise on each state, 6 values, unit^2/s.
         measurement: variances of both encoders [rad2].
-        sample_time: [s].
     """
     from scipy.linalg import solve_discrete_are
 

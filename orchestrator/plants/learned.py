@@ -38,10 +38,7 @@ class Argument:
 
 def arguments_of(plant: Plant) -> tuple[Argument, ...]:
     """Return what a law of a plant may be a function of."""
-    alone = (
-        Argument(MOTOR_SPEED, "speed", "motor", "rad/s"),
-        Argument(DRIVE, "torque of the drive", "motor", "N.m"),
-    )
+    alone = (Argument(MOTOR_SPEED, "speed", "motor", "rad/s"), Argument(DRIVE, "torque of the drive", "motor", "N.m"))
     if plant.shaft is None:
         return (*alone, Argument(LOAD_ANGLE, "position", "motor", "rad"))
     return (
@@ -54,11 +51,7 @@ def arguments_of(plant: Plant) -> tuple[Argument, ...]:
 
 def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Return the names of the law's parameters."""
-    return (
-        "law.argument",
-        tuple(f"law.knot_{n}" for n in range(KNOTS)),
-        tuple(f"law.value_{n}" for n in range(KNOTS)),
-    )
+    return ("law.argument", tuple(f"law.knot_{n}" for n in range(KNOTS)), tuple(f"law.value_{n}" for n in range(KNOTS)))
 
 
 @cache

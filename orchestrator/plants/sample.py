@@ -66,15 +66,9 @@ def travel_bound(speed: float, acceleration: float, h: float) -> float:
 def _along(x: Any, rate: Any, h: float) -> Any:
     """Return the state after a straight step; the last entry is the memory of the shaft's hysteresis here."""
     return (
-        x[0] + h * rate[0],
-        x[1] + h * rate[1],
-        x[2] + h * rate[2],
-        x[3] + h * rate[3],
-        x[4] + h * rate[4],
-        x[5] + h * rate[5],
-        x[6] + h * rate[6],
-        x[7] + h * rate[7],
-    )
+        x[0] + h * rate[0], x[1] + h * rate[1], x[2] + h * rate[2], x[3] + h * rate[3], x[4] + h * rate[4],
+        x[5] + h * rate[5], x[6] + h * rate[6], x[7] + h * rate[7],
+    )  # fmt: skip
 
 
 @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)

@@ -1,4 +1,7 @@
-"""What the columns of a record must be: finite, in range, moving; and what an encoder's count is."""
+"""What the columns of a record must be: finite, in range, moving; and what an encoder's count is.
+
+In all functions: ``values``: (n,).
+"""
 
 import itertools
 import math
@@ -22,11 +25,7 @@ LARGEST_SHARE_MISSING = 0.2  # of the rows of one column
 
 
 def check_finite(values: Array, name: str, source: str) -> None:
-    """Refuse infinite and huge values; NaN is a missing sample, of which there may be some.
-
-    Args:
-        values: (n,).
-    """
+    """Refuse infinite and huge values; NaN is a missing sample, of which there may be some."""
     bad = np.flatnonzero(np.isinf(values) | (np.abs(values) > LARGEST_VALUE))
     if bad.size:
         more = f" (and {bad.size - 1} more rows)" if bad.size > 1 else ""
@@ -160,9 +159,6 @@ def quantisation_step(values: Array) -> float:
     """Return the encoder count [unit of ``values``] that a column is rounded to, or 0.0 when it is not.
 
     A column counts as rounded when its changes are whole multiples of the smallest one.
-
-    Args:
-        values: (n,).
     """
     unit = _resolution(values)
     if unit <= 0.0 or (np.unique(values).size > 0.9 * values.size and unit < 1e-6):

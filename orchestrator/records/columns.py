@@ -1,4 +1,7 @@
-"""Where a column of a record comes from, and its conversion to SI."""
+"""Where a column of a record comes from, and its conversion to SI.
+
+In all functions: ``values``: (n,), in the unit of the file.
+"""
 
 import math
 from dataclasses import dataclass
@@ -127,11 +130,7 @@ def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, sou
 
 
 def unwrap(values: Array, column: Column) -> Array:
-    """Return values that go on where the file's start again from zero after ``column.modulo``.
-
-    Args:
-        values: (n,), in the unit of the file.
-    """
+    """Return values that go on where the file's start again from zero after ``column.modulo``."""
     if column.modulo is None:
         return values
     good = np.isfinite(values)
@@ -141,11 +140,7 @@ def unwrap(values: Array, column: Column) -> Array:
 
 
 def check_wraps(values: Array, name: str, label: str, source: str) -> None:
-    """Refuse an angle that starts again at an end of its range.
-
-    Args:
-        values: (n,), in the unit of the file.
-    """
+    """Refuse an angle that starts again at an end of its range."""
     steps = np.diff(values[np.isfinite(values)])
     span = float(np.ptp(values[np.isfinite(values)])) if steps.size else 0.0
     if span <= 0.0:

@@ -31,10 +31,7 @@ __all__ = ["COLUMNS", "MINIMUM_ROWS", "RESAMPLING", "Column", "Reading", "Record
 
 
 def read_record(
-    path: Path,
-    columns: Mapping[str, Column] | None = None,
-    further: Sequence[str] = (),
-    reading: Reading | None = None,
+    path: Path, columns: Mapping[str, Column] | None = None, further: Sequence[str] = (), reading: Reading | None = None
 ) -> Record:
     """Read and check a record: CSV of any dialect, Parquet, MDF, MAT or NumPy."""
     reading = reading or Reading()

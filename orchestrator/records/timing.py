@@ -1,4 +1,7 @@
-"""The time of a record: its step, jitter and gaps, and the uniform grid that the methods work on."""
+"""The time of a record: its step, jitter and gaps, and the uniform grid that the methods work on.
+
+In all functions: ``time``: (n,) stamps [s]; ``values``: (n,); NaN: missing.
+"""
 
 import math
 from dataclasses import dataclass
@@ -180,11 +183,7 @@ def _check_grid(
 
 
 def resample_grid(time: Array) -> tuple[Array, float]:
-    """Return the uniform grid (n,) [s] of the same mean rate that non-uniform stamps are resampled to, and its step.
-
-    Args:
-        time: (n,) stamps [s].
-    """
+    """Return the uniform grid (n,) [s] of the same mean rate that non-uniform stamps are resampled to, and its step."""
     steps = np.diff(time)
     step = float(np.mean(steps[steps <= GAP * np.median(steps)]))
     rows = max(math.floor((time[-1] - time[0]) / step + 1e-6) + 1, 2)
@@ -196,8 +195,6 @@ def interpolate(grid: Array, time: Array, values: Array, how: str) -> Array:
 
     Args:
         grid: (m,) [s].
-        time: (n,) stamps [s].
-        values: (n,); NaN: missing.
 
     Returns:
         Shape (m,); NaN within gaps.
@@ -222,10 +219,6 @@ def interpolation_cost(time: Array, values: Array, how: str) -> float:
 
     Every other row is left out and interpolated from its neighbours; at half the distance the error is a quarter
     (linear) or a sixteenth (cubic) of that.
-
-    Args:
-        time: (n,) stamps [s].
-        values: (n,); NaN: missing.
 
     Returns:
         The error, in the unit of ``values``; 0.0 for fewer than eight samples.

@@ -6,34 +6,14 @@ from pathlib import Path
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
-from orchestrator.reporting.pages import (
-    calibrate,
-    check,
-    diagnose,
-    estimate,
-    generic,
-    inspect,
-    simulate,
-    sweep,
-    thesis,
-)
+from orchestrator.reporting.pages import calibrate, check, diagnose, estimate, generic, inspect, simulate, sweep, thesis
 from orchestrator.reporting.source import ResultDocument, load
 from orchestrator.shared.source_tree import import_masters
 
 PAGE = "report.html"
 COMMANDS = (
-    "build",
-    "check",
-    "simulate",
-    "sweep",
-    "inspect",
-    "estimate",
-    "diagnose",
-    "calibrate",
-    "thesis",
-    "ssp",
-    "bench",
-)
+    "build", "check", "simulate", "sweep", "inspect", "estimate", "diagnose", "calibrate", "thesis", "ssp", "bench",
+)  # fmt: skip
 
 
 def _bench_page(source: ResultDocument) -> Report:

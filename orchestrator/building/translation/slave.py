@@ -16,12 +16,7 @@ from orchestrator.errors import FmuError
 
 # Hooks that the runtime calls, with their parameters; a slave may lack those marked False.
 _PLAIN = {"initialise": ("", True), "advance": (", double time, double step", True), "refresh": ("", False)}
-_SAMPLED = {
-    "take_parameters": ("", True),
-    "begin": ("", True),
-    "predict": ("", False),
-    "correct": ("", True),
-}
+_SAMPLED = {"take_parameters": ("", True), "begin": ("", True), "predict": ("", False), "correct": ("", True)}
 # Hooks of a slave with continuous states (it may lack indicators and `begin_exchange`), those that FMI 3.0 wants
 # besides, and those of one that follows its inputs.
 _CONTINUOUS = {"derivatives": "", "indicators": "", "update": ", double time", "observe": "", "begin_exchange": ""}
@@ -68,11 +63,7 @@ def translate_slave(cls: Any, taken: frozenset[str] = frozenset(), fmi: int = 2)
     tables = "\n\n".join((variable_table(cls), _lists(program, owner), _settings(cls, owner, sampled, program), *hooks))
     if pairs is None:
         return TranslatedSlave(
-            f"{program.types()}\n\n{struct}",
-            program.constants(),
-            program.prototypes(),
-            program.definitions(),
-            tables,
+            f"{program.types()}\n\n{struct}", program.constants(), program.prototypes(), program.definitions(), tables
         )
     both = (program, pairs.program)
     return TranslatedSlave(

@@ -1,4 +1,7 @@
-"""Repairs of modelDescription.xml, each for a rule, at the place that its finding names."""
+"""Repairs of modelDescription.xml, each for a rule, at the place that its finding names.
+
+In all functions: ``root``: of modelDescription.xml; it is changed.
+"""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -19,11 +22,7 @@ _BEFORE_UNITS = ("ModelExchange", "CoSimulation", "ScheduledExecution")
 
 
 def mend_description(root: etree._Element, findings: Iterable[Finding]) -> list[str]:
-    """Mend what single findings name. Return what was mended, a line each.
-
-    Args:
-        root: of modelDescription.xml; it is changed.
-    """
+    """Mend what single findings name. Return what was mended, a line each."""
     repairs = []
     for finding in findings:
         if finding.path.startswith(DESCRIPTION) and _DATE in finding.message:
@@ -114,11 +113,7 @@ _GUID = re.compile(rb"\{?[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}\}?
 
 
 def mend_token(root: etree._Element, members: Mapping[str, bytes]) -> list[str]:
-    """Write the token that the binaries hold, where they do not hold the one of the description, and hold one.
-
-    Args:
-        root: of modelDescription.xml; it is changed.
-    """
+    """Write the token that the binaries hold, where they do not hold the one of the description, and hold one."""
     name = "guid" if root.get("guid") is not None else "instantiationToken"
     written = root.get(name, "")
     code = [data for path, data in members.items() if path.startswith(("binaries/", "sources/"))]

@@ -1,4 +1,7 @@
-"""Event mode: what model exchange and co-simulation share, in both versions of FMI."""
+"""Event mode: what model exchange and co-simulation share, in both versions of FMI.
+
+In all functions: ``t``: time [s].
+"""
 
 import math
 from collections.abc import Sequence
@@ -109,22 +112,14 @@ class EventDriver(Driver):
         return float(min(times))
 
     def due(self, t: float) -> list[ProbedClock]:
-        """The clocks that tick at a time.
-
-        Args:
-            t: time [s].
-        """
+        """The clocks that tick at a time."""
         ticks = self.memory.get("ticks", {})
         slack = _SMALL * max(abs(t), self.job.step)
         chosen = [c for c in self.job.clocks if c.reference in ticks and ticks[c.reference] <= t + slack]
         return sorted(chosen, key=lambda c: c.priority)
 
     def settle(self, t: float, when: str, triggered: Sequence[ProbedClock] = ()) -> list[EventOutcome]:
-        """In event mode: tick what is due, then update the discrete states until nothing is left to do.
-
-        Args:
-            t: time [s].
-        """
+        """In event mode: tick what is due, then update the discrete states until nothing is left to do."""
         ticking = [*self.due(t), *triggered]
         outcomes: list[EventOutcome] = []
         for position in range(MOST_ITERATIONS):
@@ -192,11 +187,7 @@ class EventDriver(Driver):
         self.memory["ticks"] = ticks
 
     def update(self, t: float, when: str) -> EventOutcome:
-        """Update the discrete states once.
-
-        Args:
-            t: time [s].
-        """
+        """Update the discrete states once."""
         if self.job.version == "2.0":
             ((again, terminate, nominals, states, defined, time),) = self.call(
                 "NewDiscreteStates", ("event info",), when=when

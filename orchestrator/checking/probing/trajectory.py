@@ -1,4 +1,7 @@
-"""Running an FMU over a grid of time, and what to feed it with."""
+"""Running an FMU over a grid of time, and what to feed it with.
+
+In all functions: ``t``: time [s]; ``phase``: of the signal [rad].
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -71,12 +74,7 @@ class Bench:
             made.free()
 
     def excite(self, driver: Driver, t: float, phase: float = 0.0) -> None:
-        """Set the floating point inputs to a smooth signal inside their bounds, so that something happens.
-
-        Args:
-            t: time [s].
-            phase: of the signal [rad].
-        """
+        """Set the floating point inputs to a smooth signal inside their bounds, so that something happens."""
         inputs = self.job.inputs() if self.excited else []
         for base in dict.fromkeys(v.base for v in inputs):
             group = [v for v in inputs if v.base == base]
@@ -109,9 +107,7 @@ def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0)
     """A sine of two periods over the run around each start value, a tenth of the nominal value high.
 
     Args:
-        t: time [s].
         duration: of the run [s].
-        phase: of the signal [rad].
     """
     low = -math.inf if v.minimum is None else v.minimum
     high = math.inf if v.maximum is None else v.maximum

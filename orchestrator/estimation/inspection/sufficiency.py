@@ -72,10 +72,7 @@ def sufficiency(record: Record, model: Model) -> Sufficiency:
     rows = min(record.size, MOST_ROWS)
     part = record.part(0, rows).fill_missing()
     both = part.theta_l is not None
-    noise = (
-        measurement_noise(part, model, "theta_m"),
-        measurement_noise(part, model, "theta_l") if both else 1.0,
-    )
+    noise = (measurement_noise(part, model, "theta_m"), measurement_noise(part, model, "theta_l") if both else 1.0)
     # The information of a record grows with its length.
     longer = math.sqrt(rows / record.size)
     bounds = []

@@ -19,12 +19,7 @@ from orchestrator.estimation.description import describe
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
-from orchestrator.estimation.problem import (
-    IMPULSE,
-    LEAST_WHERE_INEXACT,
-    make_problem,
-    with_least_torque_noise,
-)
+from orchestrator.estimation.problem import IMPULSE, LEAST_WHERE_INEXACT, make_problem, with_least_torque_noise
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.model_file import Model
@@ -35,15 +30,9 @@ GRID = (0.0, *(3e-4 * 1.28**n for n in range(31)))  # to half a radian
 BOTH_ENCODERS = tuple((w, w) for w in (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-9))
 BLURRED = ((0.1, 1.0), (0.08, 0.7), (0.06, 0.5), (0.045, 0.3), (0.03, 0.2), (0.02, 0.1), (0.01, 0.05))
 MOTOR_ENCODER = (
-    (0.1, 1.0),
-    (0.03, 0.2),
-    (0.01, 0.05),
-    (0.01, 0.03),
-    (3e-3, 1e-2),
-    (1e-3, 3e-3),
-    (3e-4, 2e-3),
+    (0.1, 1.0), (0.03, 0.2), (0.01, 0.05), (0.01, 0.03), (3e-3, 1e-2), (1e-3, 3e-3), (3e-4, 2e-3),
     LEAST_WHERE_INEXACT,
-)
+)  # fmt: skip
 SHARP_STARTS = (2, 1, 0)  # places in MOTOR_ENCODER, tried in turn until the noise at the load gets down
 # Shares of the work that usually lie before a stage.
 BEFORE_FIT, BEFORE_FREE, BEFORE_WHOLE, BEFORE_INTERVAL = 0.1, 0.5, 0.2, 0.7

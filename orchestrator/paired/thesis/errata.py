@@ -28,16 +28,9 @@ from orchestrator.shared.results.thesis import Erratum
 def errata() -> list[Erratum]:
     """Return all errata, computed afresh."""
     return [
-        _erratum_of_damping(),
-        _controllability(),
-        _dual_gain(),
-        _input_sign(),
-        _gear_ratio(),
-        _erratum_of_known_gap(),
-        _mean_square(),
-        _noise_inverse(),
-        _erratum_of_delay(),
-    ]
+        _erratum_of_damping(), _controllability(), _dual_gain(), _input_sign(), _gear_ratio(),
+        _erratum_of_known_gap(), _mean_square(), _noise_inverse(), _erratum_of_delay(),
+    ]  # fmt: skip
 
 
 def _erratum_of_damping() -> Erratum:

@@ -63,16 +63,7 @@ def _facts(results: InspectFound) -> Facts:
 def _channels(results: InspectFound) -> ReportTable:
     names = ("channel", "unit", "least", "most", "rounded to", "noise", "at an end [%]", "missing")
     rows = tuple(
-        (
-            c.name,
-            c.unit,
-            c.least,
-            c.most,
-            c.count or None,
-            c.noise,
-            100.0 * c.saturated,
-            c.missing,
-        )
+        (c.name, c.unit, c.least, c.most, c.count or None, c.noise, 100.0 * c.saturated, c.missing)
         for c in results.channels
     )
     return ReportTable("Channels", tuple(TableColumn(name) for name in names), rows)

@@ -16,16 +16,7 @@ from orchestrator.paired.cosimulation import MACHINE, RECORDED, TWIN
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.live import pair_system, regulator_design
 from orchestrator.plants.known import plants
-from orchestrator.reporting.model import (
-    Control,
-    Live,
-    LiveCurve,
-    LivePlot,
-    LiveRegulator,
-    LiveRun,
-    Section,
-    Text,
-)
+from orchestrator.reporting.model import Control, Live, LiveCurve, LivePlot, LiveRegulator, LiveRun, Section, Text
 from orchestrator.reporting.pages.record import metric_words
 from orchestrator.reporting.source import ResultDocument, numbers
 from orchestrator.shared.results import LiveFound, PairFound

@@ -43,11 +43,7 @@ def _table_4_1(published: Sequence[TableRow], ours: Sequence[float]) -> ReportTa
         TableColumn("our error", "%"),
     )
     rows = tuple(
-        (
-            *(row.alpha, row.S, row.estimate, row.error_percent),
-            own,
-            100.0 * abs(own - row.alpha) / row.alpha,
-        )
+        (*(row.alpha, row.S, row.estimate, row.error_percent), own, 100.0 * abs(own - row.alpha) / row.alpha)
         for row, own in zip(published, ours, strict=True)
     )
     return ReportTable("Table 4.1", columns, rows)

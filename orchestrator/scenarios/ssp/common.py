@@ -1,4 +1,7 @@
-"""Names and schemas that reading and writing share."""
+"""Names and schemas that reading and writing share.
+
+In all functions: ``step``: communication step [s].
+"""
 
 import os
 from collections.abc import Iterator
@@ -121,11 +124,7 @@ def _short_name(name: str) -> str:
 
 
 def add_master(system: etree._Element, step: float, solver_tolerance: float | None) -> None:
-    """Say of a system that it is co-simulated, how it steps, and how exactly its FMUs solve, as OMSimulator reads it.
-
-    Args:
-        step: communication step [s].
-    """
+    """Say of a system that it is co-simulated, how it steps and how exactly its FMUs solve: as OMSimulator reads it."""
     annotations = etree.SubElement(system, tag("ssd", "Annotations"))
     annotation = etree.SubElement(annotations, tag("ssc", "Annotation"), type=OMS)
     information = etree.SubElement(
@@ -142,7 +141,6 @@ def add_experiment(root: etree._Element, start: float, stop: float, step: float)
     Args:
         start: [s].
         stop: [s].
-        step: communication step [s].
     """
     times = {"startTime": repr(start), "stopTime": repr(stop)}
     experiment = etree.SubElement(root, tag("ssd", "DefaultExperiment"), times)
