@@ -82,7 +82,7 @@ def diagnose(
     nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
     workings = Workings(fitted, test_data, result, tuple(models), nominal, base, final)
     if gap is not None:
-        values = model.plant.extended(gap.values.tolist())
+        values = model.plant.extend_values(gap.values.tolist())
         return _report_hidden_gap(replace(workings, final=values), gap, model, settings)
     return _report(workings, model, settings)
 

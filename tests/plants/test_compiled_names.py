@@ -1,4 +1,4 @@
-"""What is asked of a compiled module by its name is there: no linter sees through ``compiled("module").name``."""
+"""What is asked of a compiled module by its name is there: no linter sees through ``compile_module("module").name``."""
 
 import ast
 import importlib
@@ -14,9 +14,9 @@ FILES = [
 
 
 def module_of(node: ast.AST) -> str | None:
-    """The module of a call ``compiled("module")``, else None."""
+    """The module of a call ``compile_module("module")``, else None."""
     match node:
-        case ast.Call(func=ast.Name("compiled"), args=[ast.Constant(str() as name)]):
+        case ast.Call(func=ast.Name("compile_module"), args=[ast.Constant(str() as name)]):
             return name
     return None
 
@@ -52,7 +52,7 @@ def _held(body: list[ast.stmt]) -> dict[str, str]:
 TAKEN = {
     path.relative_to(ROOT).as_posix(): found
     for path in FILES
-    if "compiled(" in (text := path.read_text(encoding="utf-8")) and (found := list(names_of(ast.parse(text))))
+    if "compile_module(" in (text := path.read_text(encoding="utf-8")) and (found := list(names_of(ast.parse(text))))
 }
 
 
@@ -70,6 +70,7 @@ def test_the_places_are_seen() -> None:
     modules = {module for found in TAKEN.values() for module, _, _ in found}
     assert {"equations", "drivetrain", "servo_axis", "port_laws", "drive_request", "closed_loop"} <= modules
     wrong = ast.parse(
-        'def f():\n    s, n = compiled("equations"), 1\n    return s.rates, s.ratez, compiled("drivetrain").x'
+        'def f():\n    s, n = compile_module("equations"), 1\n'
+        '    return s.rates, s.ratez, compile_module("drivetrain").x'
     )
     assert [name for _, name, _ in names_of(wrong)] == ["rates", "ratez", "x"]

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fmu.bank import BANK, CUT, INPUT, OUTPUT, PORT, FmuEffect, PlaceScales
 from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
-from orchestrator.plants.compiled import compiled
-from orchestrator.shared.numba_cache import kept
+from orchestrator.plants.compiled import compile_module
+from orchestrator.shared.numba_cache import njit_on_disk
 
 Array = NDArray[np.float64]
 
-_laws = compiled("port_laws")
+_laws = compile_module("port_laws")
 _built_up: Any = _laws.built_up
 _has_memory: Any = _laws.has_memory
 _distance: Any = _laws.distance_of
@@ -79,7 +79,7 @@ def efforts_along(motion: Motion, law: int, values: tuple[float, ...], step: flo
     return np.asarray(_efforts(law, motion.x, motion.v, motion.a, q, step))
 
 
-@kept()
+@njit_on_disk()
 def _efforts(law, x, v, a, q, h):  # type: ignore[no-untyped-def]
     """Return the effort against the motion in each sample."""
     found, built = np.zeros(len(x)), 0.0

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from orchestrator.master.native_calls import call_reporting_step, call_sized_transfer, call_step, call_transfer
 from orchestrator.master.protocol import ENDED, LEFT_EARLY
-from orchestrator.plants.compiled import compiled
-from orchestrator.shared.numba_cache import kept
+from orchestrator.plants.compiled import compile_module
+from orchestrator.shared.numba_cache import njit_on_disk
 
 Array = NDArray[np.float64]
 
-_laws = compiled("port_laws")
+_laws = compile_module("port_laws")
 _built_up: Any = _laws.built_up
 _has_memory: Any = _laws.has_memory
 _distance: Any = _laws.distance_of
@@ -49,7 +49,7 @@ def delay_input(fine: Array, step: float, delay: float, before: float) -> Array:
     return np.asarray((1.0 - share) * past[1 : n + 1] + share * past[:n])
 
 
-@kept()
+@njit_on_disk()
 def lag_input(fine: Array, step: float, constant: float, before: float) -> Array:
     """Return a signal behind a lag of first order with a time ``constant`` [s]; ``before``: its value until then."""
     out = np.empty_like(fine)
@@ -65,7 +65,7 @@ def lag_input(fine: Array, step: float, constant: float, before: float) -> Array
     return out
 
 
-@kept()
+@njit_on_disk()
 def limit_rate(fine: Array, step: float, rate: float, before: float) -> Array:
     """Return a signal that cannot change by more than ``rate`` a second."""
     out = np.empty_like(fine)
@@ -111,7 +111,7 @@ def delay_output(rows: Array, step: float, delay: float, m: int = 1) -> Array:
     return np.asarray(sum(w * rows[first + i] for i, w in enumerate(weights)))
 
 
-@kept()
+@njit_on_disk()
 def lag_output(rows: Array, step: float, constant: float) -> Array:
     """Return samples of an output behind a lag of first order, straight lines between its samples."""
     out = rows.copy()
@@ -125,7 +125,7 @@ def lag_output(rows: Array, step: float, constant: float) -> Array:
     return out
 
 
-@kept()
+@njit_on_disk()
 def _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, handed):  # type: ignore[no-untyped-def]
     """Add to inputs what other FMUs hand to them, extrapolated."""
     now = np.zeros(len(wires))
@@ -140,7 +140,7 @@ def _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, h
         handed[w] = now[w]
 
 
-@kept()
+@njit_on_disk()
 def _act(k, sent, read, into, outof, ports, laws, last, built, step):  # type: ignore[no-untyped-def]
     """Let the effects at ports and cuts act on the inputs; tell whether all efforts are within their bounds."""
     bounded = True
@@ -176,7 +176,7 @@ def _act(k, sent, read, into, outof, ports, laws, last, built, step):  # type: i
     return bounded
 
 
-@kept()
+@njit_on_disk()
 def _count_warning(status, warned, n, call, k):  # type: ignore[no-untyped-def]
     """Count a warning of a member, and remember the first; return the status."""
     if status == 1:
@@ -186,7 +186,7 @@ def _count_warning(status, warned, n, call, k):  # type: ignore[no-untyped-def]
     return status
 
 
-@kept()
+@njit_on_disk()
 def _transfer(calls, counts, where, n, place):  # type: ignore[no-untyped-def]
     """Set (place 0) or read (1) a member; return the status."""
     function, references, values = calls[n, 1 + 2 * place], where[n, 2 * place], where[n, 2 * place + 1]
@@ -195,7 +195,7 @@ def _transfer(calls, counts, where, n, place):  # type: ignore[no-untyped-def]
     return call_transfer(function, calls[n, 0], references, counts[n, place], values)
 
 
-@kept()
+@njit_on_disk()
 def _advance(calls, reports, n, time, step, k, astray):  # type: ignore[no-untyped-def]
     """Step a member; return the status."""
     if calls[n, 4] == 0:
@@ -218,7 +218,7 @@ def _advance(calls, reports, n, time, step, k, astray):  # type: ignore[no-untyp
     return status
 
 
-@kept()
+@njit_on_disk()
 def _step(calls, counts, where, reports, time, step, k, warned, astray):  # type: ignore[no-untyped-def]
     """Set, step and read all FMUs; return ``(status, call, member)``."""
     for n in range(len(calls)):
@@ -238,7 +238,7 @@ def _step(calls, counts, where, reports, time, step, k, warned, astray):  # type
     return np.int32(0), GET, 0
 
 
-@kept()
+@njit_on_disk()
 def run_loop(  # type: ignore[no-untyped-def]
     calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, laws,
     warned, astray, out,

@@ -13,10 +13,10 @@ from orchestrator.diagnosis.settings import FmuSettings
 from orchestrator.errors import RecordError
 from orchestrator.master.protocol import Unit
 from orchestrator.master.units import conversion, resolve
-from orchestrator.records.arrays import lined, runs_of
-from orchestrator.records.tables import NamedColumns, Wanted, known_unit, read_columns
-from orchestrator.records.timing import interpolated
-from orchestrator.shared.inference.decimation import content_band
+from orchestrator.records.arrays import interpolate_missing, runs_of
+from orchestrator.records.tables import NamedColumns, Wanted, read_columns, read_unit
+from orchestrator.records.timing import interpolate
+from orchestrator.shared.inference.band import content_band
 from orchestrator.shared.inference.noise import residual_noise
 
 Array = NDArray[np.float64]
@@ -143,7 +143,7 @@ def _convert(
         return factor * values
     if text == target.name:
         return values
-    known_unit(text, wanted, label, path)
+    read_unit(text, wanted, label, path)
     ratio = conversion(resolve(text, {}), target)
     if ratio is None:
         raise RecordError(
@@ -188,8 +188,8 @@ def _fill(values: Array, time: Array, entry: ColumnEntry, path: Path) -> tuple[A
         rows = np.maximum.accumulate(np.where(lost, 0, np.arange(values.size)))
         return values[rows], [f"{count} samples of {entry.column} are missing; the one before is held"]
     whole = values.copy()
-    whole[lost] = lined(values)[lost] if lost[-1] else interpolated(time[lost], time, values, "cubic")
-    return whole, [f"{count} samples of {entry.column} are missing and were interpolated"]
+    whole[lost] = interpolate_missing(values)[lost] if lost[-1] else interpolate(time[lost], time, values, "cubic")
+    return whole, [f"{count} samples of {entry.column} are missing and were interpolate"]
 
 
 def _unevenness(time: Array) -> str:

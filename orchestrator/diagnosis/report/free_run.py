@@ -196,7 +196,7 @@ def free_runs(
         runs = [free_run(plant, p, guess, signals, part, history) for guess in guesses]
         return min(runs, key=lambda run: float(np.sum((run.rms / signals.noise) ** 2)))
 
-    return spread(run, list(parts))
+    return map_on_threads(run, list(parts))
 
 
 def start_guesses(plant: Plant, p: Array, signals: RunSignals, row: int) -> list[Array]:

@@ -42,7 +42,7 @@ class HiddenGap:
 def find_hidden_gap(record: Record, model: Model) -> HiddenGap | None:
     """Return the gap that a record of the motor's encoder alone shows."""
     alpha = model.parameters.get("alpha")
-    if model.plant is not PLANT or alpha is None or alpha.value > 0.0 or record.missing:
+    if model.plant is not PLANT or alpha is None or alpha.value > 0.0 or record.n_missing:
         return None
     try:
         found = estimate(record.without_load_encoder(), model)

@@ -127,7 +127,7 @@ def run_signals(record: Record, channels: int, cutoff: float) -> RunSignals:
     Returns:
         The signals; straight lines stand for missing samples.
     """
-    whole = record.filled()
+    whole = record.fill_missing()
     angles = [whole.theta_m, whole.theta_l][:channels]
     noise = [residual_noise(angle, quantisation_step(angle), NOISE_WINDOW) for angle in angles if angle is not None]
     columns = np.column_stack([angle for angle in angles if angle is not None])
