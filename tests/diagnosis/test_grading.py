@@ -21,7 +21,6 @@ BROKEN = {
     "enough share": ({"share": 0.01, "gain": 0.05}, {}),
     "sure size": ({"size_t": 3.5}, {}),
     "size": ({"size_t": 2.0}, {}),
-    "explained": ({}, {"left": 0.7}),
     "inertia seen": ({}, {"inertia_error": 0.5}),
     "same machine": ({}, {"inertia": 3.0}),
     "alone of its kind": ({"foreign_family": True}, {}),

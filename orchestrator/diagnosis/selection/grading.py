@@ -77,10 +77,6 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "grades.likely_size_t", "its size may be zero",
     ),
     GradeRule(
-        "explained", Grade.LIKELY, lambda e, r, s: r.left < s.grades.most_left, "share of the torque that is left",
-        "grades.most_left", "too much of the torque remains unexplained",
-    ),
-    GradeRule(
         "inertia seen", Grade.LIKELY, lambda e, r, s: r.inertia_error < s.grades.inertia_error,
         "relative error of the record's own inertia", "grades.inertia_error",
         "the record does not determine the inertia, so the scale of its torque is unknown",
