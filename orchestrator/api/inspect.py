@@ -89,7 +89,7 @@ class InspectResult(Result):
         """
         from orchestrator.estimation.figures import draw_record
 
-        draw_record(Path(path), self.record, list(self.excitation))
+        draw_record(Path(path), self.record, [(band.low, band.high, band.share) for band in self.excitation])
 
     def verdict(self) -> list[str]:
         """Say whether the record suffices, what it lacks, and what would do better.

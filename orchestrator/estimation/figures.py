@@ -1,6 +1,7 @@
 """Figures of an estimate and of a record, drawn with matplotlib's object interface (no global state, no display)."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,6 @@ from matplotlib.figure import Figure
 
 from orchestrator.estimation.design import Excitation
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.inspection.channels import Band
 from orchestrator.estimation.profile import Profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
@@ -138,8 +138,12 @@ def draw_design(path: Path, time: Array, best: Excitation) -> None:
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
-def draw_record(path: Path, record: Record, bands: list[Band]) -> None:
-    """Draw the channels over time, what is missing left blank, and the excitation by frequency."""
+def draw_record(path: Path, record: Record, bands: Sequence[tuple[float, float, float]]) -> None:
+    """Draw the channels over time, what is missing left blank, and the excitation by frequency.
+
+    Args:
+        bands: lowest and highest frequency [Hz], and share of the torque's power.
+    """
     signals = [("u", "torque [N.m]", record.u)] if record.has_torque else []
     signals.append(("theta_m", "motor [rad]", record.theta_m))
     if record.theta_l is not None:
@@ -151,8 +155,7 @@ def draw_record(path: Path, record: Record, bands: list[Band]) -> None:
         axis.set_ylabel(label)
         axis.grid(alpha=0.3)
     axes[len(signals) - 1].set_xlabel("time [s]")
-    names = [f"{band.low:g}-{band.high:g}" for band in bands]
-    axes[-1].bar(names, [100.0 * band.share for band in bands])
+    axes[-1].bar([f"{low:g}-{high:g}" for low, high, _ in bands], [100.0 * share for *_, share in bands])
     axes[-1].set_ylabel("torque power [%]")
     axes[-1].set_xlabel("band [Hz]")
     figure.savefig(path, dpi=DPI)

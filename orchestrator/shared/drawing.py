@@ -12,7 +12,6 @@ def shade_gap(axis: Any, time: NDArray[np.float64], contact: NDArray[Any], label
     """Shade the spans of time in which no teeth touch, the first with a label.
 
     Args:
-        axis: of matplotlib.
         time: (n,) [s].
         contact: (n,) flank that touches, 0 for none.
     """

@@ -116,7 +116,6 @@ def grammar_faults(root: etree._Element, grammar: str, name_of: Callable[[str], 
     """Return what is wrong with elements and attributes; equal faults of one kind of element are one.
 
     Args:
-        grammar: its lines.
         name_of: what the grammar calls a tag.
     """
     types = _grammar(grammar)

@@ -19,7 +19,7 @@ from orchestrator.records.checks import (
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.nested import DEEPEST
 from orchestrator.records.plausibility import lag_torque, momentum_balance
-from orchestrator.records.timing import grid_of, interpolated, interpolation_cost, resample_grid
+from orchestrator.records.timing import grid_of, interpolate, interpolation_cost, resample_grid
 
 
 def angle_that_moves(blocks: range) -> tuple[np.ndarray, np.ndarray]:
@@ -147,7 +147,7 @@ def test_resampling_leaves_gaps_and_says_what_it_costs() -> None:
     time = 0.125 * np.array([*range(10), *range(20, 30)])
     grid, step = resample_grid(time)
     assert (step, grid.size) == (0.125, 30)
-    values = interpolated(grid, time, 2.0 * time, "linear")
+    values = interpolate(grid, time, 2.0 * time, "linear")
     assert np.flatnonzero(np.isnan(values)).tolist() == list(range(10, 20))
     good = np.isfinite(values)
     np.testing.assert_allclose(values[good], 2.0 * grid[good])

@@ -189,7 +189,7 @@ def _fill(values: Array, time: Array, entry: ColumnEntry, path: Path) -> tuple[A
         return values[rows], [f"{count} samples of {entry.column} are missing; the one before is held"]
     whole = values.copy()
     whole[lost] = interpolate_missing(values)[lost] if lost[-1] else interpolate(time[lost], time, values, "cubic")
-    return whole, [f"{count} samples of {entry.column} are missing and were interpolate"]
+    return whole, [f"{count} samples of {entry.column} are missing and were interpolated"]
 
 
 def _unevenness(time: Array) -> str:

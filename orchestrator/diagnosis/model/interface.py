@@ -115,7 +115,15 @@ class CandidateEffect:
         return self.label.partition("@")[2]
 
     def bounded(self, place: int, value: float) -> float:
-        """Return a value within its bounds."""
+        """Return a value within its bounds.
+
+        Args:
+            place: of the value among those of the effect.
+            value: in the effect's own unit.
+
+        Returns:
+            The value, or the bound that it went beyond.
+        """
         low = self.lower[place] if self.lower else -np.inf
         high = self.upper[place] if self.upper else np.inf
         return min(max(value, low), high)
@@ -130,15 +138,37 @@ class ModelPoint:
 
     @staticmethod
     def nominal(parameters: Sequence["UncertainParameter"]) -> "ModelPoint":
-        """Return the nominal values of parameters, those of a record alone at zero, without effects."""
+        """Return the nominal values of parameters, those of a record alone at zero, without effects.
+
+        Args:
+            parameters: of the model, those of one record last.
+
+        Returns:
+            The point at which every fit without effects begins.
+        """
         return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in parameters))
 
     def with_effect(self, label: str, values: Values) -> "ModelPoint":
-        """Return the point with an effect added or moved."""
+        """Return the point with an effect added or moved.
+
+        Args:
+            label: of the effect, ``name@site``.
+            values: of the effect, in its order.
+
+        Returns:
+            A new point with all other effects as they are.
+        """
         return ModelPoint(self.parameters, {**self.effects, label: values})
 
     def without_effects(self, labels: Sequence[str]) -> "ModelPoint":
-        """Return the point without some effects."""
+        """Return the point without some effects.
+
+        Args:
+            labels: of effects, of which the point may lack some.
+
+        Returns:
+            A new point with all other effects as they are.
+        """
         return ModelPoint(self.parameters, {name: v for name, v in self.effects.items() if name not in labels})
 
 
@@ -237,16 +267,21 @@ class ResidualModel(Protocol):
         """Tell whether a machine can have an effect of such values, and the record can show it.
 
         Args:
+            label: of the effect, ``name@site``.
+            values: of the effect, in its order.
 
         Returns:
             False for sizes that no machine has, or that act nowhere in the record.
         """
 
     def driving(self, point: ModelPoint) -> Array:
-        """Return (channels, n) the signals that residuals are compared with: torques that drive the bodies, or outputs.
+        """Return the signals that residuals are compared with: torques that drive the bodies, or outputs.
 
         Args:
             point: values of the model.
+
+        Returns:
+            Shape (channels, n), in the unit of the residuals.
         """
 
     def inertia_shares(self) -> Mapping[str, float]:
@@ -261,4 +296,7 @@ class ResidualModel(Protocol):
 
         Args:
             spread: of every parameter, as a share.
+
+        Returns:
+            A new model beside the same record.
         """

@@ -12,7 +12,7 @@ from orchestrator.master.system import Instance
 
 
 @dataclass(frozen=True)
-class Described:
+class SspVariable:
     """A variable or an array.
 
     Attributes:
@@ -27,11 +27,10 @@ class Described:
     first: Variable
 
 
-def described(instance: Instance, names: Iterable[str], version: str) -> Iterator[Described]:
+def described(instance: Instance, names: Iterable[str], version: str) -> Iterator[SspVariable]:
     """Yield some variables of an instance as a version of SSP has them, each array once.
 
     Args:
-        names: of variables.
         version: of SSP, "1.0" or "2.0".
     """
     seen = set()
@@ -45,7 +44,7 @@ def described(instance: Instance, names: Iterable[str], version: str) -> Iterato
         first = instance.model.variables[name + element_places(sizes)[0]]
         own = description.access[first.name].kind if version != "1.0" and description.version != "2.0" else None
         # An enumeration travels as an integer: of the tools tried, none reads the name of an item.
-        yield Described(name, own or ("Integer" if first.type == "Enumeration" else first.type), sizes, first)
+        yield SspVariable(name, own or ("Integer" if first.type == "Enumeration" else first.type), sizes, first)
 
 
 def connector_of(instance: Instance, variable: str, version: str) -> tuple[str, str]:
@@ -56,7 +55,7 @@ def connector_of(instance: Instance, variable: str, version: str) -> tuple[str, 
     return name, rest.rstrip("]").replace(",", " ")
 
 
-def whole_values(instance: Instance, entry: Described, values: Mapping[str, Value]) -> list[Value]:
+def whole_values(instance: Instance, entry: SspVariable, values: Mapping[str, Value]) -> list[Value]:
     """Return the values of a variable or of all elements of an array, start values where none are given."""
     found: list[Value] = []
     for place in element_places(entry.sizes):

@@ -243,18 +243,18 @@ def _descriptions(structure: Structure, path: Path, events: bool) -> dict[str, F
     return found
 
 
-def _check_names(structure: Structure, found: Mapping[str, FmuDescription]) -> None:
+def _check_names(structure: Structure, models: Mapping[str, FmuDescription]) -> None:
     """Add connectors and values that components do not have, and clocks that have other intervals there."""
     for owner, variable in structure.kinds:
-        if owner in found and variable not in found[owner].model.variables:
-            text = f"must be a variable of {found[owner].model.name}, but {variable!r} is none"
+        if owner in models and variable not in models[owner].model.variables:
+            text = f"must be a variable of {models[owner].model.name}, but {variable!r} is none"
             structure.problems.append(Problem(f"$.{owner}.Connectors", text, mismatch=True))
     for owner, variable in structure.given:
-        if owner not in found and (owner, variable) not in structure.kinds:
+        if owner not in models and (owner, variable) not in structure.kinds:
             text = f"must name a component's parameter or a system's connector, but {variable!r} of "
             structure.problems.append(Problem("$.ParameterBindings", f"{text}{owner or 'the system'} is none"))
     for (owner, clock), interval in structure.intervals.items():
-        own = found[owner].model.clocks.get(clock) if owner in found else None
+        own = models[owner].model.clocks.get(clock) if owner in models else None
         if own is not None and own.interval != interval:
             text = f"must have the interval of the FMU's clock, {own.interval} s, but has {interval} s"
             structure.problems.append(Problem(f"$.{owner}.Connectors", f"{clock} {text}", mismatch=True))

@@ -22,7 +22,7 @@ from orchestrator.scenarios.ssp.common import (
     new_document,
     tag,
 )
-from orchestrator.scenarios.ssp.described import Described, connector_of, described, whole_values
+from orchestrator.scenarios.ssp.described import SspVariable, connector_of, described, whole_values
 
 
 def write_ssp(path: Path, scenario: Scenario, version: str = "1.0") -> None:
@@ -128,7 +128,7 @@ def _component(elements: etree._Element, system: System, instance: Instance, ver
         )
 
 
-def _type(parent: etree._Element, space: str, entry: Described, values: Sequence[Value] = ()) -> None:
+def _type(parent: etree._Element, space: str, entry: SspVariable, values: Sequence[Value] = ()) -> None:
     element = etree.SubElement(parent, tag(space, entry.type))
     texts = [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
     if entry.sizes and entry.type == "String":
@@ -140,7 +140,7 @@ def _type(parent: etree._Element, space: str, entry: Described, values: Sequence
         element.set("unit", entry.first.unit)
 
 
-def _dimensions(parent: etree._Element, entry: Described) -> None:
+def _dimensions(parent: etree._Element, entry: SspVariable) -> None:
     for size in entry.sizes:
         etree.SubElement(parent, tag("ssc", "Dimension"), size=str(size))
 
