@@ -107,7 +107,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
     searched = workings.search
     record = record_evidence(searched)
-    evidence = [effect_evidence(searched, label) for label in searched.final.labels]
+    evidence = effect_evidence(searched)
     result, evidence = leave_out_possible(searched, evidence, record, settings)
     final = workings.balances[0].physical_values(result.problem.record_points(result.final.point)[0])
     workings = replace(workings, search=result, final=final)

@@ -65,6 +65,8 @@ def test_one_effect_is_named_with_its_size(effects, label, parameter, value, tol
     assert high - low < 0.2 * value
     assert len(effect.block_values[parameter]) >= 10
     assert effect.evidence.motion_share > 0.5
+    assert effect.evidence.test_torque.gain > 0.1
+    assert effect.evidence.test_torque.t > 2.5
     assert not found.test[0].is_worse(0.05, 0.1)
     assert any(label.partition("@")[0].split("_")[0] in line.lower() for line in summarise(found))
 

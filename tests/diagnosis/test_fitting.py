@@ -60,3 +60,14 @@ def test_a_true_effect_gains_and_chance_does_not():
     assert compare(base, true).gain > 0.3
     assert compare(base, chance).gain < 0.01
     assert compare(true, base).t < -3.0
+
+
+def test_blocks_after_a_share_are_of_the_rows_behind_it(fitted):
+    problem, _ = fitted
+    (whitening,), (model,) = problem.whitenings, problem.models
+    blocks, places = problem.blocks_after([0.85])
+    late = whitening.rows >= 0.85 * model.size
+    np.testing.assert_array_equal(places, np.flatnonzero(np.tile(late, len(whitening.active))))
+    assert 0 < places.size < 0.2 * whitening.size
+    np.testing.assert_array_equal(np.unique(blocks), np.arange(blocks.max() + 1))
+    assert blocks.max() >= 3

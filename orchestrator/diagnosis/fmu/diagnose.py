@@ -125,7 +125,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
     searched, problem = workings.search, workings.problem
     record = record_evidence(searched)
-    evidence = [effect_evidence(searched, label) for label in searched.final.labels]
+    evidence = effect_evidence(searched)
     found, evidence = leave_out_possible(searched, evidence, record, settings)
     workings = replace(workings, search=found)
     test = misfit_on_test_data(workings)

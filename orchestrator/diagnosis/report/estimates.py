@@ -23,6 +23,10 @@ from orchestrator.plants.description import Plant
 from orchestrator.records.model_file import Model
 
 Array = NDArray[np.float64]
+CARRIERS = ("N.m", "kg.m2")  # begin the units of values that scale with the torque
+LEAST_CARRIERS = 4  # values that must agree
+LIKELY_GAIN = 0.1  # standard deviation of a gain before a record is seen
+SURE = 4.0  # half the squared distance from one, in standard deviations, from which a gain is reported
 
 
 def parameter_estimates(problem: FitProblem, fitted: FittedModel, level: float) -> dict[str, ParameterEstimate]:
@@ -165,12 +169,6 @@ def add_test_evidence(
         return replace(effect, motion_share=share if math.isfinite(final) else math.nan, test_torque=compared(without))
 
     return list(map(tested, evidence))
-
-
-CARRIERS = ("N.m", "kg.m2")  # begin the units of values that scale with the torque
-LEAST_CARRIERS = 4  # values that must agree
-LIKELY_GAIN = 0.1  # standard deviation of a gain before a record is seen
-SURE = 4.0  # half the squared distance from one, in standard deviations, from which a gain is reported
 
 
 def find_drive_gain(model: Model, values: dict[str, float], level_width: float) -> ValueEstimate | None:

@@ -23,6 +23,7 @@ from orchestrator.records.record import Record
 
 Array = NDArray[np.float64]
 LEAST_TORQUE_ROWS = 200
+LEAST_TRAVEL = 20.0  # in deviations of the noise, from which a test part moves
 LEAST_TEST_ROWS = 16  # whitened, about independent: four in each of four blocks
 
 
@@ -53,12 +54,24 @@ def misfit_on_test_data(workings: Workings, model: Model, settings: DiagnosisSet
 
 
 def _misfit(workings: Workings, model: Model, record: Record, first: int, settings: DiagnosisSettings) -> TestMisfit:
-    models = (workings.nominal, workings.base, workings.final)
-    unit, signals = "m" if in_metres(model) else "rad", signals_for_runs(record, workings.balances[0])
-    found = motion_misfit(model.plant, models, signals, first, record.source, unit, settings.report)
-    if found.still:
-        return found
-    return replace(found, torque=torque_left(record.part(first, record.size), workings, model, settings))
+    plant, signals = model.plant, signals_for_runs(record, workings.balances[0])
+    nominal, refitted, final = (
+        run_misfit(plant, p, signals, first, settings.report) for p in (workings.nominal, workings.base, workings.final)
+    )
+    parts = run_parts(first, signals.size, settings.report)
+    variance = np.mean([np.var(signals.angles[part], axis=0) for part in parts], axis=0)
+    explained = 1.0 - final**2 / np.maximum(variance, 1e-300)
+    unit = "m" if in_metres(model) else "rad"
+    rows = tuple(
+        SignalMisfit(
+            name, unit, float(signals.noise[n]), float(nominal[n]), float(refitted[n]), float(final[n]),
+            float(explained[n]),
+        )
+        for n, name in enumerate(plant.encoders[: signals.channels])
+    )  # fmt: skip
+    still = bool(np.all(np.ptp(signals.angles[first:], axis=0) < LEAST_TRAVEL * signals.noise))
+    torque = () if still else torque_left(record.part(first, record.size), workings, model, settings)
+    return TestMisfit(record.source, signals.size - first, rows, torque, still)
 
 
 def misfit_on_record(diagnosis: Diagnosis, record: Record) -> TestMisfit:
@@ -96,22 +109,23 @@ def torque_comparison(
         A model's values -> how much less the final one leaves, block by block; None: there are too few rows to tell.
     """
     records = [
-        (balance_of(record, model, settings), first / record.size)
-        for (record, first), misfit in zip(open_test_data(workings.test_data), test, strict=True)
+        (number, balance_of(record, model, settings), first / record.size)
+        for number, ((record, first), misfit) in enumerate(zip(open_test_data(workings.test_data), test, strict=True))
         if not misfit.still
     ]
     if not records:
         return lambda point: None
-    models, fitted = zip(*records, strict=True)
+    _, models, fitted = zip(*records, strict=True)
     found = workings.search
     problem = replace(found.problem, models=models)
 
     def seen(point: ModelPoint) -> ModelPoint:
+        own, shared = found.problem.record_points(point), len(problem.shared)
         local: list[float] = []
-        for balance, own, share in zip(models, found.problem.record_points(point), fitted, strict=False):
-            count = sum(entry.local for entry in balance.parameters)
-            local += own.parameters[len(own.parameters) - count :] if share else (0.0,) * count
-        return ModelPoint((*point.parameters[: len(problem.shared)], *local), point.effects)
+        for number, balance, share in records:  # of a record that was not fitted nothing is known
+            unknown = (0.0,) * (len(balance.parameters) - shared)
+            local += own[number].parameters[shared:] if share else unknown
+        return ModelPoint((*point.parameters[:shared], *local), point.effects)
 
     problem = problem.reweighted(seen(found.final.point))
     blocks, rows = problem.blocks_after(fitted)
@@ -121,35 +135,7 @@ def torque_comparison(
     return lambda point: compare_residuals(problem.whitened([seen(point)])[0][rows], final, blocks)
 
 
-LEAST_TRAVEL = 20.0  # in deviations of the noise, from which a test part moves
-
-
 def run_misfit(plant: Plant, p: Array, signals: RunSignals, first: int, settings: ReportSettings) -> Array:
     """Return the rms (channels,) of free runs over the test part of a record against the measurement."""
     runs = free_runs(plant, p, signals, run_parts(first, signals.size, settings))
     return np.asarray(np.sqrt(np.mean([run.rms**2 for run in runs], axis=0)))
-
-
-def motion_misfit(
-    plant: Plant, models: Sequence[Array], signals: RunSignals, first: int, source: str, unit: str,
-    settings: ReportSettings,
-) -> TestMisfit:  # fmt: skip
-    """Return the misfit of the nominal, the re-fitted and the final model on the test part of a record."""
-    rms = [run_misfit(plant, p, signals, first, settings) for p in models]
-    parts = run_parts(first, signals.size, settings)
-    variance = np.mean([np.var(signals.angles[part], axis=0) for part in parts], axis=0)
-    explained = 1.0 - rms[-1] ** 2 / np.maximum(variance, 1e-300)
-    rows = tuple(
-        SignalMisfit(
-            name,
-            unit,
-            float(signals.noise[n]),
-            float(rms[0][n]),
-            float(rms[1][n]),
-            float(rms[2][n]),
-            float(explained[n]),
-        )
-        for n, name in enumerate(plant.encoders[: signals.channels])
-    )
-    travel = np.ptp(signals.angles[first:], axis=0)
-    return TestMisfit(source, signals.size - first, rows, still=bool(np.all(travel < LEAST_TRAVEL * signals.noise)))

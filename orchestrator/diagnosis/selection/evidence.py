@@ -29,23 +29,24 @@ def record_evidence(result: SearchResult) -> RecordEvidence:
     return RecordEvidence(float(left.max()), inertia, error, spread)
 
 
-def effect_evidence(result: SearchResult, label: str) -> EffectEvidence:
-    """Return what speaks for one effect of the final model."""
+def effect_evidence(result: SearchResult) -> list[EffectEvidence]:
+    """Return what speaks for each effect of the final model, in the model's order."""
+    missing = [missing_torque(result.problem, fitted.point) for fitted in (result.base, result.final)]
+    return [_effect_evidence(result, label, *missing) for label in result.final.labels]
+
+
+def _effect_evidence(result: SearchResult, label: str, base: float, left: float) -> EffectEvidence:
     problem, final, review = result.problem, result.final, result.reviews[label]
     effect = problem.effects[label]
     step = next((step for step in result.steps if step.taken == label), review)
     leaving, entry = review.entry, step.entry
     assert leaving is not None
     assert entry is not None
-    base = missing_torque(problem, result.base.point)
-    shares = [
-        (missing_torque(problem, before.point) - missing_torque(problem, after.point)) / base
-        for before, after in ((review.before, final), (step.before, entry.fitted))
-    ]
+    without, before, after = (missing_torque(problem, one.point) for one in (review.before, step.before, entry.fitted))
     kinds = {problem.effects[other].kind for other in review.family}
     return EffectEvidence(
         label, effect.kind, max(leaving.comparison.t, entry.comparison.t),
-        max(leaving.comparison.gain, entry.comparison.gain), float(max(shares)),
+        max(leaving.comparison.gain, entry.comparison.gain), max(without - left, before - after) / base,
         size_over_error(problem, final, label), review.family, bool(kinds - {effect.kind}),
         problem.is_possible(label, final.point.effects[label]),
     )  # fmt: skip

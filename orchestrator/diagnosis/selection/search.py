@@ -1,8 +1,9 @@
 """The search: forward by the cross-validated score with one look-ahead, then backward.
 
 In each step every effect is screened, the most promising are fitted in full, and the best is taken if it gains more
-than the settings ask for. Effects that are not told apart from it, block by block, are its family; of those of its kind
-the one with the fewest values enters. Then each earlier effect that no longer pays is taken out.
+than the settings ask for. Of the effects over which it gains nothing the one with the fewest values enters. Then each
+earlier effect that no longer pays is taken out. At the end each effect of the model is compared so once more: what
+does as well in its place is its family.
 """
 
 from collections.abc import Callable, Sequence
@@ -166,9 +167,9 @@ class _Search:
         rising: list[tuple[float, FitProblem, list[TriedEffect]]] = []
         for one in tried[: self.settings.look_ahead]:
             own, fitted = settle(problem, one.fitted)
-            _, result = self._compared(own, model, [replace(one, fitted=fitted)])
-            if result[0].comparison.gain > one.comparison.gain:
-                rising.append((result[0].comparison.gain, own, result))
+            _, again = self._compared(own, model, [replace(one, fitted=fitted)])
+            if again[0].comparison.gain > one.comparison.gain:
+                rising.append((again[0].comparison.gain, own, again))
         if not rising:
             return None
         gain, own, leading = max(rising, key=lambda entry: entry[0])
