@@ -12,7 +12,6 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = [ROOT / "orchestrator", ROOT / "pyfmu_sources"]
 RULES = (ROOT / "docs" / "naming.md").read_text(encoding="utf-8").partition("## Words that are not names")[2]
 NO_NAMES = frozenset(re.search(r"```text\n(.+?)\n```", RULES, re.DOTALL)[1].split())
-TO_COME = ("fmi", "master")  # rooms under work
 LARGEST_SHARE = 0.06  # of participles among the names of functions
 
 
@@ -36,8 +35,6 @@ def test_words_that_are_not_names_are_read_from_the_page():
 
 @pytest.mark.parametrize("room", sorted(path.name for path in (ROOT / "orchestrator").iterdir() if path.is_dir()))
 def test_names_are_no_riddles(room):
-    if room in TO_COME:
-        pytest.skip("still to be renamed")
     assert not [name for path, tree in files_of([ROOT / "orchestrator" / room]) for name in riddles(path, tree)]
 
 

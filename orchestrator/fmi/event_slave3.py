@@ -54,8 +54,8 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
         self._halves = False
         self._halved: tuple[float, int] = (math.nan, 0)  # s, count
 
-    def _needed(self) -> list[str]:
-        needed = [*super()._needed(), "EnterEventMode", "EnterStepMode", "UpdateDiscreteStates"]
+    def _necessary_functions(self) -> list[str]:
+        needed = [*super()._necessary_functions(), "EnterEventMode", "EnterStepMode", "UpdateDiscreteStates"]
         if self.model.clocks or self._description.events.timed:
             needed.append("SetClock")
         return needed
@@ -98,7 +98,7 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
         length = step
         while True:
             try:
-                return self._stepped(time, length)
+                return self._advance(time, length)
             except StepDiscardedError:
                 if not self._halves or length < SMALLEST * step:
                     raise
@@ -106,7 +106,7 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
                 first, count = self._halved
                 self._halved = (time if not count else first, count + 1)
 
-    def _stepped(self, time: float, step: float) -> StepOutcome:
+    def _advance(self, time: float, step: float) -> StepOutcome:
         end = self._last.value = time + step
         status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
         self._reached = time
@@ -274,7 +274,7 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
     # Saved states --------------------------------------------------------------------------------------------------
 
     def get_state(self) -> Any:
-        return _State(super().get_state(), self._next_event, self._timed.saved(), self._reached)
+        return _State(super().get_state(), self._next_event, self._timed.state(), self._reached)
 
     def set_state(self, state: Any) -> None:
         super().set_state(state.handle)

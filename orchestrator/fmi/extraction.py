@@ -31,7 +31,7 @@ def content_hash(path: Path) -> str:
     return digest.hexdigest()
 
 
-def extracted(path: Path) -> Path:
+def extract_fmu(path: Path) -> Path:
     """Return the folder in which the FMU at ``path`` is unpacked; the same for the same content within a process."""
     if path.is_dir():
         return path

@@ -13,7 +13,7 @@ from orchestrator.fmi.slave2 import Fmu2Slave
 from orchestrator.fmi.slave3 import Fmu3Slave
 from orchestrator.master.protocol import Value
 from orchestrator.master.system import Instance, Quantity, Start
-from orchestrator.master.values import typed_value
+from orchestrator.master.values import coerce_value
 
 
 def make_slave(name: str, path: Path, description: FmuDescription | None = None) -> FmuSlave:
@@ -75,7 +75,7 @@ def read_configured(path: Path, start: Start, events: bool) -> tuple[FmuDescript
         value, text = (
             (None, "must be without a unit, but has one")
             if isinstance(raw, Quantity)
-            else typed_value(description.model.variables[name], raw)
+            else coerce_value(description.model.variables[name], raw)
         )
         if value is None:
             raise FmuError(f"its structural parameter {name} {text}")

@@ -11,14 +11,11 @@ _RELEASE: Any = getattr(_ctypes, "FreeLibrary" if sys.platform == "win32" else "
 
 
 def load_library(path: Path, python: bool) -> Any:
-    """Return a shared library.
+    """Load a shared library and return it.
 
     Args:
         path: of it. Libraries beside it are found where the system looks in the current directory.
         python: it runs Python: call it with the interpreter's lock held, which it would take back at once.
-
-    Returns:
-        The library.
 
     Raises:
         OSError: it cannot be loaded.

@@ -66,7 +66,7 @@ def _log(environment: int | None, _instance: bytes, status: int, _category: byte
 
 
 @cache
-def _shared() -> tuple[Any, ...]:
+def _callbacks() -> tuple[Any, ...]:
     """Return the one set of callbacks, never released: what is called and what keeps it alive."""
     from fmpy import calloc, fmi2, free
 
@@ -83,11 +83,11 @@ def _shared() -> tuple[Any, ...]:
     return callbacks, ours, allocate, release
 
 
-def logging_callbacks(inbox: Inbox) -> Any:
+def make_callbacks(inbox: Inbox) -> Any:
     """Return callbacks for one instance, which put its warnings and worse into ``inbox``."""
     from fmpy import fmi2
 
-    shared = _shared()[0]
+    shared = _callbacks()[0]
     callbacks = fmi2.fmi2CallbackFunctions()
     ctypes.memmove(ctypes.byref(callbacks), ctypes.byref(shared), ctypes.sizeof(shared))
     number = next(_numbers)

@@ -201,11 +201,11 @@ def _description3(
         structural=frozenset(found.structural),
         configured=configured,
         resized=frozenset(found.resized),
-        left_out=_left_out(found.binaries, left_out),
+        left_out=_note_on_unusable(found.binaries, left_out),
     )
 
 
-def _left_out(binaries: Sequence[str], clocks: Sequence[str]) -> str:
+def _note_on_unusable(binaries: Sequence[str], clocks: Sequence[str]) -> str:
     texts = [f"{kind} {clock_names(names)}" for kind, names in (("Binary", binaries), ("clocks", clocks)) if names]
     return f"variables that nothing here can use are left as they are: {'; '.join(texts)}" if texts else ""
 

@@ -24,14 +24,14 @@ from orchestrator.master.protocol import (
     Transfer,
     Value,
 )
-from orchestrator.master.result import RunRemark, claimed_remarks
+from orchestrator.master.result import RunRemark, read_remarks
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import Limits
 
 DONE, DISCARDED, ENDED = range(3)
 
 
-def opened(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, list[Any]]], Any]:
+def open_instance(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, list[Any]]], Any]:
     """Make the instance in the child, and return what calls it.
 
     Returns:
@@ -69,16 +69,16 @@ class _Host:
         return buffer
 
     def do_step(self, time: float, step: float) -> list[Any]:
-        return self._judged(lambda: self._slave.do_step(time, step))
+        return self._outcome_of(lambda: self._slave.do_step(time, step))
 
     def step(self, time: float, step: float) -> list[Any]:
         assert isinstance(self._slave, EventFmuSlave)
         slave, found = self._slave, [StepOutcome(time, False)]
-        said = self._judged(lambda: found.append(slave.step(time, step)))
+        said = self._outcome_of(lambda: found.append(slave.step(time, step)))
         return [said, found[-1].reached, found[-1].event, found[-1].ends_run]
 
     @staticmethod
-    def _judged(advance: Callable[[], None]) -> list[Any]:
+    def _outcome_of(advance: Callable[[], None]) -> list[Any]:
         """Do a step; return how it went: a code, what was said, when, and how the run is to end."""
         try:
             advance()
@@ -118,7 +118,7 @@ class RemoteSlave(Slave):
     def __init__(self, name: str, folder: Path, description: FmuDescription, limits: Limits, walls: bool) -> None:
         self.name = name
         self.model: ModelInterface = description.model
-        entry = "orchestrator.fmi.remote:opened"
+        entry = "orchestrator.fmi.remote:open_instance"
         self._jail = Jail(entry, (name, folder, description), read=[folder], limits=limits, walls=walls)
         try:
             self._jail.start(limits.time)
@@ -190,7 +190,7 @@ class RemoteSlave(Slave):
 
     def take_remarks(self) -> list[RunRemark]:
         """Return warnings and shortened steps since this was last asked."""
-        return list(claimed_remarks(self._ask("remarks")))
+        return list(read_remarks(self._ask("remarks")))
 
     def shorten_steps(self) -> bool:
         """Do steps that the FMU discards in shorter ones, from the next run on.

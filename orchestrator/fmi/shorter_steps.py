@@ -40,7 +40,7 @@ class ShorterSteps:
         end, now, length = time + step, time, step
         while now < end:
             last = end - now <= 1.01 * length
-            reached = self._tried(now, end - now if last else length)
+            reached = self._try_step(now, end - now if last else length)
             if reached is None:
                 now = end if last else now + length
                 continue
@@ -57,7 +57,7 @@ class ShorterSteps:
         done = f"done in shorter steps, the least of {self._least:g} s"
         return [RunRemark(self._slave.name, f"{text}: {done}", count)] if count else []
 
-    def _tried(self, time: float, step: float) -> float | None:
+    def _try_step(self, time: float, step: float) -> float | None:
         """Try a step; return where the slave stands when it was discarded, else None."""
         slave = self._slave
         state = slave.get_state() if slave.model.can_save_state else None

@@ -109,7 +109,7 @@ class FmuSlave(Slave):
         """The newest messages that it logged beside OK."""
         return self._inbox.messages
 
-    def _said(self) -> str:
+    def _last_message(self) -> str:
         return f": {self.messages[-1]}" if self.messages else ""
 
     def _check(self, status: int, what: str) -> None:
@@ -120,10 +120,10 @@ class FmuSlave(Slave):
                 self._inbox.warn(f"{what}{moment}")
             return
         self._worst = max(self._worst, status if status < PENDING else FATAL)
-        if "KeyboardInterrupt" in self._said():  # Ctrl-C reached the Python inside the FMU
+        if "KeyboardInterrupt" in self._last_message():  # Ctrl-C reached the Python inside the FMU
             raise KeyboardInterrupt
         label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-        text = f"{self.name}: {what}{moment} returned {label}{self._said()}"
+        text = f"{self.name}: {what}{moment} returned {label}{self._last_message()}"
         if status == PENDING:
             raise SlaveError(f"{text}: it must do its steps while it is called, but goes on by itself")
         if status == DISCARD:
@@ -201,9 +201,9 @@ class FmuSlave(Slave):
             batch.complete()
             status = batch.call()
             if status:
-                self._check(status, self._naming(batch, names))
+                self._check(status, self._describe_transfer(batch, names))
 
-    def _naming(self, batch: VariableBatch, names: Sequence[str]) -> str:
+    def _describe_transfer(self, batch: VariableBatch, names: Sequence[str]) -> str:
         some = ", ".join(names[p] for p in batch.positions[:3])
         return f"{batch.function} of {some}" + (", ..." if len(batch.positions) > 3 else "")
 
@@ -212,7 +212,7 @@ class FmuSlave(Slave):
         self._alive(f"{self.PREFIX}Get")
         found: list[Value] = [0.0] * len(names)
         for batch in self._functions.batches(self._accesses(names), "Get"):
-            self._check(batch.call(), self._naming(batch, names))
+            self._check(batch.call(), self._describe_transfer(batch, names))
             for position, place in zip(batch.positions, batch.places, strict=True):
                 kind, value = self.model.variables[names[position]].type, batch.values[place]
                 decoded = (value or b"").decode("utf-8", "replace") if kind == "String" else value
@@ -337,7 +337,7 @@ class FmuSlave(Slave):
             return None
         return native_calls(self._functions, self._accesses(inputs), self._accesses(outputs), self._description.python)
 
-    def warned(self, count: int, function: str, time: float) -> None:
+    def note_warnings(self, count: int, function: str, time: float) -> None:
         """Take warnings that the compiled loop met.
 
         Args:
@@ -345,7 +345,7 @@ class FmuSlave(Slave):
         """
         self._inbox.warn(f"{function} at t = {time:g} s", count)
 
-    def failed(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
+    def raise_for_status(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
         """Raise for a status that the compiled loop met.
 
         Args:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import FmuError
-from orchestrator.fmi.extraction import extracted, library_of
+from orchestrator.fmi.extraction import extract_fmu, library_of
 from orchestrator.fmi.farewell import ends_cleanly
-from orchestrator.fmi.messages import OK, logging_callbacks
+from orchestrator.fmi.messages import OK, make_callbacks
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.protocol import Value
@@ -33,7 +33,7 @@ class Fmu2Slave(FmuSlave):
     def _instantiate(self) -> tuple[Any, ctypes.c_void_p]:
         from fmpy.fmi2 import FMU2Slave
 
-        folder = extracted(self.path)
+        folder = extract_fmu(self.path)
         identifier, python = self._description.identifier, self._description.python
         library = library_of(self.name, self.path, folder, identifier, "2.0")
         try:
@@ -47,9 +47,9 @@ class Fmu2Slave(FmuSlave):
         except Exception as error:  # FMPy raises bare Exception, ctypes AttributeError
             raise FmuError(f"{self.name}: the binary of {self.path} cannot be loaded: {error}") from None
         try:
-            self._fmu.instantiate(callbacks=logging_callbacks(self._inbox), loggingOn=True)
+            self._fmu.instantiate(callbacks=make_callbacks(self._inbox), loggingOn=True)
         except Exception:
-            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._said()}") from None
+            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._last_message()}") from None
         if python:
             ends_cleanly(library.parent)
         loader = ctypes.PyDLL if python else ctypes.CDLL

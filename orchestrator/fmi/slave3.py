@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import FmuError, SlaveError
-from orchestrator.fmi.extraction import extracted, library_of
+from orchestrator.fmi.extraction import extract_fmu, library_of
 from orchestrator.fmi.farewell import ends_cleanly
 from orchestrator.fmi.libraries import free_library, load_library
 from orchestrator.fmi.messages import ERROR, log_message_callback
@@ -51,7 +51,7 @@ class Fmu3Slave(FmuSlave):
         self._step.restype = ctypes.c_int
         self._configure()
 
-    def _needed(self) -> list[str]:
+    def _necessary_functions(self) -> list[str]:
         """Return the functions without which the FMU cannot be run, without their prefix."""
         kinds = sorted({access.kind for access in self._description.access.values()})
         transfers = [f"{direction}{kind}" for direction in ("Set", "Get") for kind in kinds]
@@ -67,7 +67,7 @@ class Fmu3Slave(FmuSlave):
             self._call("ExitConfigurationMode")
 
     def _instantiate(self) -> tuple[Any, c_void_p]:
-        folder, description = extracted(self.path), self._description
+        folder, description = extract_fmu(self.path), self._description
         path = library_of(self.name, self.path, folder, description.identifier, description.version)
         try:
             library = load_library(path, description.python)
@@ -75,7 +75,7 @@ class Fmu3Slave(FmuSlave):
                 ends_cleanly(path.parent)
         except OSError as error:
             raise FmuError(f"{self.name}: the binary of {self.path} cannot be loaded: {error}") from None
-        lacking = [name for name in self._needed() if not hasattr(library, f"fmi3{name}")]
+        lacking = [name for name in self._necessary_functions() if not hasattr(library, f"fmi3{name}")]
         if lacking:
             raise FmuError(f"{self.name}: the binary of {self.path} must have fmi3{lacking[0]}, but has not")
         library.fmi3InstantiateCoSimulation.restype = c_void_p
@@ -99,7 +99,7 @@ class Fmu3Slave(FmuSlave):
         )
         if not component:
             hint = " (`events = false` runs it without event mode)" if self.model.has_events else ""
-            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._said()}{hint}")
+            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._last_message()}{hint}")
         return library, c_void_p(component)
 
     def _intermediate(self) -> tuple[Any, Any]:
@@ -144,7 +144,7 @@ class Fmu3Slave(FmuSlave):
     def _refuse_end(self, ends: bool, time: float, reached: float) -> None:
         """Raise for a step from ``time`` to ``reached`` [s] that did not end as asked, though all was well."""
         if ends and math.isfinite(reached):
-            text = f"{self.name}: fmi3DoStep at t = {time:g} s asked for the end of the run{self._said()}"
+            text = f"{self.name}: fmi3DoStep at t = {time:g} s asked for the end of the run{self._last_message()}"
             raise RunEndedError(text, self.name, reached, TERMINATES)
         text = "must do a whole step, for no events are taken, but returned early, with an event or at no time"
         self._worst = max(self._worst, ERROR)
@@ -176,8 +176,8 @@ class Fmu3Slave(FmuSlave):
         self._rolls_back = False
         self._configure()
 
-    def failed(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
+    def raise_for_status(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
         if status >= ENDED:
             self._reached = time
             self._refuse_end(status == ENDED, time, reached)
-        super().failed(status, function, time, reached)
+        super().raise_for_status(status, function, time, reached)

@@ -127,10 +127,10 @@ def join_terminals(first: TerminalEnd, second: TerminalEnd) -> tuple[list[Joint]
             return [], [f"must have as many members in both terminals, but have {counts}"]
         pairs = list(zip(a.members, b.members, strict=True))
     else:
-        pairs, problems = _matched(first, second)
+        pairs, problems = _match_members(first, second)
     joints: list[Joint] = []
     for one, other in pairs:
-        made, wrong = _joined(first, one, second, other)
+        made, wrong = _join_members(first, one, second, other)
         joints += made
         problems += wrong
     for name in sorted(a.parts.keys() & b.parts.keys()):
@@ -144,7 +144,7 @@ def join_terminals(first: TerminalEnd, second: TerminalEnd) -> tuple[list[Joint]
     return joints, problems
 
 
-def _matched(first: TerminalEnd, second: TerminalEnd) -> tuple[list[tuple[Member, Member]], list[str]]:
+def _match_members(first: TerminalEnd, second: TerminalEnd) -> tuple[list[tuple[Member, Member]], list[str]]:
     """Return the members that have the same name, and those that a plug lacks in the other terminal."""
     problems = []
     for end, other in ((first, second), (second, first)):
@@ -160,7 +160,9 @@ def _matched(first: TerminalEnd, second: TerminalEnd) -> tuple[list[tuple[Member
     return [(m, by_name[m.name]) for m in first.terminal.members if m.name in by_name], problems
 
 
-def _joined(first: TerminalEnd, left: Member, second: TerminalEnd, right: Member) -> tuple[list[Joint], list[str]]:
+def _join_members(
+    first: TerminalEnd, left: Member, second: TerminalEnd, right: Member
+) -> tuple[list[Joint], list[str]]:
     """Return the connections of two members, several where they are arrays, and what is wrong with them."""
     name = left.name or left.variable
     ends = [(first, left), (second, right)]

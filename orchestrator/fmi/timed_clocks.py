@@ -88,7 +88,7 @@ class TimedClocks:
                 if qualifier == CHANGED:
                     self._ticks[reference] = _Tick(time + interval, interval)
 
-    def saved(self) -> dict[int, object]:
+    def state(self) -> dict[int, object]:
         """Return what belongs to a saved state."""
         return dict(self._ticks)
 

@@ -109,7 +109,7 @@ def element_places(shape: tuple[int, ...]) -> list[str]:
 
 
 def _add(
-    found: Variables3,
+    variables: Variables3,
     element: etree._Element,
     declared: etree._Element | None,
     shape: tuple[int, ...],
@@ -125,17 +125,17 @@ def _add(
         access = Access("Int64" if kind == "Enumeration" else kind, reference, number_, count)
         scalar = make(f"{name}{place}", starts[number_] if starts else None)
         if starts is None:
-            found.resized.append(scalar.name)
-        found.scalars.append(scalar)
-        found.accesses.append(access)
-        found.names.setdefault(reference, []).append(scalar.name)
+            variables.resized.append(scalar.name)
+        variables.scalars.append(scalar)
+        variables.accesses.append(access)
+        variables.names.setdefault(reference, []).append(scalar.name)
         if clocks:
-            found.clocked[scalar.name] = clocks
+            variables.clocked[scalar.name] = clocks
         if element.get("intermediateUpdate") in {"true", "1"} and scalar.causality == "input" and kind == "Float64":
-            found.inside.append(scalar.name)
+            variables.inside.append(scalar.name)
         for alias, text in aliases:
-            found.scalars.append(_alias(scalar, f"{alias}{place}", text))
-            found.accesses.append(access)
+            variables.scalars.append(_alias(scalar, f"{alias}{place}", text))
+            variables.accesses.append(access)
 
 
 def _alias(scalar: Variable, name: str, description: str | None) -> Variable:

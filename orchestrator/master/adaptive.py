@@ -281,9 +281,9 @@ class _Run:
         error = float(np.max(np.abs(window.error_between(before, times)[:, signals]) / scale, initial=0.0))
         return error if math.isfinite(error) else SUSPICIOUS
 
-    def _difference(self, one: Array, other: Array) -> float:
+    def _difference(self, values: Array, reference: Array) -> float:
         """Return the largest difference of two sets of values as a multiple of the tolerance."""
-        a, b = one[self.outputs], other[self.outputs]
+        a, b = values[self.outputs], reference[self.outputs]
         scale = self.settings.tolerance * np.maximum(1.0, np.abs(b))
         error = float(np.max(np.abs(a - b) / scale, initial=0.0))
         return error if math.isfinite(error) else math.inf

@@ -101,7 +101,7 @@ class _Failure(ctypes.Structure):
 
 
 @cache
-def _loaded(holds_lock: bool) -> Any:
+def _load_loop(holds_lock: bool) -> Any:
     """Return ``run_steps`` of the compiled ``loop.c``, or ``None``."""
     path = compile_library(SOURCE)
     if path is None:
@@ -132,7 +132,7 @@ def _transfers(transfers: Sequence[NativeTransfer]) -> Any:
     )
 
 
-def _called(native: NativeCalls, call: int) -> str:
+def _call_name(native: NativeCalls, call: int) -> str:
     """Return the name of a call, as ``loop.c`` counts them."""
     return [*(t.name for t in native.inputs), native.step_name, *(t.name for t in native.outputs)][call]
 
@@ -189,8 +189,8 @@ class CompiledWiring:
             for slave, native, stage in zip(self._slaves, self._natives, self._wiring.stages, strict=True):
                 called: Any = stage.slave
                 if slave.warnings:
-                    name = _called(native, slave.first_call)
-                    called.warned(slave.warnings, name, start + slave.first_step * step)
+                    name = _call_name(native, slave.first_call)
+                    called.note_warnings(slave.warnings, name, start + slave.first_step * step)
                 if slave.astray:
                     called.came_elsewhere(slave.astray, start + slave.first_astray * step, slave.farthest)
 
@@ -202,9 +202,9 @@ class CompiledWiring:
             status = self._run_steps(ctypes.byref(job), begin, end, ctypes.byref(failure))
             if status:
                 failed: Any = self._wiring.stages[failure.slave].slave
-                name = _called(self._natives[failure.slave], failure.call)
+                name = _call_name(self._natives[failure.slave], failure.call)
                 reached = self._slaves[failure.slave].reached
-                failed.failed(status, name, start + failure.step * step, reached)
+                failed.raise_for_status(status, name, start + failure.step * step, reached)
             taken = time.perf_counter() - clock
             chunk = (
                 min(2 * chunk, MOST_STEPS) if taken < 0.5 * CHUNK_TIME else max(1, round(chunk * CHUNK_TIME / taken))
@@ -212,7 +212,7 @@ class CompiledWiring:
             begin = end
 
 
-def compiled_loop(wiring: Wiring) -> CompiledWiring | None:
+def compile_loop(wiring: Wiring) -> CompiledWiring | None:
     """Return the compiled loop, or ``None`` when a slave does not offer native calls or nothing can compile it."""
     natives = []
     for stage in wiring.stages:
@@ -221,5 +221,5 @@ def compiled_loop(wiring: Wiring) -> CompiledWiring | None:
         if native is None:
             return None
         natives.append(native)
-    run_steps = _loaded(holds_lock=all(native.python for native in natives))
+    run_steps = _load_loop(holds_lock=all(native.python for native in natives))
     return None if run_steps is None else CompiledWiring(wiring, natives, run_steps)

@@ -6,7 +6,7 @@ import numpy as np
 
 from orchestrator.master.protocol import Variable
 from orchestrator.master.signals import Constant, Samples, Scaled, Signal, Square, Step, Table
-from orchestrator.master.values import typed_value
+from orchestrator.master.values import coerce_value
 
 
 def levels(signal: Signal) -> Sequence[float] | None:
@@ -37,7 +37,7 @@ def discrete_problem(variable: Variable, signal: Signal) -> str | None:
             if value not in (0.0, 1.0):
                 return f"must be true or false (1 or 0) at all times, but is {value:g}"
             continue
-        _, text = typed_value(variable, value)
+        _, text = coerce_value(variable, value)
         if text is not None:
             return text
     return None

@@ -13,7 +13,7 @@ from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi
 from orchestrator.master.clocks import TickSamples
 from orchestrator.master.event_stage import EventStage, slack
 from orchestrator.master.events import MOST_EVENTS, EventIteration
-from orchestrator.master.fixed_point import fixed_point
+from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.input_leads import InputLeads
 from orchestrator.master.iterated import loop_groups
 from orchestrator.master.protocol import RunEndedError, StepDiscardedError, StepOutcome
@@ -41,7 +41,7 @@ class _Group:
     """Instances that step together, for they are an algebraic loop, or one instance.
 
     Attributes:
-        stages: its instances.
+        stages: in the order in which they step.
         cut: unknowns of the loop; none for one instance.
         at: where it is [s].
         moved: it is beyond the begin of the window, or has an event there.
@@ -124,18 +124,14 @@ class FixedSteps:
         self._leads = InputLeads(events, self.gather, self._simultaneous)
 
     def gather(self, stage: Stage) -> None:
-        """Fill the input slots of a stage for the present communication step.
-
-        Args:
-            stage: whose inputs.
-        """
+        """Fill the input slots of a stage for the present communication step."""
         gather(stage, self.view, self.table, self._column)
 
     def run(self, steps: int, rows: Array, record: Slots) -> None:
         """Run; a row holds the values after the events at its time.
 
         Args:
-            steps: their number.
+            steps: how many communication steps to take.
             rows: results, shape (steps + 1, recorded); row 0 is already there.
             record: recorded slots, shape (recorded,).
 
@@ -288,7 +284,7 @@ class FixedSteps:
             return self.values[group.cut]
 
         what = f"{', '.join(stage.name for stage in group.stages)} at t = {begin:g} s"
-        fixed_point(sweep, self.values[group.cut], algorithm.tolerance, algorithm.iterations, what)
+        solve_fixed_point(sweep, self.values[group.cut], algorithm.tolerance, algorithm.iterations, what)
 
     def _go_on_alone(self, begin: float, end: float) -> None:
         """Take the slaves that stopped before ``end`` [s] there, each through its events by itself."""

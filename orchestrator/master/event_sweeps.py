@@ -86,7 +86,7 @@ class Sweeper:
             end: [s].
         """
         with rollback(self.wiring) as restore:
-            track = self._guessed(begin, end, rates, guess)
+            track = self._guess_track(begin, end, rates, guess)
             for sweep in range(MOST_SWEEPS):
                 if sweep:
                     restore()
@@ -96,13 +96,13 @@ class Sweeper:
                     brief = begin + BRIEF * slack(begin)
                     if reached - begin <= slack(begin) and track.end > brief:  # a poor guess may have brought it about
                         restore()
-                        track = self._guessed(begin, max(brief, begin + 0.1 * (track.end - begin)), rates, None)
+                        track = self._guess_track(begin, max(brief, begin + 0.1 * (track.end - begin)), rates, None)
                         continue
                     if reached - begin <= slack(begin):
                         restore()
                         self._pass(track, only=stage)
                         return Swept(track, begin, True, rates)
-                    track = self._shortened(found.track, reached)
+                    track = self._shorten_track(found.track, reached)
                     continue
                 change = self._difference(track.values[1:], found.track.values[1:])
                 track = found.track
@@ -110,7 +110,7 @@ class Sweeper:
                     return found
         raise UnsettledError
 
-    def _guessed(self, begin: float, end: float, rates: Array, guess: Track | None) -> Track:
+    def _guess_track(self, begin: float, end: float, rates: Array, guess: Track | None) -> Track:
         """Return what the signals may do: as before, moved to where they are now."""
         times, now = begin + 0.5 * (end - begin) * np.arange(3.0), self.wiring.values
         if guess is None or end - begin > FAR * (guess.end - guess.start):
@@ -123,7 +123,7 @@ class Sweeper:
         values[0] = now
         return Track(begin, end, values, slopes, self.rated)
 
-    def _shortened(self, track: Track, end: float) -> Track:
+    def _shorten_track(self, track: Track, end: float) -> Track:
         times = track.start + 0.5 * (end - track.start) * np.arange(3.0)
         values, rates = track.at(times), track.rates_at(times)
         values[0], rates[0] = track.values[0], track.rates[0]
@@ -177,13 +177,15 @@ class Sweeper:
         for k in range(2):
             origin, cubic = times[k], rows[k]
 
-            def fed(time: float, origin: float = origin, cubic: Sequence[Sequence[float]] = cubic) -> Sequence[float]:
+            def signals(
+                time: float, origin: float = origin, cubic: Sequence[Sequence[float]] = cubic
+            ) -> Sequence[float]:
                 s = (time - origin) / cell
                 return [a + s * (b + s * (c + s * d)) for a, b, c, d in cubic]
 
             self.wiring.values[stage.inputs] = begins[k]
             stage.send()
-            stage.events.feed(stage.inside, fed)
+            stage.events.feed(stage.inside, signals)
             outcome = stage.step(times[k], times[k + 1])
             event = outcome.event
             self._show(stage, k + 1, values, rates)

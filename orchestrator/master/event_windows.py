@@ -157,9 +157,9 @@ class EventWindows:
                 table[k] += factor * signal.sample(inside) + offset
         return table
 
-    def _difference(self, one: Array, other: Array) -> float:
+    def _difference(self, values: Array, reference: Array) -> float:
         """Return the largest difference of outputs as a multiple of the tolerance; shape (..., slots) each."""
-        a, b = one[..., self.outputs], other[..., self.outputs]
+        a, b = values[..., self.outputs], reference[..., self.outputs]
         scale = self.settings.tolerance * np.maximum(1.0, np.abs(b))
         error = float(np.max(np.abs(a - b) / scale, initial=0.0))
         return error if math.isfinite(error) else math.inf
@@ -169,7 +169,7 @@ class EventWindows:
         length = end - begin
         with rollback(self.wiring) as restore:
             try:
-                return self._doubled(begin, end, rates, guess, record, restore)
+                return self._sweep_whole_and_halves(begin, end, rates, guess, record, restore)
             except RunEndedError as error:
                 raise SlaveError(f"{error}: it wants the run to end, which `adaptive` does not do") from None
             except (UnsettledError, StepDiscardedError) as error:
@@ -181,7 +181,7 @@ class EventWindows:
                 restore()
                 return _Window((), None, refused.error, length)
 
-    def _doubled(
+    def _sweep_whole_and_halves(
         self, begin: float, end: float, rates: Array, guess: Track | None, record: Slots, restore: Callable[[], None]
     ) -> _Window:
         whole = self.sweeper.sweep(begin, end, rates, guess)
@@ -239,7 +239,7 @@ class EventWindows:
             tracks = JoinedTracks(parts)
             times = np.minimum(self._grid(0) + self.settings.step * np.arange(first, row), end)
             held = self.sweeper.held
-            rows[first:row] = np.where(held, tracks.held_at(times), tracks.at(times))[:, record]
+            rows[first:row] = np.where(held, tracks.values_before(times), tracks.at(times))[:, record]
         return row
 
 

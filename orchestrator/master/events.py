@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from orchestrator.errors import ChatteringError
 from orchestrator.master.clocks import ClockSchedule
 from orchestrator.master.event_stage import EventStage, Gather, is_discrete, slack
-from orchestrator.master.fixed_point import fixed_point
+from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.iterated import backward_slots
 from orchestrator.master.result import EventStatistics, RunRemark
 from orchestrator.master.wiring import Wiring
@@ -35,7 +35,7 @@ MOST_TIMES = 50_000
 LOOP_TOLERANCE, LOOP_PASSES = 1e-12, 100
 
 
-def _chattering(time: float, names: Sequence[str]) -> ChatteringError:
+def _chatter_error(time: float, names: Sequence[str]) -> ChatteringError:
     text = f"t = {time:.9g} s: {MOST_INSTANTS} instants at one time must settle all slaves"
     return ChatteringError(f"{text}, but {', '.join(names) or 'what they exchange'} needs another")
 
@@ -150,7 +150,7 @@ class EventIteration:
             if not again:
                 stage.events.leave_event_mode()
                 return
-        raise _chattering(time, [stage.name])
+        raise _chatter_error(time, [stage.name])
 
     def jump(self, time: float, gather: Gather) -> None:
         """Take all slaves through an instant because a source jumps at ``time`` [s]."""
@@ -205,7 +205,7 @@ class EventIteration:
             if not asking and np.array_equal(values[self._sources], shown, equal_nan=True):
                 break
         else:
-            raise _chattering(time, asking)
+            raise _chatter_error(time, asking)
         for stage in self._taking:
             stage.events.leave_event_mode()
 
@@ -228,7 +228,7 @@ class EventIteration:
             sweep()
             return values[self._cut]
 
-        fixed_point(image, values[self._cut], LOOP_TOLERANCE, LOOP_PASSES, f"an event at t = {time:g} s")
+        solve_fixed_point(image, values[self._cut], LOOP_TOLERANCE, LOOP_PASSES, f"an event at t = {time:g} s")
         before = values[self._discrete]
         sweep()
         if not np.array_equal(values[self._discrete], before):

@@ -13,7 +13,9 @@ MEMORY = 6
 """Past residuals that an Anderson step is made from: enough to solve a linear loop of six signals exactly."""
 
 
-def fixed_point(sweep: Callable[[Array], Array], guess: Array, tolerance: float, iterations: int, what: str) -> int:
+def solve_fixed_point(
+    sweep: Callable[[Array], Array], guess: Array, tolerance: float, iterations: int, what: str
+) -> int:
     """Solve ``x = sweep(x)`` by Anderson acceleration (Walker and Ni, SIAM J. Numer. Anal. 49, 2011), type II.
 
     ``sweep`` is left having been called last with a point that it maps onto itself within the tolerance.
@@ -42,14 +44,14 @@ def fixed_point(sweep: Callable[[Array], Array], guess: Array, tolerance: float,
         points.append(image)
         residuals.append(residual)
         del points[: -MEMORY - 1], residuals[: -MEMORY - 1]
-        point = _accelerated(points, residuals)
+        point = _accelerate(points, residuals)
     raise ConvergenceError(
         f"{what}: {iterations} passes left a change of {gap:.2g} where {tolerance:.2g} is asked for; "
         "take a smaller step, a larger tolerance or more iterations"
     )
 
 
-def _accelerated(images: list[Array], residuals: list[Array]) -> Array:
+def _accelerate(images: list[Array], residuals: list[Array]) -> Array:
     if len(images) == 1:
         return images[-1].copy()
     differences = np.array([residuals[-1] - r for r in residuals[:-1]]).T

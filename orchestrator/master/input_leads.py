@@ -57,11 +57,11 @@ class InputLeads:
             bend = 3.0 * slope - 2.0 * rate - rate_end
             cubics.append((float(first[k]), float(rate), float(bend), float(rate + rate_end - 2.0 * slope)))
 
-        def fed(time: float) -> list[float]:
+        def signals(time: float) -> list[float]:
             s = (time - begin) / step
             return [a + s * (b + s * (c + s * d)) for a, b, c, d in cubics]
 
-        stage.events.feed(stage.inside, fed)
+        stage.events.feed(stage.inside, signals)
         return last
 
     def _inputs(self, stage: EventStage, values: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import ScenarioError
-from orchestrator.master.fixed_point import fixed_point
+from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.fixed_step import do_step
 from orchestrator.master.layout import Layout
 from orchestrator.master.protocol import RunEndedError
@@ -46,7 +46,7 @@ def initialise(wiring: Wiring, cut: Slots, table: Array, tolerance: float, itera
             stage.receive()
         return values[cut]
 
-    return fixed_point(sweep, values[cut], tolerance, iterations, "initialisation")
+    return solve_fixed_point(sweep, values[cut], tolerance, iterations, "initialisation")
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +156,7 @@ def _solve(
 
     try:
         what = f"{', '.join(s.block.name for s in stages)} at t = {time:g} s"
-        count = fixed_point(sweep, values[cut], settings.tolerance, settings.iterations, what)
+        count = solve_fixed_point(sweep, values[cut], settings.tolerance, settings.iterations, what)
         return count, ended
     finally:
         for stage, state in saved:

@@ -108,7 +108,7 @@ class Layout:
             Shape (steps + 1,), in the unit of the input.
         """
         found = np.zeros(len(times))
-        for values, at_end in self._sampled(row, times, replaced):
+        for values, at_end in self._source_samples(row, times, replaced):
             found[0] += values[0]
             found[1:] += values[1:] if at_end else values[:-1]
         return found
@@ -122,9 +122,9 @@ class Layout:
         Returns:
             Shape (n,), in the unit of the input.
         """
-        return np.sum([values for values, _ in self._sampled(row, times, replaced)], axis=0)
+        return np.sum([values for values, _ in self._source_samples(row, times, replaced)], axis=0)
 
-    def _sampled(
+    def _source_samples(
         self, row: int, times: Signals, replaced: Mapping[int, Signal]
     ) -> Iterator[tuple[NDArray[np.float64], bool]]:
         for index, factor, offset, at_end in self.signals[row]:
@@ -135,8 +135,8 @@ class Layout:
 def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: bool = False) -> Layout:
     """Plan the signals of a sound system."""
     shown = _state_outputs(system) if states else []
-    needed = _needed(system, [*record, *shown])
-    fed = _fed(system)
+    needed = _variables_in_use(system, [*record, *shown])
+    fed = _inputs_in_use(system)
     slots: dict[str, int] = {}
     order = system.execution_order()
     for name in order:
@@ -153,8 +153,8 @@ def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: b
     return Layout(tuple(blocks), len(slots), slots, recorded, tuple(signals), system)
 
 
-def _needed(system: System, record: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    fed = _fed(system)
+def _variables_in_use(system: System, record: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    fed = _inputs_in_use(system)
     wanted: dict[str, dict[str, Variable]] = {i.name: {} for i in system.instances}
     for address in [c.source for c in system.connections] + list(record):
         name, variable = split(address)
@@ -178,7 +178,7 @@ def _state_outputs(system: System) -> list[str]:
     ]
 
 
-def _fed(system: System) -> dict[str, tuple[str, ...]]:
+def _inputs_in_use(system: System) -> dict[str, tuple[str, ...]]:
     targets: dict[str, dict[str, Variable]] = {i.name: {} for i in system.instances}
     for address in [c.target for c in system.connections] + [s.target for s in system.sources]:
         name, variable = split(address)
@@ -212,7 +212,7 @@ def _feed(
 ) -> Feed:
     connection = next((c for c in system.connections if c.target == target), None)
     factor, offset, quantum, source = 1.0, 0.0, 0.0, -1
-    newer = system.fed_through(target)
+    newer = system.has_feedthrough(target)
     if connection is not None:
         ratio = units.conversion(system.unit(connection.source), system.unit(target))
         assert ratio is not None

@@ -152,7 +152,7 @@ class ModelInterface:
     inputs_inside_steps: frozenset[str] = frozenset()
     clocks: Mapping[str, "PeriodicClock"] = field(default_factory=dict)
 
-    def named(self, causality: str) -> tuple[str, ...]:
+    def names_of(self, causality: str) -> tuple[str, ...]:
         """Return the names of the variables with this causality, in the order of declaration.
 
         Args:
@@ -173,7 +173,7 @@ class ModelInterface:
             Names of the inputs that act on it at once.
         """
         declared = self.feedthrough.get(output)
-        return frozenset(self.named("input")) if declared is None else declared
+        return frozenset(self.names_of("input")) if declared is None else declared
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class EventStatistics:
     late: tuple[float, ...] = ()
 
 
-def claimed_events(claimed: object) -> EventStatistics:
+def read_events(claimed: object) -> EventStatistics:
     """Return the events that a child process sends, as far as they are such."""
     match claimed:
         case [list() as times, int() as instants, int() as ticks, list() as late]:
@@ -78,7 +78,7 @@ MOST_REMARKS, LONGEST_REMARK = 1000, 1000
 """What is believed of a child process."""
 
 
-def claimed_remarks(claimed: object) -> tuple[RunRemark, ...]:
+def read_remarks(claimed: object) -> tuple[RunRemark, ...]:
     """Return the remarks that a child process sends, as far as they are such."""
     found = []
     for entry in claimed[:MOST_REMARKS] if isinstance(claimed, list) else ():

@@ -84,7 +84,7 @@ class Session:
         self._wiring = self._events = self._compiled = None
 
     @staticmethod
-    def _created(instance: Instance) -> Slave:
+    def _create(instance: Instance) -> Slave:
         try:
             return instance.create(instance.name)
         except FmuError as error:
@@ -178,7 +178,7 @@ class Session:
             self._used.clear()
             try:
                 for instance in self.system.instances:
-                    self._slaves[instance.name] = self._created(instance)
+                    self._slaves[instance.name] = self._create(instance)
                 self._wiring = wire(self.layout, self._slaves)
                 if any(instance.model.has_events for instance in self.system.instances):
                     self._events = EventIteration(self._wiring)
@@ -191,12 +191,12 @@ class Session:
         if self._own is None:
             own = {f"{i.name}.{v}": value for i in self.system.instances for v, value in i.start.items()}
             if any(self.system.start_value(address, value)[0] is None for address, value in own.items()):
-                return self._typed({**own, **extra})
-            self._own = self._typed(own)
-        more = self._typed(extra)
+                return self._values_by_instance({**own, **extra})
+            self._own = self._values_by_instance(own)
+        more = self._values_by_instance(extra)
         return {name: {**values, **more[name]} for name, values in self._own.items()}
 
-    def _typed(self, given: Mapping[str, Value | Quantity]) -> dict[str, dict[str, Value]]:
+    def _values_by_instance(self, given: Mapping[str, Value | Quantity]) -> dict[str, dict[str, Value]]:
         """Return values by instance and variable, as the variables take them; raise for those that they do not."""
         values: dict[str, dict[str, Value]] = {i.name: {} for i in self.system.instances}
         problems = []
@@ -244,7 +244,7 @@ class Session:
             return Statistics(steps, run.undone, self._calls(), run.passes, events=self._events.statistics())
         match algorithm:
             case GaussSeidel() | Jacobi():
-                loop = self._fixed_step(wiring, table, rows, record, algorithm)
+                loop = self._run_fixed_step(wiring, table, rows, record, algorithm)
                 return Statistics(
                     steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), steps, loop
                 )
@@ -260,7 +260,7 @@ class Session:
         """Return the calls for a step by instance, of a system with events."""
         return {} if self._events is None else {stage.name: stage.steps for stage in self._events.stages}
 
-    def _fixed_step(
+    def _run_fixed_step(
         self, wiring: Wiring, table: Array, rows: Array, record: Slots, algorithm: GaussSeidel | Jacobi
     ) -> str:
         """Run, and return what ran the loop, see ``Statistics``."""
@@ -268,9 +268,9 @@ class Session:
         self._do_steps += self.steps * len(wiring.stages)
         compiled = self._compiled
         if compiled is None and algorithm.compiled and self._do_steps >= COMPILED_FROM:
-            from orchestrator.master.compiled import compiled_loop
+            from orchestrator.master.compiled import compile_loop
 
-            compiled = self._compiled = compiled_loop(wiring)
+            compiled = self._compiled = compile_loop(wiring)
         if compiled is not None:
             compiled.run(table, self.start, algorithm.step, simultaneous, rows, record)
             return MACHINE_CODE

@@ -10,7 +10,7 @@ from orchestrator.master.graph import components
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import NUMERIC, READABLE, ModelInterface, Slave, Unit, Value, Variable
 from orchestrator.master.signals import Signal
-from orchestrator.master.values import nearest, typed_value, types_fit
+from orchestrator.master.values import coerce_value, nearest, types_fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class System:
         groups = components([i.name for i in self.instances], self._feedthrough_edges())
         return tuple(name for group in groups for name in group)
 
-    def fed_through(self, address: str) -> bool:
+    def has_feedthrough(self, address: str) -> bool:
         """Return whether the model declares that an output depends on this input at the same instant."""
         name, variable = split(address)
         instance = self.instance(name)
@@ -151,7 +151,7 @@ class System:
             source, target = split(connection.source)[0], split(connection.target)
             instance = self.instance(target[0])
             if source in edges and instance is not None:
-                outputs = instance.model.named("output")
+                outputs = instance.model.names_of("output")
                 if any(target[1] in instance.model.depends_on(output) for output in outputs):
                     edges[source].add(target[0])
         return edges
@@ -184,14 +184,14 @@ class System:
         ):
             return None, f"must name a parameter or a start value, but {address} is of causality {variable.causality}"
         if isinstance(value, Quantity):
-            converted = self._converted(address, value)
+            converted = self._convert(address, value)
             if converted is None:
                 own = variable.unit or "no unit"
                 return None, f"must be given in a unit that measures what {own} does, but is in {value.unit!r}"
             value = converted
-        return typed_value(variable, value)
+        return coerce_value(variable, value)
 
-    def _converted(self, address: str, value: Quantity) -> float | None:
+    def _convert(self, address: str, value: Quantity) -> float | None:
         instance = self.instance(split(address)[0])
         own = self.unit(address)
         if instance is None or own is None:
@@ -276,7 +276,7 @@ class System:
                 found.append(
                     Problem(f"{path}.to", f"must be fed once, but {source.target} is fed by something else too")
                 )
-        elif source.unit is not None and self._converted(source.target, Quantity(0.0, source.unit)) is None:
+        elif source.unit is not None and self._convert(source.target, Quantity(0.0, source.unit)) is None:
             own = variable.unit or "no unit"
             found.append(
                 Problem(f"{path}.unit", f"must measure what {own} of {source.target} does, but is {source.unit!r}")

@@ -122,7 +122,7 @@ class JoinedTracks:
         found[:, ~self._rated] = weights @ self._values[:, ~self._rated]
         return found
 
-    def held_at(self, times: Array) -> Array:
+    def values_before(self, times: Array) -> Array:
         """Return the values at the last node before each time: of signals that jump at nodes.
 
         Args:

@@ -27,7 +27,7 @@ def types_fit(source: Variable, target: Variable) -> bool:
     return source.type == target.type or (source.type == "Integer" and target.type == "Real")
 
 
-def typed_value(variable: Variable, value: Value) -> tuple[Value | None, str | None]:
+def coerce_value(variable: Variable, value: Value) -> tuple[Value | None, str | None]:
     """Return ``value`` as ``variable`` takes it, or ``None`` and what is wrong with it."""
     kind = variable.type
     if kind == "String":

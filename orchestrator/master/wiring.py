@@ -146,11 +146,11 @@ def gather(stage: Stage, view: View, table: NDArray[np.float64], column: int) ->
         if feed.signal >= 0:
             value += table[feed.signal, column]
         if feed.quantum > 0.0:
-            value = _quantised(value, feed.quantum)
+            value = _round_to_quantum(value, feed.quantum)
         view[feed.slot] = value
 
 
-def _quantised(value: float, quantum: float) -> float:
+def _round_to_quantum(value: float, quantum: float) -> float:
     """Return the multiple of ``quantum`` nearest to ``value``; what is not finite stays as it is."""
     scaled = value / quantum
     return quantum * round(scaled) if abs(scaled) < 2.0**53 else value

@@ -19,7 +19,7 @@ from orchestrator.fmi.ours import is_ours
 from orchestrator.fmi.remote import RemoteFactory, without_feed
 from orchestrator.master.algorithms import step_count
 from orchestrator.master.compiled import prepare
-from orchestrator.master.result import LOOPS, Recording, Statistics, claimed_events, claimed_remarks
+from orchestrator.master.result import LOOPS, Recording, Statistics, read_events, read_remarks
 from orchestrator.master.system import System
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.inside import UnpackedRun
@@ -201,8 +201,8 @@ def _result(answer: Any, scenario: Scenario, shape: tuple[int, int], names: str)
             raise SimulationError(f"{names}: the run must return {shape[0]} signals of {shape[1]} values, but does not")
     times = scenario.start + scenario.algorithm.step * np.arange(values.shape[1], dtype=np.float64)
     units = {name: getattr(scenario.system.unit(name), "name", None) for name in scenario.record}
-    statistics = Statistics(steps, rejected, counts, sweeps, loop, claimed_events(events))
-    return Recording(times, values, scenario.record, units, statistics, claimed_remarks(remarks))
+    statistics = Statistics(steps, rejected, counts, sweeps, loop, read_events(events))
+    return Recording(times, values, scenario.record, units, statistics, read_remarks(remarks))
 
 
 def _fits(values: NDArray[Any], shape: tuple[int, int]) -> bool:

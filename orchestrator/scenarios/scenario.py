@@ -26,7 +26,7 @@ from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import Value, Variable
 from orchestrator.master.result import Recording
 from orchestrator.master.system import Connection, Instance, Quantity, SignalSource, System
-from orchestrator.master.values import one_line, typed_value
+from orchestrator.master.values import coerce_value, one_line
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.isolated import Safety, run_safely
 from orchestrator.scenarios.joining import joined
@@ -369,7 +369,7 @@ class _Reader:
             )
             self.problems.append(Problem(f"{path}.value", f"must be {kind}, but is {value!r}"))
             return None
-        number, text = typed_value(variable, value)
+        number, text = coerce_value(variable, value)
         if text is not None:
             self.problems.append(Problem(f"{path}.value", text))
             return None

@@ -63,7 +63,7 @@ def excitation(count: int, steps: int) -> np.ndarray:
 def sampled(path: Path, rows: np.ndarray) -> np.ndarray:
     """Return what an FMU of FMI 2.0 samples from the inputs of each row, the first at t = 0."""
     description = read_description(path)
-    inputs, outputs = description.model.named("input"), description.model.named("output")
+    inputs, outputs = description.model.names_of("input"), description.model.names_of("output")
     slave = make_slave("a", path, description)
     slave.begin(0.0, None, None)
     slave.set(dict(zip(inputs, rows[0], strict=True)))
@@ -104,7 +104,7 @@ def ticked(path: Path, rows: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize(("version", "name"), [*(("3", name) for name in NAMES), ("3 python", "LqrController")])
 def test_ticks_have_the_bits_of_samples(built: dict[str, dict[str, Path]], version: str, name: str) -> None:
-    count = len(read_description(built["2"][name]).model.named("input"))
+    count = len(read_description(built["2"][name]).model.names_of("input"))
     rows = excitation(count, 100)
     expected, found = sampled(built["2"][name], rows), ticked(built[version][name], rows)
     assert found.tobytes() == expected.tobytes()

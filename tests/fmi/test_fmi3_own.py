@@ -40,7 +40,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Path]
 def outputs(path: Path, steps: int = 300) -> np.ndarray:
     """What an FMU returns for random inputs, shape (steps, outputs)."""
     description = read_description(path, events=False)
-    inputs, names = description.model.named("input"), description.model.named("output")
+    inputs, names = description.model.names_of("input"), description.model.names_of("output")
     slave = make_slave("a", path, description)
     sent, received = np.zeros(len(inputs)), np.zeros(len(names))
     if "K[2]" in description.model.variables:
@@ -76,11 +76,11 @@ def test_names_and_capabilities_are_those_of_2_0(built: dict[str, dict[str, Path
     assert set(two.model.variables) <= set(three.model.variables)
     assert (two.version, three.version) == ("2.0", "3.0")
     for kind in ("input", "output", "parameter"):
-        assert two.model.named(kind) == three.model.named(kind)
+        assert two.model.names_of(kind) == three.model.names_of(kind)
     for variable in ("causality", "type", "variability", "start"):
         mine = {n: getattr(v, variable) for n, v in two.model.variables.items()}
         if three.model.clocks and variable == "variability":  # what is sampled is discrete
-            mine |= dict.fromkeys(two.model.named("input"), "discrete")
+            mine |= dict.fromkeys(two.model.names_of("input"), "discrete")
         assert mine == {n: getattr(three.model.variables[n], variable) for n in mine}
     assert set(three.model.clocks) == ({"sample"} if "sample_time" in two.model.variables else set())
     assert read_description(built["3 python"][name]).python

@@ -69,7 +69,7 @@ def test_a_refused_integer_is_an_error_with_the_slaves_own_words(
 def test_without_a_compiler_the_python_loop_runs(mixed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(session_module, "COMPILED_FROM", 0)
     expected = run(mixed, GaussSeidel, True)
-    monkeypatch.setattr(compiled_module, "_loaded", lambda holds_lock: None)
+    monkeypatch.setattr(compiled_module, "_load_loop", lambda holds_lock: None)
     found = run(mixed, GaussSeidel, True)
     assert found.statistics.loop == PYTHON
     assert found.values.tobytes() == expected.values.tobytes()

@@ -224,6 +224,6 @@ def test_joined_tracks_follow_quartics() -> None:
 
     joined, times = JoinedTracks((track(0.0, 1.0), track(1.0, 1.9))), np.linspace(0.0, 1.9, 7)
     np.testing.assert_allclose(joined.at(times)[:, 0], times**4, atol=1e-12)
-    np.testing.assert_allclose(joined.held_at(np.array([0.0, 0.4, 0.5, 1.44]))[:, 0], [0.0, 0.0, 0.5**4, 1.0])
+    np.testing.assert_allclose(joined.values_before(np.array([0.0, 0.4, 0.5, 1.44]))[:, 0], [0.0, 0.0, 0.5**4, 1.0])
     assert JoinedTracks((track(0.0, 1.0),)).roughness()[0] == 0.0
     assert math.isclose(JoinedTracks((track(0.0, 1.0), track(1.0, 2.0))).roughness()[0], 24.0 * 0.5**4)

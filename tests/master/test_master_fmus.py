@@ -11,7 +11,7 @@ import pytest
 import orchestrator.master.session as session_module
 from orchestrator.building.build import ensure_built
 from orchestrator.errors import FmuError, SlaveError
-from orchestrator.fmi.extraction import extracted
+from orchestrator.fmi.extraction import extract_fmu
 from orchestrator.fmi.instances import fmu_instance, make_slave
 from orchestrator.fmi.model_description import parse_description, read_description
 from orchestrator.master.algorithms import Adaptive, GaussSeidel, Jacobi
@@ -152,7 +152,7 @@ def test_types_travel(fmus) -> None:
 def test_one_extraction_per_content(fmus, tmp_path: Path) -> None:
     copy = tmp_path / "other_name.fmu"
     shutil.copy(fmus["Drivetrain"], copy)
-    assert extracted(copy) == extracted(fmus["Drivetrain"])
+    assert extract_fmu(copy) == extract_fmu(fmus["Drivetrain"])
 
 
 # Bad files ---------------------------------------------------------------------------------------------------------

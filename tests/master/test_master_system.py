@@ -5,7 +5,7 @@ import pytest
 
 from orchestrator.errors import ConnectionMismatchError, ConvergenceError, ScenarioError, SlaveError
 from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi, step_count
-from orchestrator.master.fixed_point import fixed_point
+from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.graph import components
 from orchestrator.master.protocol import RunEndedError, Unit
 from orchestrator.master.session import Session
@@ -334,7 +334,7 @@ def test_fixed_point_of_a_nonlinear_map() -> None:
         point[:] = np.cos(x[0]) + 0.1 * x[1], np.exp(-x[0]) - 2.0 * x[1]
         return point.copy()
 
-    calls = fixed_point(sweep, np.array([1.0, 0.0]), 1e-12, 30, "map")
+    calls = solve_fixed_point(sweep, np.array([1.0, 0.0]), 1e-12, 30, "map")
     assert calls < 15
     np.testing.assert_allclose(
         [np.cos(point[0]) + 0.1 * point[1], np.exp(-point[0]) - 2.0 * point[1]], point, atol=1e-10

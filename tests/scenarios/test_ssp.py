@@ -208,7 +208,9 @@ CONTROLLER = """<ssd:System name="root">
 def test_what_is_fed_in_at_a_communication_point_holds_from_there_on(fmus, tmp_path: Path) -> None:
     path = pack(tmp_path, fmus, CONTROLLER, **{"resources/LqrController.fmu": fmus["LqrController"].read_bytes()})
     with open_ssp(path, {"angle": Step(0.003, 1.0)}, step=1e-3) as found:
-        assert found.system.fed_through("controller.theta_l_hat")  # a sampled-data block would be given what comes next
+        assert found.system.has_feedthrough(
+            "controller.theta_l_hat"
+        )  # a sampled-data block would be given what comes next
         torque = simulate(found)["controller.u"]
     assert not np.any(torque[:4])
     assert torque[4] != 0.0

@@ -232,14 +232,14 @@ class CoupledFmus:
         members = list(self._members.values())
         for member, (count, first, at) in zip(members, warned.tolist(), strict=True):
             if count:
-                member.slave.warned(count, member.name_of_call(first), start + at * step)
+                member.slave.note_warnings(count, member.name_of_call(first), start + at * step)
         for member, (number, begin, off) in zip(members, astray.tolist(), strict=True):
             if number:
                 assert isinstance(member.slave, Fmu3Slave)
                 member.slave.came_elsewhere(int(number), start + begin * step, off)
         if status > 1 and call != self._loop.AWAY:
             reached = start + k * step
-            members[n].slave.failed(int(status), members[n].name_of_call(call), reached, reached)
+            members[n].slave.raise_for_status(int(status), members[n].name_of_call(call), reached, reached)
         for member in members:
             member.broken = False
         if call == self._loop.AWAY:

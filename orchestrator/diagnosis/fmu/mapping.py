@@ -13,7 +13,7 @@ from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import Unit, Value, Variable
 from orchestrator.master.units import resolve
-from orchestrator.master.values import typed_value
+from orchestrator.master.values import coerce_value
 from orchestrator.records.model_file import ModelParameter
 
 MAXIMUM_BYTES = 1 << 24
@@ -262,7 +262,7 @@ class _MapCheck:
                           f"{variable.type}: it can be set, with `value` and without `uncertainty`")  # fmt: skip
             if value is None:
                 raise ScenarioError(f"{self._source}: {where}.value must be given: the FMU states no start value")
-            typed, text = typed_value(variable, value)
+            typed, text = coerce_value(variable, value)
             if typed is None:
                 raise ScenarioError(f"{self._source}: {where}.value {text}")
             return typed

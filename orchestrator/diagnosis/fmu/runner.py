@@ -17,7 +17,7 @@ from orchestrator.diagnosis.fmu.coupled_fmus import Batch, Feedthrough, LoadRequ
 from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.diagnosis.settings import FmuSettings
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
-from orchestrator.master.result import MOST_REMARKS, RunRemark, claimed_remarks
+from orchestrator.master.result import MOST_REMARKS, RunRemark, read_remarks
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.jail import Jail
@@ -212,7 +212,7 @@ class Runner:
             case [list() as given, list() as reasons, float() as seconds, remarks] if (
                 len(given) == len(reasons) == len(runs)
             ):
-                self._keep_remarks(claimed_remarks(remarks))
+                self._keep_remarks(read_remarks(remarks))
             case _:
                 raise SlaveError(f"{self.path}: its process must return {len(runs)} runs, but does not")
         results: list[Array | None] = []
