@@ -18,8 +18,8 @@ from orchestrator.diagnosis.report.corrected import (
     BeforeAfter,
     before_and_after,
     build_corrected,
-    corrected_model,
     fmu_name,
+    format_corrected_model,
 )
 from orchestrator.diagnosis.report.json_results import diagnosis_found, test_found
 from orchestrator.diagnosis.report.law_export import LawRun, build_with_law, run_with_law
@@ -171,7 +171,9 @@ class DiagnosisResult(AnyDiagnosisResult):
             self.__dict__["_simulation"] = self._co_simulated(fmu)
         draw_workings(folder, self.diagnosis)
         self.write_csv(folder / "diagnose.csv")
-        (folder / "corrected.toml").write_text(corrected_model(self.diagnosis.model, self.diagnosis), encoding="utf-8")
+        (folder / "corrected.toml").write_text(
+            format_corrected_model(self.diagnosis.model, self.diagnosis), encoding="utf-8"
+        )
         self.plot(folder / "diagnose_signals.png")
 
 

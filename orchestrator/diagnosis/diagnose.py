@@ -115,7 +115,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     compared = torque_comparison(workings, test, model, settings)
     labels = result.final.labels
     graded = tuple(
-        _graded(result if one.label in labels else searched, one, record, model, settings, one.label in labels)
+        _grade(result if one.label in labels else searched, one, record, model, settings, one.label in labels)
         for one in add_test_evidence(evidence, result, test, misses_of(workings, model, settings), compared)
     )
     graded = share_values(graded, labels, model.plant)
@@ -138,7 +138,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     )  # fmt: skip
 
 
-def _graded(
+def _grade(
     result: SearchResult, evidence: EffectEvidence, record: RecordEvidence, model: Model, settings: DiagnosisSettings,
     in_model: bool,
 ) -> GradedEffect:  # fmt: skip
@@ -146,12 +146,14 @@ def _graded(
     effect = result.problem.effects[evidence.label]
     row = next(row for row in plant.bank if row.label == evidence.label)
 
-    def named(values: Values) -> Mapping[str, float]:
+    def values_by_name(values: Values) -> Mapping[str, float]:
         full = effect_parameters(plant, effect, values)
         return {short: full[name] for short, name in row.parameters.items()}
 
     units = {short: unit_in(plant.entry(place).unit, model, short) for short, place in row.places(plant).items()}
-    return replace(report_effect(result, evidence, named, units, record, settings, in_model), of_log=row.measurement)
+    return replace(
+        report_effect(result, evidence, values_by_name, units, record, settings, in_model), of_log=row.measurement
+    )
 
 
 def _nuisances(

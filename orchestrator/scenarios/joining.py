@@ -9,7 +9,7 @@ from orchestrator.master.system import Connection, Instance, split
 from orchestrator.master.values import nearest
 
 
-def joined(
+def terminal_connections(
     joints: Iterable[tuple[str, str, str]], instances: Sequence[Instance], problems: list[Problem]
 ) -> list[Connection]:
     """Return the connections of pairs of terminals, after adding what is wrong with them to ``problems``.

@@ -29,7 +29,7 @@ from orchestrator.master.system import Connection, Instance, Quantity, SignalSou
 from orchestrator.master.values import coerce_value, one_line
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.isolated import Safety, run_safely
-from orchestrator.scenarios.joining import joined
+from orchestrator.scenarios.joining import terminal_connections
 from orchestrator.scenarios.tables import read_table
 
 MAXIMUM_BYTES = 16 * 2**20
@@ -163,7 +163,10 @@ def load_scenario(path: Path) -> Scenario:
     reader = _Reader(path, problems)
     algorithm, order = reader.master(top)
     instances = reader.instances(top.instances)
-    connections = (*reader.connections(top.connections), *joined(_joints(top, problems), instances, problems))
+    connections = (
+        *reader.connections(top.connections),
+        *terminal_connections(_joints(top, problems), instances, problems),
+    )
     sources = reader.sources(top.sources, instances, algorithm.step if algorithm else math.nan, top.start)
     if algorithm is not None:
         try:

@@ -69,7 +69,7 @@ def exact_record(values):
 def left_at(balance, p):
     """Rms of what is missing over that of what drives, at each body, within the band and away from the ends."""
     missing, inner = balance.balance(p), slice(6 * balance.size // 10, -balance.size // 20)  # the start is forgotten
-    driving = balance.driving(ModelPoint.nominal(balance.parameters))
+    driving = balance.reference_signals(ModelPoint.nominal(balance.parameters))
     shares = []
     for n, cutoff in enumerate(balance.cutoffs):
         rows = balance.active[n][inner] > 0.0

@@ -66,7 +66,7 @@ class LinearModel:
     def is_possible(self, label: str, values: Values) -> bool:
         return True
 
-    def driving(self, point: ModelPoint) -> Array:
+    def reference_signals(self, point: ModelPoint) -> Array:
         return self.data[None, :]
 
     def inertia_shares(self) -> Mapping[str, float]:

@@ -81,7 +81,9 @@ class FmuProblem:
     def simulate(self, models: Sequence[FmuModel]) -> list[Array | None]:
         """Return outputs (n, outputs) of each model; None where the FMU failed, or ran away."""
         found = self._runs([self._run_of(model) for model in models])
-        runs = [None if y is None else self._sampled_outputs(y, model) for y, model in zip(found, models, strict=True)]
+        runs = [
+            None if y is None else self._outputs_at_samples(y, model) for y, model in zip(found, models, strict=True)
+        ]
         most = ABSURD * np.max(np.abs(self.data.outputs), axis=0)
         return [None if y is None or np.any(np.abs(y) > most) else y for y in runs]
 
@@ -200,7 +202,7 @@ class FmuProblem:
         assert name is not None
         return name
 
-    def _sampled_outputs(self, fine: Array, model: FmuModel) -> Array:
+    def _outputs_at_samples(self, fine: Array, model: FmuModel) -> Array:
         """Return the outputs at the samples, from what is read after every communication step.
 
         Effects behind an output act between the samples too: an output need not be smooth from one to the next.
@@ -236,8 +238,8 @@ class FmuProblem:
         base, *found = self._runs(runs)
         if base is None:
             raise self.does_not_run()
-        output, count = self._sampled_outputs(base, model), len(rows)
-        changes = [None if y is None else (self._sampled_outputs(y, model) - output) / IMPULSE for y in found]
+        output, count = self._outputs_at_samples(base, model), len(rows)
+        changes = [None if y is None else (self._outputs_at_samples(y, model) - output) / IMPULSE for y in found]
         return base[:: self.m], [changes[k * count : (k + 1) * count] for k in range(len(places))]
 
     @property

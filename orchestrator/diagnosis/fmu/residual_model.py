@@ -112,7 +112,7 @@ class FmuResiduals(ResidualModel):
         effect, given = self.placed[label].at(values)
         return effect.kind.plausible(tuple(given), effect.scales)
 
-    def driving(self, point: ModelPoint) -> Array:
+    def reference_signals(self, point: ModelPoint) -> Array:
         """Return the measured outputs (outputs, n); see :class:`ResidualModel`."""
         del point
         return np.ascontiguousarray(self.problem.data.outputs.T)

@@ -70,7 +70,7 @@ def fit_model(problem: FitProblem, point: ModelPoint, iterations: int = 0) -> Fi
         iterations: steps at most; 0: as the settings say.
     """
     coordinates = problem.coordinates(point)
-    (residual,) = problem.whitened([point])
+    (residual,) = problem.whiten_residuals([point])
     prior, slopes = problem.prior(point, coordinates)
     cost, damping = float(residual @ residual + prior @ prior), 1e-6
     jacobian = problem.jacobian(point, coordinates, residual)
@@ -78,7 +78,7 @@ def fit_model(problem: FitProblem, point: ModelPoint, iterations: int = 0) -> Fi
         normal, gradient = jacobian.T @ jacobian + np.diag(slopes**2), jacobian.T @ residual + slopes * prior
         step = None
         for _ in range(4):
-            step = _damped_step(problem, point, coordinates, normal, gradient, damping)
+            step = _take_damped_step(problem, point, coordinates, normal, gradient, damping)
             if step[2] < cost:
                 break
             damping = max(30.0 * damping, 1e-3)
@@ -92,23 +92,23 @@ def fit_model(problem: FitProblem, point: ModelPoint, iterations: int = 0) -> Fi
         jacobian = problem.jacobian(point, coordinates, residual)
         if gain < 1e-3 * cost and gain < 0.5:
             break
-    return _scored(problem, point, coordinates, residual, jacobian, cost)
+    return _score(problem, point, coordinates, residual, jacobian, cost)
 
 
-def _damped_step(
+def _take_damped_step(
     problem: FitProblem, point: ModelPoint, coordinates: Sequence[Coordinate], normal: Array, gradient: Array,
     damping: float,
 ) -> tuple[ModelPoint, Array, float]:  # fmt: skip
     diagonal = np.diag(normal)
     step = np.asarray(-np.linalg.lstsq(normal + np.diag(damping * diagonal + 1e-12), gradient, rcond=None)[0], float)
-    moved = problem.moved(point, coordinates, step)
-    (residual,) = problem.whitened([moved])
+    moved = problem.move_point(point, coordinates, step)
+    (residual,) = problem.whiten_residuals([moved])
     prior, _ = problem.prior(moved, coordinates)
     cost = float(residual @ residual + prior @ prior)
     return moved, residual, cost if np.isfinite(cost) else np.inf
 
 
-def _scored(
+def _score(
     problem: FitProblem, point: ModelPoint, coordinates: Sequence[Coordinate], residual: Array, jacobian: Array,
     cost: float,
 ) -> FittedModel:  # fmt: skip

@@ -104,7 +104,7 @@ class FitProblem:
             place += count
         return found
 
-    def whitened(self, points: Sequence[ModelPoint]) -> list[Array]:
+    def whiten_residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
         """Return the whitened residuals (rows,) of all records at each of some points."""
         seen = [self.record_points(point) for point in points]
         parts = [
@@ -136,7 +136,7 @@ class FitProblem:
                     found[n][rows] = whitening.apply(change)
         return found
 
-    def reweighted(self, point: ModelPoint, quiet: bool = False) -> "FitProblem":
+    def reweight(self, point: ModelPoint, quiet: bool = False) -> "FitProblem":
         """Return the problem with the whitening that the residuals at a point ask for."""
         seen = self.record_points(point)
         found = tuple(
@@ -152,7 +152,7 @@ class FitProblem:
         effects = self.models[0].effects
         return [*range(len(self.parameters)), *((label, n) for label in point.effects for n in effects[label].fitted)]
 
-    def moved(self, point: ModelPoint, coordinates: Sequence[Coordinate], steps: Array) -> ModelPoint:
+    def move_point(self, point: ModelPoint, coordinates: Sequence[Coordinate], steps: Array) -> ModelPoint:
         """Return a point moved by steps: shares of parameters, scales of effects' values; bounds are kept.
 
         Args:
@@ -170,7 +170,7 @@ class FitProblem:
                 label, place = coordinate
                 effect = self.models[0].effects[label]
                 value = effects[label][place] + float(step) * effect.scales[place]
-                effects[label][place] = effect.bounded(place, value)
+                effects[label][place] = effect.clip_value(place, value)
         return ModelPoint(tuple(parameters), {label: tuple(values) for label, values in effects.items()})
 
     def jacobian(self, point: ModelPoint, coordinates: Sequence[Coordinate], residual: Array) -> Array:
@@ -180,8 +180,8 @@ class FitProblem:
             residual: (rows,) at the point.
         """
         steps = [SMALL_SHARE if isinstance(one, int) else 1.0 for one in coordinates]
-        points = [self.moved(point, [one], np.array([s])) for one, s in zip(coordinates, steps, strict=True)]
-        columns = self.whitened(points)
+        points = [self.move_point(point, [one], np.array([s])) for one, s in zip(coordinates, steps, strict=True)]
+        columns = self.whiten_residuals(points)
         if not columns:  # nothing is uncertain
             return np.zeros((residual.size, 0))
         return np.column_stack([(found - residual) / s for found, s in zip(columns, steps, strict=True)])
@@ -219,4 +219,4 @@ def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:
 def fit_problem(models: Sequence[ResidualModel], settings: FitSettings, first: ModelPoint | None = None) -> FitProblem:
     """Return the problem of some records, whitened by what the first model leaves."""
     problem = FitProblem(tuple(models), tuple(band_only(model, settings) for model in models), settings, first=first)
-    return problem.reweighted(first or problem.start)
+    return problem.reweight(first or problem.start)

@@ -83,7 +83,7 @@ class Whitening:
         return np.asarray(irfft(total, self.length)[: self.taper.size] * self.taper)
 
 
-def kept_rows(model: ResidualModel, settings: FitSettings) -> NDArray[np.int64]:
+def independent_rows(model: ResidualModel, settings: FitSettings) -> NDArray[np.int64]:
     """Return rows (m,) so far apart that whitened residuals there are about independent, without the record's edges."""
     highest = max(model.cutoffs)
     apart = max(int(0.45 / (model.step * highest)), 1)
@@ -99,7 +99,7 @@ def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
     weights = np.zeros((frequencies.size, count, count), dtype=complex)
     for n, cutoff in enumerate(model.cutoffs):
         weights[:, n, n] = frequencies < cutoff
-    rows = kept_rows(model, settings)
+    rows = independent_rows(model, settings)
     apart = float(rows[1] - rows[0]) if rows.size > 1 else 1.0
     # Of a band that ends below the highest one, neighbouring rows repeat each other: they count by what is independent.
     independent = np.minimum(2.0 * np.array(model.cutoffs) * apart * model.step, 1.0)

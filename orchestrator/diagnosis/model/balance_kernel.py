@@ -116,7 +116,7 @@ def _hidden_load_kernel(plant: Plant, usual: bool) -> Any:
         return rates((angle, speed, y[0], y[1], 0.0, y[2], y[3], y[4]), signs, p, 0.0)
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def moved(y: Any, rate: Any, h: float) -> Any:
+    def advance(y: Any, rate: Any, h: float) -> Any:
         return y[0] + h * rate[2], y[1] + h * rate[3], y[2] + h * rate[5], y[3] + h * rate[6], y[4] + h * rate[7]
 
     @njit_on_disk(error_model="numpy", nogil=True, **ALGEBRA)
@@ -149,10 +149,10 @@ def _hidden_load_kernel(plant: Plant, usual: bool) -> Any:
                 )
                 direction = (bristle[n], sign)
                 k1 = rate_at(angles[0], speeds[0], y, direction, values)
-                k2 = rate_at(angles[1], speeds[1], moved(y, k1, 0.5 * h), direction, values)
-                k3 = rate_at(angles[1], speeds[1], moved(y, k2, 0.5 * h), direction, values)
-                k4 = rate_at(angles[2], speeds[2], moved(y, k3, h), direction, values)
-                y = moved(moved(moved(moved(y, k1, h / 6.0), k2, h / 3.0), k3, h / 3.0), k4, h / 6.0)
+                k2 = rate_at(angles[1], speeds[1], advance(y, k1, 0.5 * h), direction, values)
+                k3 = rate_at(angles[1], speeds[1], advance(y, k2, 0.5 * h), direction, values)
+                k4 = rate_at(angles[2], speeds[2], advance(y, k3, h), direction, values)
+                y = advance(advance(advance(advance(y, k1, h / 6.0), k2, h / 3.0), k3, h / 3.0), k4, h / 6.0)
                 sign = min(1.0, max(-1.0, sign + (y[0] - begin) / width))
 
     return fill

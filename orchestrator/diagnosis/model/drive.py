@@ -30,17 +30,17 @@ def delivered_torque(plant: Plant, p: Array, requests: Array, step: float, held:
         )
     lag = plant.value(p, drive.lag)
     if lag > SHORT_LAG * step:
-        torque = lagged_hold(requests, lag, step) if held else triangle_average(lagged(requests, lag, step))
+        torque = hold_behind_lag(requests, lag, step) if held else triangle_average(apply_lag(requests, lag, step))
     else:
-        torque = held_average(requests) if held else triangle_average(requests)
+        torque = average_of_held(requests) if held else triangle_average(requests)
     if drive.second_lag and (second := plant.value(p, drive.second_lag)) > 0.0:
-        torque = lagged(torque, second, step)
+        torque = apply_lag(torque, second, step)
     lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
     late = plant.value(p, drive.delay) - lead + (lag if lag <= SHORT_LAG * step else 0.0)
-    return shifted(torque, late / step)
+    return shift_signal(torque, late / step)
 
 
-def held_average(requests: Array) -> Array:
+def average_of_held(requests: Array) -> Array:
     """Return the triangle average (n,) of requests that are held over each sample: exactly half the sum of two.
 
     Args:
@@ -49,7 +49,7 @@ def held_average(requests: Array) -> Array:
     return np.concatenate([requests[:1], 0.5 * (requests[1:] + requests[:-1])])
 
 
-def lagged_hold(requests: Array, lag: float, step: float) -> Array:
+def hold_behind_lag(requests: Array, lag: float, step: float) -> Array:
     """Return the triangle average (n,), exactly, of a first-order lag behind held requests; it is at rest at first.
 
     Args:
@@ -66,7 +66,7 @@ def lagged_hold(requests: Array, lag: float, step: float) -> Array:
     return np.concatenate([state[:1], falling[:-1] + rising[1:]])
 
 
-def lagged(values: Array, lag: float, step: float) -> Array:
+def apply_lag(values: Array, lag: float, step: float) -> Array:
     """Return a first-order lag (n,) of a signal that goes straight between its samples, settled at first.
 
     Args:
@@ -80,7 +80,7 @@ def lagged(values: Array, lag: float, step: float) -> Array:
     return np.asarray(lfilter([now, before], [1.0, -decay], values, zi=[values[0] * (1.0 - now)])[0])
 
 
-def shifted(values: Array, samples: float) -> Array:
+def shift_signal(values: Array, samples: float) -> Array:
     """Return a signal (n,) that is later by some ``samples``, interpolated by cubic splines.
 
     Args:

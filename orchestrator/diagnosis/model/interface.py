@@ -114,7 +114,7 @@ class CandidateEffect:
         """Return the part of the machine at which it acts."""
         return self.label.partition("@")[2]
 
-    def bounded(self, place: int, value: float) -> float:
+    def clip_value(self, place: int, value: float) -> float:
         """Return a value within its bounds.
 
         Args:
@@ -274,7 +274,7 @@ class ResidualModel(Protocol):
             False for sizes that no machine has, or that act nowhere in the record.
         """
 
-    def driving(self, point: ModelPoint) -> Array:
+    def reference_signals(self, point: ModelPoint) -> Array:
         """Return the signals that residuals are compared with: torques that drive the bodies, or outputs.
 
         Args:

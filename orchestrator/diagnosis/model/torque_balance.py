@@ -33,7 +33,7 @@ from orchestrator.diagnosis.data.signals import (
     triangle_average,
 )
 from orchestrator.diagnosis.model.balance_kernel import acceleration_kernel, hidden_load_kernel, slide_bristle
-from orchestrator.diagnosis.model.drive import delivered_torque, shifted
+from orchestrator.diagnosis.model.drive import delivered_torque, shift_signal
 from orchestrator.diagnosis.model.interface import (
     CandidateEffect,
     ModelPoint,
@@ -88,7 +88,7 @@ class TorqueBalance(ResidualModel):
         self.parameters = self._uncertain(model)
         self._places = [plant.index(entry.name) for entry in self.parameters if not entry.local]
         self.active = np.array([self._active(speed) for speed in self._speeds])
-        self._hidden = self._hidden_load(self.nominal)[0] if self.hides_load else np.empty((0, 2))
+        self._hidden = self._simulate_hidden_load(self.nominal)[0] if self.hides_load else np.empty((0, 2))
         self.effects: Mapping[str, CandidateEffect] = candidate_effects(model, self.scales, self.channels)
 
     def _uncertain(self, model: Model) -> tuple[UncertainParameter, ...]:
@@ -196,10 +196,10 @@ class TorqueBalance(ResidualModel):
         angles, speeds, accelerations = self._motion(p)
         found = np.empty((self.size, 2))
         if self.hides_load:
-            found[:, 0] = self._hidden_load(p)[1]
+            found[:, 0] = self._simulate_hidden_load(p)[1]
         else:
             motion = np.column_stack([angles[0], speeds[0], angles[-1], speeds[-1]])
-            acceleration_kernel(plant, p)(motion, self._directions(p), p, step, self._hidden_states_move(p), found)
+            acceleration_kernel(plant, p)(motion, self._directions(p), p, step, self._uses_memory(p), found)
         missing = np.array(
             [p[place] * (triangle_average(found[:, n]) - accelerations[n]) for n, place in enumerate(self.inertias)]
         )
@@ -208,7 +208,7 @@ class TorqueBalance(ResidualModel):
             missing[0] += initial * np.exp(-step * np.arange(self.size) / plant.value(p, plant.drive.lag))
         return missing
 
-    def _hidden_load(self, p: Array) -> tuple[Array, Array]:
+    def _simulate_hidden_load(self, p: Array) -> tuple[Array, Array]:
         """Return angle and speed (n, 2) of a load that no encoder shows, and the motor's acceleration (n,)."""
         (angle, *_), (speed, *_), _ = self._motion(p)
         motion, signs, acceleration = np.empty((self.size, 2)), np.empty(self.size), np.empty(self.size)
@@ -228,7 +228,7 @@ class TorqueBalance(ResidualModel):
         late = self.plant.value(p, SHIFT.name) if SHIFT.name in self.plant.names else 0.0
         if late and len(angles) > 1:
             for values in (angles, speeds, accelerations):
-                values[1] = shifted(values[1], -late / self.step)
+                values[1] = shift_signal(values[1], -late / self.step)
         return angles, speeds, accelerations
 
     def _directions(self, p: Array) -> Array:
@@ -255,11 +255,11 @@ class TorqueBalance(ResidualModel):
             self._torques[key] = delivered_torque(self.plant, p, self.signals.torque, self.step, self.signals.held)
         return self._torques[key]
 
-    def _hidden_states_move(self, p: Array) -> bool:
+    def _uses_memory(self, p: Array) -> bool:
         sizes = [effect.places(self.plant)[effect.size] for effect in self.plant.bank if effect.memory]
         return bool(np.any(p[sizes] != 0.0)) if sizes else False
 
-    def driving(self, point: ModelPoint) -> Array:
+    def reference_signals(self, point: ModelPoint) -> Array:
         """Return the drive's torque, and the torque that the load's acceleration needs; see :class:`ResidualModel`."""
         p = self.values_at(point)
         further = [p[n] * a for n, a in list(zip(self.inertias, self._accelerations, strict=True))[1:]]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.building.build import build_variant, ensure_built
 from orchestrator.checking.check import check_fmu
-from orchestrator.diagnosis.model.drive import shifted
+from orchestrator.diagnosis.model.drive import shift_signal
 from orchestrator.diagnosis.report.free_run import free_runs, run_parts
 from orchestrator.diagnosis.report.open_test_data import test_signals
 from orchestrator.diagnosis.report.simulation import RunSignals
@@ -66,10 +66,10 @@ def build_corrected(diagnosis: Diagnosis, source: str, directory: Path) -> Path:
     """Build the plant's FMU with the corrected values as start values, check it, and return its path."""
     plant = diagnosis.model.plant
     values = start_values(plant, diagnosis.workings.final)
-    return checked(build_variant(fmu_name(plant.name, source), plant.name, values, directory))
+    return check_corrected(build_variant(fmu_name(plant.name, source), plant.name, values, directory))
 
 
-def checked(path: Path) -> Path:
+def check_corrected(path: Path) -> Path:
     """Return the path of a corrected FMU that passes the check."""
     report = check_fmu(path)
     if not report.ok:
@@ -131,7 +131,7 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     covered = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     return BeforeAfter(
         np.asarray(step * np.arange(signals.size)[covered]), signals.requests[covered],
-        signals.aligned_angles(plant, w.final)[covered], np.concatenate(runs["before"]), np.concatenate(runs["after"]),
+        signals.angles_in_time(plant, w.final)[covered], np.concatenate(runs["before"]), np.concatenate(runs["after"]),
         difference, tuple(step * part.start for part in parts), tuple(part.start - parts[0].start for part in parts),
         tuple(starts),
     )  # fmt: skip
@@ -140,10 +140,10 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
 def requests_for_fmu(signals: RunSignals, plant: Plant, p: Array) -> Array:
     """Return the requests (n,) for an FMU that takes one a sample: what the log has early comes later."""
     lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
-    return shifted(signals.requests, -lead / signals.step)
+    return shift_signal(signals.requests, -lead / signals.step)
 
 
-def corrected_model(model: Model, diagnosis: Diagnosis) -> str:
+def format_corrected_model(model: Model, diagnosis: Diagnosis) -> str:
     """Return the TOML text of a model with the values of a diagnosis.
 
     Every value that differs from the FMU's default is stated. Those that were fitted carry the half-width of their

@@ -60,7 +60,7 @@ def effect_estimates(
         place = coordinate[1]
         step = 1e-4 * effect.scales[place]
         moved = names((*values[:place], values[place] + step, *values[place + 1 :]))
-        slopes[:, n] = [(_wrapped(name, moved[name] - centre[name])) / 1e-4 for name in centre]
+        slopes[:, n] = [(_wrap_phase(name, moved[name] - centre[name])) / 1e-4 for name in centre]
     result = {}
     variances = np.einsum("pc,cd,pd->p", slopes, covariance, slopes)
     for error, (name, value) in zip(np.sqrt(np.maximum(variances, 0.0)).tolist(), centre.items(), strict=True):
@@ -106,7 +106,7 @@ def interval_width(problem: FitProblem, level: float) -> float:
     return float(student.ppf(0.5 + 0.5 * level, problem.block_count - 1))
 
 
-def _wrapped(name: str, difference: float) -> float:
+def _wrap_phase(name: str, difference: float) -> float:
     return float((difference + np.pi) % (2.0 * np.pi) - np.pi) if name == "phase" else difference
 
 
@@ -133,7 +133,7 @@ def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: 
     fitted = {one.label: one for one in effects}
     setter = {full: (fitted[label], short) for label in reversed(labels) for short, full in rows[label].items()}
 
-    def shared(effect: GradedEffect) -> GradedEffect:
+    def with_common_values(effect: GradedEffect) -> GradedEffect:
         if not effect.in_model:
             return effect
         by_name = {short: setter[full] for short, full in rows[effect.label].items()}
@@ -143,7 +143,7 @@ def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: 
             block_values={short: one.block_values[name] for short, (one, name) in by_name.items()},
         )
 
-    return tuple(map(shared, effects))
+    return tuple(map(with_common_values, effects))
 
 
 def add_test_evidence(
@@ -159,7 +159,7 @@ def add_test_evidence(
     """
     final = sum((one.final / one.noise) ** 2 for record in test for one in record.signals)
 
-    def tested(effect: EffectEvidence) -> EffectEvidence:
+    def with_test_evidence(effect: EffectEvidence) -> EffectEvidence:
         if effect.label not in result.final.labels:
             return effect
         without = fit_model(result.problem, result.final.point.without_effects([effect.label]), 3).point
@@ -168,7 +168,7 @@ def add_test_evidence(
         share = 1.0 if astray else 1.0 - final / max(misses, 1e-300)
         return replace(effect, motion_share=share if math.isfinite(final) else math.nan, test_torque=compared(without))
 
-    return list(map(tested, evidence))
+    return list(map(with_test_evidence, evidence))
 
 
 def find_drive_gain(model: Model, values: dict[str, float], level_width: float) -> ValueEstimate | None:

@@ -113,7 +113,7 @@ def _closest(model: Simulation, guess: Array, part: slice) -> FreeRun:
     def cost(out: Array) -> float:
         return float(np.sum(((out - measured) / scale) ** 2))
 
-    first = _followed(plant, np.array(guess, dtype=float))
+    first = _move_followers(plant, np.array(guess, dtype=float))
     foretold: list[float] = []  # squared errors over what derivatives foretold, of each step
     steps = _steps(plant, first, signals, free)
 
@@ -123,17 +123,17 @@ def _closest(model: Simulation, guess: Array, part: slice) -> FreeRun:
         if not np.all(np.isfinite(J)):
             return None
 
-        def moved(change: Array) -> tuple[tuple[Array, Array], float]:
+        def try_change(change: Array) -> tuple[tuple[Array, Array], float]:
             there = start.copy()
             there[list(free)] += change
-            there = _followed(plant, there)
+            there = _move_followers(plant, there)
             new = outputs(there)
             after = cost(new)
             foretold.append(after / max(float(np.sum((error + J @ change) ** 2)), 1e-300))
             return (there, new), after
 
         error = ((out - measured) / scale).ravel()
-        return Linearised(J.T @ J, J.T @ error, cost(out), moved)
+        return Linearised(J.T @ J, J.T @ error, cost(out), try_change)
 
     damping = Damping(DAMPING, 0.0, lambda H: FADE * float(np.trace(H)), TRIES)
     (start, out), _ = fit_damped(
@@ -149,18 +149,18 @@ def _answers(
     outputs: Callable[[Array], Array], start: Array, out: Array, free: tuple[int, ...], steps: Sequence[float],
     plant: Plant,
 ) -> Array:  # fmt: skip
-    nudged = [_followed(plant, _nudged(start, place, step)) for place, step in zip(free, steps, strict=True)]
+    nudged = [_move_followers(plant, _nudge(start, place, step)) for place, step in zip(free, steps, strict=True)]
     moved = map_on_threads(outputs, nudged)
     return np.column_stack([((new - out) / step).ravel() for new, step in zip(moved, steps, strict=True)])
 
 
-def _nudged(start: Array, place: int, step: float) -> Array:
+def _nudge(start: Array, place: int, step: float) -> Array:
     moved = start.copy()
     moved[place] += step
     return moved
 
 
-def _followed(plant: Plant, start: Array) -> Array:
+def _move_followers(plant: Plant, start: Array) -> Array:
     """Return the state with the extra inertia at rest relative to what carries it."""
     moved = start.copy()
     for place, followed in plant.followers:

@@ -41,7 +41,7 @@ def _nominal_explains(search: SearchResult) -> bool:
     """
     problem, count = search.problem, len(search.problem.shared)
     start = ModelPoint((*problem.start.parameters[:count], *search.final.point.parameters[count:]))
-    (nominal,) = problem.whitened([start])
+    (nominal,) = problem.whiten_residuals([start])
     return float(nominal @ nominal) - search.final.cost < 3.0 * count
 
 

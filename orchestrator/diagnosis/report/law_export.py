@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.building.build import build_variant
 from orchestrator.building.sources import catalogue, takes_law
-from orchestrator.diagnosis.report.corrected import checked, fmu_name, requests_for_fmu, start_values
+from orchestrator.diagnosis.report.corrected import check_corrected, fmu_name, requests_for_fmu, start_values
 from orchestrator.diagnosis.report.free_run import free_runs, run_parts
 from orchestrator.diagnosis.report.open_test_data import test_signals
 from orchestrator.diagnosis.result import Diagnosis
@@ -62,7 +62,7 @@ def build_with_law(diagnosis: Diagnosis, law: Dependence, source: str, directory
     """Build the corrected FMU with a learned law, which is off until ``effects.learned_law.on`` is 1, and check it."""
     plant, final = diagnosis.model.plant, diagnosis.workings.final
     values, described = start_values(plant, final), describe_law(diagnosis, law)
-    return checked(build_variant(fmu_name(plant.name, source), plant.name, values, directory, described))
+    return check_corrected(build_variant(fmu_name(plant.name, source), plant.name, values, directory, described))
 
 
 def describe_law(diagnosis: Diagnosis, law: Dependence) -> dict[str, Any]:
@@ -126,7 +126,7 @@ def run_with_law(diagnosis: Diagnosis, law: Dependence, fmu: Path) -> LawRun:
             difference = max(difference, float(np.max(np.abs(outputs[-1] - run.outputs))))
             starts.append(given)
     simulated = np.concatenate(outputs)
-    angles = signals.aligned_angles(plant, diagnosis.workings.final)
+    angles = signals.angles_in_time(plant, diagnosis.workings.final)
     measured = np.concatenate([angles[part] for part in parts])
     rms = np.sqrt(np.mean((simulated - measured) ** 2, axis=0))
     misfit = {name: float(value) for name, value in zip(encoders, rms, strict=True)}

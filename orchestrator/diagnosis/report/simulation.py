@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import first_derivative, smooth
-from orchestrator.diagnosis.model.drive import lagged, shifted
+from orchestrator.diagnosis.model.drive import apply_lag, shift_signal
 from orchestrator.plants.coarse_run import FINER, coarse_runner_of, coarse_steps, runs_coarsely
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import is_linear, linear_run_of
@@ -65,7 +65,7 @@ class RunSignals:
         ahead = max(1, min(NOISE_WINDOW, self.size - 1))
         return float(np.max(np.abs(self.angles[ahead:, 0] - self.angles[:-ahead, 0]))) / ahead
 
-    def aligned_angles(self, plant: Plant, p: Array) -> Array:
+    def angles_in_time(self, plant: Plant, p: Array) -> Array:
         """Return the angles (n, channels) as they were: what the log has late is put earlier.
 
         Returns:
@@ -74,7 +74,7 @@ class RunSignals:
         late = plant.value(p, SHIFT.name) if SHIFT.name in plant.names else 0.0
         if late == 0.0 or self.channels == 1:
             return self.angles
-        return np.column_stack([self.angles[:, 0], shifted(self.angles[:, 1], -late / self.step)])
+        return np.column_stack([self.angles[:, 0], shift_signal(self.angles[:, 1], -late / self.step)])
 
     def lateness(self, plant: Plant, p: Array) -> float:
         """Return the time [s] by which requests act after their stamp; negative: before it."""
@@ -87,7 +87,7 @@ class RunSignals:
         The drive is at rest before the record.
         """
         state = np.zeros(8)
-        angles = self.aligned_angles(plant, p)
+        angles = self.angles_in_time(plant, p)
         for channel, body in enumerate(plant.bodies):
             if channel < self.channels:
                 angle, speed = self._motion(channel, angles)
@@ -99,7 +99,7 @@ class RunSignals:
         lag = plant.value(p, plant.drive.lag)
         limit = plant.value(p, plant.drive.limit)
         torque = np.clip(self.requests[: row + 1], -limit, limit)
-        state[plant.drive.torque] = lagged(np.append(0.0, torque), lag, self.step)[-1] if lag > 0.0 else torque[-1]
+        state[plant.drive.torque] = apply_lag(np.append(0.0, torque), lag, self.step)[-1] if lag > 0.0 else torque[-1]
         for place, followed in plant.followers:
             state[place] = state[followed]
         return state
@@ -180,7 +180,7 @@ class Simulation:
     @cached_property
     def measured(self) -> Array:
         """The angles (n, channels) as they were, from how the log has them."""
-        return self.signals.aligned_angles(self.plant, self.p)
+        return self.signals.angles_in_time(self.plant, self.p)
 
     @cached_property
     def _requests(self) -> tuple[Array, Array]:

@@ -64,7 +64,7 @@ def summarise(diagnosis: Diagnosis) -> Iterator[str]:
     for nuisance in diagnosis.nuisances:
         yield f"  In the log: {nuisance_words(nuisance)}"
     yield from _values(diagnosis)
-    yield _left(diagnosis)
+    yield _remainder_text(diagnosis)
     yield from _motion(diagnosis)
     yield from next_steps(diagnosis)
 
@@ -80,7 +80,7 @@ def summarise_fmu(diagnosis: DiagnosisOutcome) -> Iterator[str]:
         yield sizes_line(effect)
         yield f"    {sureness(effect)}"
         yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{test_words(effect)}."
-    left = " and ".join(f"{left_percent(share)} of {name}" for name, share in diagnosis.left.items())
+    left = " and ".join(f"{remainder_percent(share)} of {name}" for name, share in diagnosis.left.items())
     strongest = [f"at {one.site} {one.words}" for one in diagnosis.remaining[:2]]
     follows = "; ".join(strongest) if strongest else "it follows no signal"
     yield f"What is left (rms, where the model was fitted): {left}; {follows}."
@@ -102,7 +102,7 @@ def effect_words(label: str) -> str:
     return words if site in parts else f"{words} {SITES.get(site, site)}".strip()
 
 
-def listed(labels: Sequence[str]) -> str:
+def list_effects(labels: Sequence[str]) -> str:
     """Return effects in words, as a list in a sentence."""
     words = [effect_words(label) for label in labels]
     return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
@@ -125,14 +125,14 @@ def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
     if diagnosis.verdict == "effects":
         named = [effect.label for effect in diagnosis.graded(Grade.LIKELY)]
         return (
-            f"Verdict: effects. The {compared} lacks {listed(named)}."
+            f"Verdict: effects. The {compared} lacks {list_effects(named)}."
             if named
             else "Verdict: effects, in the log alone."
         )
     near = [effect.label for effect in diagnosis.effects]
     why = "no effect of the library is likely" if diagnosis.searched else "no search was made"
     text = f"Verdict: unknown. The {compared} misses something, and {why}."
-    return text + (f" Possible: {listed(near)}." if near else "")
+    return text + (f" Possible: {list_effects(near)}." if near else "")
 
 
 def play_of(diagnosis: Diagnosis) -> Play | None:
@@ -206,7 +206,7 @@ def sureness(effect: GradedEffect) -> str:
     if reasons:
         text += f"; not surer, for {reasons[0]}"
     if evidence.family:
-        text += f"; the record does not tell it from {listed(evidence.family)}"
+        text += f"; the record does not tell it from {list_effects(evidence.family)}"
     if not effect.in_model:
         text += "; it is not in the corrected model"
     return f"{text}."
@@ -240,18 +240,19 @@ def _values(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"Values of the model that were re-fitted: {', '.join(changed)}."
 
 
-def _left(diagnosis: Diagnosis) -> str:
+def _remainder_text(diagnosis: Diagnosis) -> str:
     if not diagnosis.left:
         return "What is left is noise."
     parts = [
-        f"{left_percent(share)} of the torque at {BODIES.get(name, name)}" for name, share in diagnosis.left.items()
+        f"{remainder_percent(share)} of the torque at {BODIES.get(name, name)}"
+        for name, share in diagnosis.left.items()
     ]
     text = f"What is left (rms, where the model was fitted): {' and '.join(parts)}"
     strongest = [f"at {BODIES.get(one.site, one.site)} {one.words}" for one in diagnosis.remaining[:2]]
     return f"{text}; {'; '.join(strongest)}." if strongest else f"{text}; it follows no signal."
 
 
-def left_percent(power: float) -> str:
+def remainder_percent(power: float) -> str:
     """Return what is left of a signal in words."""
     return f"{100.0 * math.sqrt(power):.2g} %"
 
@@ -281,6 +282,6 @@ def next_steps(diagnosis: DiagnosisOutcome) -> Iterator[str]:
     if diagnosis.misses_test_data or diagnosis.verdict == "unknown":
         yield f"Next: record {REPEAT}."
     for experiment, labels in open_questions.items():
-        yield f"Next, to settle {listed(labels)}: record {experiment}."
+        yield f"Next, to settle {list_effects(labels)}: record {experiment}."
     if not open_questions and diagnosis.verdict == "effects":
         yield "Next: judge the corrected model on another record of the machine, without a search."

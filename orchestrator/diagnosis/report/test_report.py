@@ -88,14 +88,14 @@ def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> 
     """
     parts = test_signals(workings.test_data, workings.balances[0])
 
-    def missed(point: ModelPoint) -> float:
+    def misses_at(point: ModelPoint) -> float:
         p = workings.balances[0].physical_values(workings.search.problem.record_points(point)[0])
         misfits = (
             run_misfit(model.plant, p, signals, first, settings.report) / signals.noise for _, signals, first in parts
         )
         return sum(float(np.sum(one**2)) for one in misfits)
 
-    return missed
+    return misses_at
 
 
 def torque_comparison(
@@ -119,7 +119,7 @@ def torque_comparison(
     found = workings.search
     problem = replace(found.problem, models=models)
 
-    def seen(point: ModelPoint) -> ModelPoint:
+    def point_of_test_data(point: ModelPoint) -> ModelPoint:
         own, shared = found.problem.record_points(point), len(problem.shared)
         local: list[float] = []
         for number, balance, share in records:  # of a record that was not fitted nothing is known
@@ -127,12 +127,14 @@ def torque_comparison(
             local += own[number].parameters[shared:] if share else unknown
         return ModelPoint((*point.parameters[:shared], *local), point.effects)
 
-    problem = problem.reweighted(seen(found.final.point))
+    problem = problem.reweight(point_of_test_data(found.final.point))
     blocks, rows = problem.blocks_after(fitted)
     if rows.size < LEAST_TEST_ROWS:
         return lambda point: None
-    final = problem.whitened([seen(found.final.point)])[0][rows]
-    return lambda point: compare_residuals(problem.whitened([seen(point)])[0][rows], final, blocks)
+    final = problem.whiten_residuals([point_of_test_data(found.final.point)])[0][rows]
+    return lambda point: compare_residuals(
+        problem.whiten_residuals([point_of_test_data(point)])[0][rows], final, blocks
+    )
 
 
 def run_misfit(plant: Plant, p: Array, signals: RunSignals, first: int, settings: ReportSettings) -> Array:

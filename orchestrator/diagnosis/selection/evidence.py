@@ -23,7 +23,7 @@ def record_evidence(result: SearchResult) -> RecordEvidence:
     """Return what the record says of the final model as a whole."""
     problem = result.problem
     left = torque_shares(problem, result.final.point)
-    inertia, error, spread = recorded_inertia(problem, result.final)
+    inertia, error, spread = inertia_of_record(problem, result.final)
     if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
         spread = np.inf
     return RecordEvidence(float(left.max()), inertia, error, spread)
@@ -69,7 +69,7 @@ def torque_shares(problem: FitProblem, point: ModelPoint) -> Array:
     shares = []
     for model, seen in zip(problem.models, problem.record_points(point), strict=True):
         plain = band_only(model, problem.settings)
-        driving = model.driving(seen)
+        driving = model.reference_signals(seen)
         power = [
             plain.apply(one).reshape(len(plain.active), -1)
             for one in (model.residuals([seen])[0], driving - driving.mean(axis=1, keepdims=True))
@@ -91,7 +91,7 @@ def size_over_error(problem: FitProblem, fitted: FittedModel, label: str) -> flo
     return float(np.sqrt(max(square, 0.0) / len(places)))
 
 
-def recorded_inertia(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float]:
+def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float]:
     """Return the inertia that the record asks for by itself, in units of the nominal one, its error and its spread.
 
     The priors are off, and torque is regressed on motion: an inertia far from the model file's tells that the record

@@ -74,7 +74,7 @@ def _fit_curve(result: SearchResult, argument: LawArgument) -> Dependence | None
     knots = knots_of(np.concatenate(argument.values))
     if knots is None:
         return None
-    columns = _whitened_hats(problem, argument, knots)
+    columns = _whiten_hats(problem, argument, knots)
     own = [n for n, one in enumerate(final.coordinates) if isinstance(one, int)]
     whole = np.column_stack([final.jacobian[:, own], columns])
     prior, slopes = (part[own] for part in problem.prior(final.point, final.coordinates))
@@ -100,7 +100,7 @@ def _fit_curve(result: SearchResult, argument: LawArgument) -> Dependence | None
     )  # fmt: skip
 
 
-def _whitened_hats(problem: FitProblem, argument: LawArgument, knots: Array) -> Array:
+def _whiten_hats(problem: FitProblem, argument: LawArgument, knots: Array) -> Array:
     """Return (rows, k) the whitened residuals of a unit torque against the motion at each knot."""
     columns = []
     for k in range(knots.size):

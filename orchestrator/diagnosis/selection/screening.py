@@ -46,10 +46,10 @@ class Screening:
             found = self._gain(effect, values, columns)
             if found is not None and (effect.label not in best or found.gain > best[effect.label].gain):
                 best[effect.label] = found
-        combed = [self._combed(effect, best[effect.label]) for effect in effects if effect.label in best]
+        combed = [self._search_comb(effect, best[effect.label]) for effect in effects if effect.label in best]
         return sorted(combed, key=lambda effect: -effect.gain)
 
-    def _combed(self, effect: CandidateEffect, best: ScreenedEffect) -> ScreenedEffect:
+    def _search_comb(self, effect: CandidateEffect, best: ScreenedEffect) -> ScreenedEffect:
         """Return the best start of an effect between the neighbours of one, where its residuals have many minima."""
         if not effect.comb:
             return best
@@ -128,7 +128,7 @@ class Screening:
         start = list(values)
         for place, part in zip(effect.amplitudes, share, strict=True):
             positive = place in effect.positive
-            start[place] = effect.bounded(
+            start[place] = effect.clip_value(
                 place, (max(float(part), 0.0) if positive else float(part)) * effect.scales[place]
             )
         if effect.positive and all(start[place] <= 0.0 for place in effect.positive):
@@ -159,6 +159,6 @@ def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[n
     return np.asarray(np.fft.ifft(bins)[: cycles.size] * count)
 
 
-def screened_point(fitted: FittedModel, screened: ScreenedEffect) -> ModelPoint:
+def start_of_fit(fitted: FittedModel, screened: ScreenedEffect) -> ModelPoint:
     """Return the point from which a model with a screened effect is fitted."""
     return fitted.point.with_effect(screened.label, screened.values)

@@ -15,7 +15,7 @@ from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreCompariso
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint
 from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
-from orchestrator.diagnosis.selection.screening import Screening, screened_point
+from orchestrator.diagnosis.selection.screening import Screening, start_of_fit
 from orchestrator.diagnosis.settings import SelectionSettings
 
 Progress = Callable[[str], None]
@@ -50,7 +50,7 @@ def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
 
 def settle(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, FittedModel]:
     """Return the problem with the whitening and the prior weight that a model asks for, and the model fitted there."""
-    problem = weigh_prior(problem.reweighted(fitted.point), fitted)
+    problem = weigh_prior(problem.reweight(fitted.point), fitted)
     return problem, fit_model(problem, fitted.point)
 
 
@@ -91,13 +91,13 @@ class _Search:
             result = replace(result, steps=(*result.steps, step))
             if step.entry is None:
                 break
-            pruned = self._pruned(problem, step.entry.fitted)
+            pruned = self._prune(problem, step.entry.fitted)
             gone = set(step.entry.fitted.labels) - set(pruned.labels)
             problem, final = settle_anew(problem, pruned)
             result = replace(result, problem=problem, final=final, refused=result.refused | gone)
-        return self._reviewed(result)
+        return self._review(result)
 
-    def _reviewed(self, result: SearchResult) -> SearchResult:
+    def _review(self, result: SearchResult) -> SearchResult:
         """Return the result with the family of each effect as the final model has it, and its simplest one in place.
 
         While others were missing, an effect may have stood for part of them, or have looked different from its like.
@@ -106,7 +106,7 @@ class _Search:
             problem, model = result.problem, result.final
             without = fit_model(problem, model.point.without_effects([label]), 3)
             reviewed = TriedEffect(label, compare(without, model), model)
-            tried = self._tried(problem, without, frozenset((label,)), self.settings.refined)
+            tried = self._try_effects(problem, without, frozenset((label,)), self.settings.refined)
             step = self._simplest(problem, without, reviewed, (reviewed, *tried))
             result = replace(result, reviews={**result.reviews, step.taken: step})
             if step.taken != label:
@@ -116,14 +116,14 @@ class _Search:
 
     def _step(self, result: SearchResult, first: bool) -> tuple[FitProblem, SearchStep]:
         problem, model = result.problem, result.final
-        tried = self._tried(problem, model, result.refused, self.settings.refined)
-        step = self._chosen(problem, model, tried, result.refused, first)
+        tried = self._try_effects(problem, model, result.refused, self.settings.refined)
+        step = self._choose_step(problem, model, tried, result.refused, first)
         if step.taken:
             return problem, step
         second = self._under_own_noise(problem, model, tried, result.refused)
         if second is None:
             second = self._under_own_noise(
-                problem, model, self._tried_quietly(problem, model, result.refused), result.refused
+                problem, model, self._try_quietly(problem, model, result.refused), result.refused
             )
         return second or (problem, step)
 
@@ -134,20 +134,20 @@ class _Search:
         quieter = self._quieter_problem(problem, model, tried)
         if quieter is None:
             return None
-        before, again = self._compared(quieter, model, tried)
-        step = self._chosen(quieter, before, again, refused, first=False)
+        before, again = self._compare_again(quieter, model, tried)
+        step = self._choose_step(quieter, before, again, refused, first=False)
         return (quieter, step) if step.taken else None
 
-    def _tried_quietly(self, problem: FitProblem, model: FittedModel, refused: frozenset[str]) -> list[TriedEffect]:
+    def _try_quietly(self, problem: FitProblem, model: FittedModel, refused: frozenset[str]) -> list[TriedEffect]:
         """Return effects that were fitted where little of what is left counts as unknown torques or inputs."""
-        quiet = problem.reweighted(model.point, quiet=True)
+        quiet = problem.reweight(model.point, quiet=True)
         pairs = zip(quiet.whitenings, problem.whitenings, strict=True)
         louder = max(float(np.max(np.abs(a.weights) / np.maximum(np.abs(b.weights), 1e-300))) for a, b in pairs)
         if louder < LOUDER:
             return []
-        return self._tried(quiet, fit_model(quiet, model.point), refused, self.settings.refined)
+        return self._try_effects(quiet, fit_model(quiet, model.point), refused, self.settings.refined)
 
-    def _compared(
+    def _compare_again(
         self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect]
     ) -> tuple[FittedModel, list[TriedEffect]]:
         """Return a model and the effects tried on top of it, fitted again in a problem of another whitening."""
@@ -167,7 +167,7 @@ class _Search:
         rising: list[tuple[float, FitProblem, list[TriedEffect]]] = []
         for one in tried[: self.settings.look_ahead]:
             own, fitted = settle(problem, one.fitted)
-            _, again = self._compared(own, model, [replace(one, fitted=fitted)])
+            _, again = self._compare_again(own, model, [replace(one, fitted=fitted)])
             if again[0].comparison.gain > one.comparison.gain:
                 rising.append((again[0].comparison.gain, own, again))
         if not rising:
@@ -176,13 +176,13 @@ class _Search:
         others = [one for one in tried[: self.settings.look_ahead] if one.label != leading[0].label]
         for _ in range(self.settings.most_effects):
             quieter, fitted = settle(own, leading[0].fitted)
-            _, again = self._compared(quieter, model, [replace(leading[0], fitted=fitted), *leading[1:], *others])
+            _, again = self._compare_again(quieter, model, [replace(leading[0], fitted=fitted), *leading[1:], *others])
             if again[0].comparison.gain <= gain:
                 break
             gain, own, leading, others = again[0].comparison.gain, quieter, again, []
         return own
 
-    def _chosen(
+    def _choose_step(
         self,
         problem: FitProblem,
         model: FittedModel,
@@ -206,11 +206,13 @@ class _Search:
         chosen = min(family, key=lambda trial: (problem.effects[trial.label].law_values, -trial.comparison.gain))
         return SearchStep(model, tuple(tried), chosen.label, tuple(one.label for one in family if one is not chosen))
 
-    def _tried(self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int) -> list[TriedEffect]:
+    def _try_effects(
+        self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int
+    ) -> list[TriedEffect]:
         screening = Screening(problem, model)
         tried = []
         for screened in screening.screen(self._candidates(problem, model, refused))[:count]:
-            fitted = fit_model(problem, screened_point(model, screened))
+            fitted = fit_model(problem, start_of_fit(model, screened))
             tried.append(TriedEffect(screened.label, compare(model, fitted), fitted))
             self.progress(" + ".join((*model.labels, screened.label)))
         return sorted(tried, key=lambda trial: -trial.comparison.gain)
@@ -240,7 +242,7 @@ class _Search:
         """Return the effect whose model, with the best second one, has the least score."""
         scores = []
         for one in fair:
-            second = self._tried(problem, one.fitted, refused, self.settings.look_ahead)
+            second = self._try_effects(problem, one.fitted, refused, self.settings.look_ahead)
             pays = [two.fitted.score for two in second if self._pays(problem, one.fitted, two)]
             scores.append(min([one.fitted.score, *pays]))
         return fair[int(np.argmin(scores))]
@@ -248,7 +250,7 @@ class _Search:
     def _is_alike(self, problem: FitProblem, model: FittedModel, best: TriedEffect, other: TriedEffect) -> bool:
         return self._pays(problem, model, other) and not self._gains(compare(other.fitted, best.fitted))
 
-    def _pruned(self, problem: FitProblem, model: FittedModel) -> FittedModel:
+    def _prune(self, problem: FitProblem, model: FittedModel) -> FittedModel:
         """Return the model without earlier effects that no longer pay, or that the last one stands for."""
         for label in model.labels[:-1]:
             simpler = any(label in problem.effects[other].contains for other in model.labels)
