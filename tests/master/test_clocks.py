@@ -1,19 +1,23 @@
-"""Times of periodic clocks: exact, merged, and refused where a clock would stand still."""
+"""Periodic clocks: exact times, refused where one would stand still; ticks under the algorithms with a fixed step."""
 
+import math
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.master.algorithms import GaussSeidel, Jacobi
+from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi
 from orchestrator.master.clocks import ClockSchedule
 from orchestrator.master.protocol import EventUpdate, PeriodicClock
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Table
-from orchestrator.master.system import SignalSource, System
-from tests.support.mock_event_slave import event_instance
+from orchestrator.master.system import Connection, Instance, SignalSource, System
+from tests.support.bouncing_ball import BALL
+from tests.support.mock_event_slave import event_instance, go
 from tests.support.mock_slave import instance, model, variable
+
+ALGORITHMS = [GaussSeidel, Jacobi, Iterated]
 
 
 def clocked(name, **clocks):
@@ -92,3 +96,79 @@ def test_sources_are_those_at_the_tick_wherever_it_is_in_a_step(algorithm) -> No
         session.run()
     times = 0.02 + 0.07 * np.arange(9)
     np.testing.assert_allclose(seen, np.transpose([times, 1.0 + 2.0 * times]), rtol=1e-12)
+
+
+def ticking(name: str, interval: Fraction, inputs=(), seen=None) -> Instance:
+    """A slave whose output is its state, which a tick makes one more than the sum of its inputs, seen at once."""
+    names = [f"u{k}" for k in range(len(inputs))]
+    clock = PeriodicClock(interval, variables=(*names, "y"))
+    kind = model(
+        "Ticking",
+        *(variable(n, "input", variability="discrete") for n in names),
+        variable("y", "output", variability="discrete"),
+        feedthrough={"y": names},
+        has_events=True,
+        clocks={"clock": clock},
+    )
+
+    def outputs(v):
+        if v["active"]:
+            v["y"] = v.get("count", 0) + sum(v[n] for n in names)
+
+    def update(v):
+        if v["active"]:
+            outputs(v)
+            v["count"] = v.get("count", 0) + 1
+            if seen is not None:
+                seen.append((name, round(v["time"], 12), v["y"]))
+        return EventUpdate()
+
+    return event_instance(name, kind, go, update, outputs)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+@pytest.mark.parametrize("step", [0.1, 0.07])
+def test_a_clock_ticks_whatever_the_step_is(algorithm, step) -> None:
+    seen: list[tuple[str, float, float]] = []
+    system = System((ticking("counter", Fraction(1, 5), seen=seen),))
+    with Session(system, ["counter.y"], algorithm(step), 30 * step) as session:
+        result = session.run()
+    ticks = [round(0.2 * n, 12) for n in range(math.floor(30 * step / 0.2 + 1e-9) + 1)]
+    assert [time for _, time, _ in seen] == ticks
+    assert result.statistics.events.ticks == len(ticks)
+    assert result.statistics.events.times == ()
+    np.testing.assert_array_equal(result["counter.y"], np.floor(result.time / 0.2 + 1e-9))
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_clocks_that_tick_together_pass_values_on_in_the_order_of_the_graph(algorithm) -> None:
+    """Declared the wrong way round: plant, estimator, controller; the controller sees this instant's estimate."""
+    seen: list[tuple[str, float, float]] = []
+    system = System(
+        (
+            ticking("controller", Fraction(1, 5), ["estimator"], seen),
+            ticking("estimator", Fraction(1, 10), ["plant"], seen),
+            ticking("plant", Fraction(1, 10), [], seen),
+        ),
+        (Connection("plant.y", "estimator.u0"), Connection("estimator.y", "controller.u0")),
+    )
+    with Session(system, ["controller.y"], algorithm(0.3), 0.6) as session:
+        session.run()
+    found = {(name, time): value for name, time, value in seen}
+    for n in range(7):
+        t = round(0.1 * n, 12)
+        assert found["plant", t] == n
+        assert found["estimator", t] == 2 * n
+        if n % 2 == 0:
+            assert found["controller", t] == 2 * n + n // 2
+
+
+def test_a_tick_and_an_event_at_one_time() -> None:
+    seen: list[tuple[str, float, float]] = []
+    ball = event_instance("ball", BALL, go, lambda v: EventUpdate(next_event=0.4 if v["time"] < 0.39 else None))
+    system = System((ticking("counter", Fraction(1, 5), seen=seen), ball))
+    with Session(system, ["counter.y"], GaussSeidel(0.25), 1.0) as session:
+        statistics = session.run().statistics
+    assert statistics.events.times == (0.4,)
+    assert statistics.events.ticks == len(seen) == 6
+    assert statistics.events.instants == 6
