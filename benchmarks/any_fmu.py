@@ -18,13 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.any_fmu_plants import INSIDE, PLANTS, Case, Maker, Plant
+from benchmarks.any_fmu_plants import INSIDE, PLANTS, Plant
+from benchmarks.any_fmu_records import Case, Maker
 from benchmarks.diagnosis import print_figures
 from benchmarks.judging import Row, Truth, judge, parameter_line
 from benchmarks.rows import run_tasks
 from benchmarks.verdicts import diagnose_with_fmu
 from orchestrator.diagnosis.fmu.bank import BANK
-from tests.support.box_fmu import DOMAINS, coupled_record, record, write_fmu, write_map, write_record, write_scenario
+from tests.support.box_fmu import DOMAINS, write_fmu, write_map, write_scenario
+from tests.support.box_records import coupled_record, record, write_record
 
 SAME = {"input_offset": "load", "load": "input_offset"}
 LEAST, MOST = 3.0, 60.0

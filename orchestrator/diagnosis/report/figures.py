@@ -15,9 +15,9 @@ from orchestrator.diagnosis.report.corrected import BeforeAfter
 from orchestrator.diagnosis.report.summary import effect_words
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect
 from orchestrator.plants.effects import Effect
+from orchestrator.shared.drawing import BLUE, GREY, ORANGE
 
 Array = NDArray[np.float64]
-BLUE, ORANGE, GREY = "#2166ac", "#d6604d", "#777777"
 DPI = 130
 TITLE_WIDTH = 90  # characters of a line
 BINS = 40

@@ -25,7 +25,8 @@ from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import FmuCalibrationFound, FmuDiagnosisFound
-from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
+from tests.support.box_fmu import DOMAINS, write_fmu, write_map
+from tests.support.box_records import record, write_record
 from tests.support.c_fmu import have_compiler
 
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="no C compiler")

@@ -7,7 +7,8 @@ import pytest
 
 from orchestrator.api.diagnose import diagnose
 from orchestrator.diagnosis.fmu.corrected_ssp import effect_parts, write_corrected
-from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
+from tests.support.box_fmu import DOMAINS, write_fmu, write_map
+from tests.support.box_records import record, write_record
 from tests.support.c_fmu import have_compiler
 
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="no C compiler")

@@ -16,7 +16,8 @@ from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import ModelInterface, Variable
 from tests.support.answers_fmu import build_answers_fmu
-from tests.support.box_fmu import DOMAINS, FINE, _run, excitation, write_fmu
+from tests.support.box_fmu import DOMAINS, write_fmu
+from tests.support.box_records import FINE, excitation, simulate
 from tests.support.c_fmu import have_compiler
 
 compiled = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
@@ -29,9 +30,9 @@ def record_of_a_circuit(folder: Path, rows: int = 900) -> tuple[Path, float]:
     rng = np.random.default_rng(5)
     p = np.array([v for v, _ in CIRCUIT.parameters.values()]) * (1.02, 0.97, 1.03)
     u = excitation(CIRCUIT, rng, rows)
-    plain = _run(CIRCUIT, p, np.repeat(u[:-1], FINE), 0, np.zeros(3), rows)
+    plain = simulate(CIRCUIT, p, np.repeat(u[:-1], FINE), 0, np.zeros(3), rows)
     size = 0.2 * float(np.std(u)) / float(np.std(plain[:, 1])) ** 2
-    i = _run(CIRCUIT, p, np.repeat(u[:-1], FINE), 2, np.array([size, 0.0, 0.0]), rows)[:, 1]
+    i = simulate(CIRCUIT, p, np.repeat(u[:-1], FINE), 2, np.array([size, 0.0, 0.0]), rows)[:, 1]
     table = np.column_stack([np.arange(rows) * CIRCUIT.h, u, i + NOISE * rng.standard_normal(rows)])
     path = folder / "record.csv"
     np.savetxt(path, table, fmt="%.10g", delimiter=",", header="time,U,i", comments="")

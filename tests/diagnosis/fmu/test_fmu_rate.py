@@ -6,7 +6,8 @@ import pytest
 from orchestrator.api.diagnose import diagnose
 from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor
 from orchestrator.diagnosis.settings import DiagnosisSettings, FmuSettings
-from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
+from tests.support.box_fmu import DOMAINS, write_fmu, write_map
+from tests.support.box_records import record, write_record
 from tests.support.c_fmu import have_compiler
 
 NOISE = 1e-3
