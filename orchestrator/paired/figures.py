@@ -1,6 +1,7 @@
 """Figures of paired runs, of sweeps and of signals of a scenario.
 
 They are drawn with matplotlib's object interface (no global state, no display).
+
 In all functions: ``actual``: (n,) half-gaps [rad]; ``estimated``: (n,) [rad]; ``noise``: (n,) encoder noise of each
 case [rad].
 """

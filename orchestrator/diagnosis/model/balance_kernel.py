@@ -67,7 +67,7 @@ def _kernel(plant: Plant, usual: bool) -> Any:
         )
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def moved(hidden: Any, rate: Any, step: float) -> Any:
+    def advance(hidden: Any, rate: Any, step: float) -> Any:
         return hidden[0] + step * rate[5], hidden[1] + step * rate[6], hidden[2] + step * rate[7]
 
     @njit_on_disk(error_model="numpy", nogil=True, **ALGEBRA)
@@ -82,9 +82,9 @@ def _kernel(plant: Plant, usual: bool) -> Any:
             if moves and n + 1 < motion.shape[0]:
                 then = (motion[n + 1, 0], motion[n + 1, 1], motion[n + 1, 2], motion[n + 1, 3])
                 half = between(now, then, step)
-                k2 = rate_at(half, moved(hidden, k1, 0.5 * step), direction, values)
-                k3 = rate_at(half, moved(hidden, k2, 0.5 * step), direction, values)
-                k4 = rate_at(then, moved(hidden, k3, step), direction, values)
+                k2 = rate_at(half, advance(hidden, k1, 0.5 * step), direction, values)
+                k3 = rate_at(half, advance(hidden, k2, 0.5 * step), direction, values)
+                k4 = rate_at(then, advance(hidden, k3, step), direction, values)
                 hidden = (
                     hidden[0] + step / 6.0 * (k1[5] + 2.0 * k2[5] + 2.0 * k3[5] + k4[5]),
                     hidden[1] + step / 6.0 * (k1[6] + 2.0 * k2[6] + 2.0 * k3[6] + k4[6]),
