@@ -62,8 +62,14 @@ def test_rules_of_sarif_name_the_place_in_the_standard() -> None:
     (run,) = json.loads(as_sarif(mixed()))["runs"]
     rules = {r["id"]: r for r in run["tool"]["driver"]["rules"]}
     assert set(rules) == {name for name, rule in RULES.items() if "2.0" in rule.versions}
-    assert f"section {RULES[ERROR].anchor['2.0']}" in rules[ERROR]["help"]["text"]
-    assert rules[ERROR]["helpUri"].startswith("https://")
+    texts = "FMI 2.0.4, section 2.2.7; FMI 3.0.2, section 2.4.7.5"
+    assert rules[ERROR]["fullDescription"]["text"] == f"The unit is defined. ({texts})"
+    assert rules[ERROR]["help"]["text"] == f"Add it to UnitDefinitions. Source: {texts}."
+    assert rules[ERROR]["helpUri"] == "https://fmi-standard.org/docs/3.0.2/#_type_specific_properties"
+    assert f"section 2.4.7.5]({rules[ERROR]['helpUri']})" in rules[ERROR]["help"]["markdown"]
+    own = rules["archive.not-a-zip"]
+    assert "helpUri" not in own
+    assert own["help"]["markdown"].endswith("Source: a rule of fmu-check, not of the standard.")
     for name, rule in rules.items():
         assert rule["help"]["text"].startswith(RULES[name].advice[0].upper())
 
