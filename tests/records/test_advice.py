@@ -117,6 +117,7 @@ COUNTS = _csv("time,u,theta_m [counts],theta_l", _scaled(theta_m=8192.0 / (2.0 *
 PERCENT = _csv("time,u [%],theta_m,theta_l", _scaled(u=2.0))
 WRAPPED = _csv(None, lambda t: t | {"theta_m": np.degrees(t["theta_m"]) % 360.0, "theta_l": np.degrees(t["theta_l"])})
 OVERFLOW = _csv("time [ms],u,theta_m,theta_l", _with("time", lambda t: np.round(1e3 * t["time"] + 64000.0) % 65536.0))
+SECONDS = _csv(None, _with("time", lambda t: np.round((t["time"] + 57.5) % 60.0, 9)))
 TWO_RUNS = _edited(lambda lines: [*lines, *lines[1:]])
 ROUNDED = _csv(None, _with("time", lambda t: np.floor(t["time"] * 20.0) / 20.0))
 SAME_NAMES = _csv("time,u,q,q", lambda t: t)
@@ -157,6 +158,9 @@ ADVICE: dict[str, tuple[Input, str, Input]] = {
     "time counter that overflows": (
         Input(OVERFLOW), "say `[columns.time] modulo = 65536`",
             Input(OVERFLOW, {"time": Column(modulo=65536.0)}, model={}),
+    ),
+    "seconds of a minute": (
+        Input(SECONDS), "say `[columns.time] modulo = 60`", Input(SECONDS, {"time": Column(modulo=60.0)}, model={}),
     ),
     "two runs, by a part": (
         Input(TWO_RUNS), "keep one run by `part` START:END", Input(TWO_RUNS, reading=Reading(part=(0.0, 4.0))),

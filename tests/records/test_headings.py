@@ -59,6 +59,7 @@ def test_key_value_lines_of_a_scope(tmp_path: Path, columns: dict[str, np.ndarra
     path.write_text(SCOPE + _rows(scaled), encoding="utf-8")
     _same(path, columns, NUMBERED | {"time": Column("#1", "ms")})
     notes = _same(path, columns, {"time": Column("#1", "ms")}, header=5)
+    assert "not used" not in notes[0]
     assert any("`SetTorque` taken as u" in note for note in notes)
 
 
@@ -156,6 +157,27 @@ def test_numbers_of_channels_above_the_names(tmp_path: Path, columns: dict[str, 
     path = tmp_path / "log.csv"
     path.write_text("1,2,3,4\ntime,u,theta_m,theta_l\n" + _rows(columns, ","))
     _same(path, columns, {})
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\n\n"])
+def test_a_row_that_is_cut_off_at_the_end_is_refused(tmp_path: Path, end: str) -> None:
+    path = tmp_path / "log.csv"
+    rows = "n;stamp\n" + "".join(f"{n};2024-05-13 08:00:{n:02d}\n" for n in range(20))
+    path.write_text(rows + "20;2024-05-13 08:00:20" + end)
+    with open_source(path) as source:
+        numbers, stamps = source.load((0, 1))
+        assert (numbers.size, stamps.size) == (21, 21)
+    path.write_text(rows + "20" + end)
+    with open_source(path) as source, pytest.raises(RecordError, match=r"row 21 must have 2 fields .* cut off; delete"):
+        source.load((0, 1))
+
+
+def test_a_long_cell_is_shown_by_its_beginning(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    for cell, shown in (("x" * 60, "x" * 60), ("x" * 61, "x" * 57 + "...")):
+        path.write_text("a;b\n" + "1;2\n" * 30 + f"1;{cell}\n")
+        with open_source(path) as source, pytest.raises(RecordError, match=rf"row 31, .* but is `{shown}`"):
+            source.load((0, 1))
 
 
 def test_truth_values_are_numbers(tmp_path: Path) -> None:

@@ -94,6 +94,15 @@ def test_an_encoder_that_sticks_is_named_with_its_rows() -> None:
         check_moving(arrays, "theta_l", "pos", "a.csv")
 
 
+def test_a_motor_that_stands_still_is_stuck_where_something_drives_it() -> None:
+    still, moving = np.ones(100), np.arange(100.0)
+    for arrays in ({"u": moving, "theta_m": still}, {"theta_m": still, "theta_l": moving}):
+        with pytest.raises(RecordError, match=r"column `pos` must change, but is 1 in all 100 rows"):
+            check_moving(arrays, "theta_m", "pos", "a.csv")
+    for arrays in ({"u": still, "theta_m": still}, {"u": still, "theta_m": still, "theta_l": still}):
+        check_moving(arrays, "theta_m", "pos", "a.csv")
+
+
 def test_a_load_that_rests_while_the_motor_crosses_the_gap_is_well() -> None:
     motor = 4.0 * held(0, 1)
     check_moving({"theta_m": motor, "theta_l": held(50, 78)}, "theta_l", "pos", "a.csv")
@@ -127,6 +136,15 @@ def test_a_grid_with_gaps() -> None:
     assert grid.timing.describe() == "4 Hz, no jitter, 3 rows missing in 2 gaps (longest 0.5 s)"
 
 
+def test_gaps_between_stamps_that_jitter_lose_no_rows() -> None:
+    """Most steps are longer than the mean one: counted in those, a gap of six rows would be one of five."""
+    stamps = 0.005 * np.concatenate([[0.0], np.cumsum(np.resize([1.08, 1.08, 0.84], 599))])
+    place = np.flatnonzero(np.arange(600) % 40 < 34)
+    grid = grid_of(stamps[place], "t", "a.csv")
+    assert grid.place.tolist() == place.tolist()
+    assert grid.timing.step == pytest.approx(0.005, rel=1e-4)
+
+
 def test_a_record_of_gaps_is_refused_with_the_longest() -> None:
     place = np.array([*range(10), *range(40, 50)])
     with pytest.raises(RecordError, match=r"row 11, .* but 60 % are \(longest gap 7.5 s from 7.25 s on\)"):
@@ -135,7 +153,12 @@ def test_a_record_of_gaps_is_refused_with_the_longest() -> None:
 
 @pytest.mark.parametrize(
     ("step", "said"),
-    [(1e-9, "must step by at least"), (20.0, "looks like milliseconds"), (200.0, "must be in seconds")],
+    [
+        (1e-9, "must step by at least"),
+        (0.5, "looks like milliseconds"),
+        (99.0, "looks like milliseconds"),
+        (100.0, "must be in seconds"),  # a log at 10 kHz in microseconds
+    ],
 )
 def test_steps_of_another_unit(step: float, said: str) -> None:
     with pytest.raises(RecordError, match=said) as caught:
@@ -186,6 +209,7 @@ def test_groups_of_hdf5_are_read_to_a_depth(tmp_path: Path) -> None:
             file.create_dataset(name, data=np.arange(20.0))
         for depth, name in ((DEEPEST, "last"), (DEEPEST + 1, "beyond")):
             file.create_dataset("/".join([*(f"{name}{n}" for n in range(depth)), name]), data=np.arange(20.0))
+        file["last0/round"] = file["last0"]  # a group within itself has no end
     with open_source(tmp_path / "log.h5") as source:
         names = {head.name.rpartition(".")[2] for head in source.heads}
         assert {"time", "u", "last"} <= names

@@ -147,10 +147,13 @@ def test_hdf5_objects_and_references(tmp_path: Path) -> None:
             columns["label"].append(label.ref)
         for name, references in columns.items():
             signals.create_dataset(name, data=np.array(references, dtype=h5py.ref_dtype))
-        kind = file.create_dataset("who", data=np.zeros((1, 6), np.uint32))
-        kind.attrs["MATLAB_class"], kind.attrs["MATLAB_object_decode"] = np.bytes_("string"), 3
+        for name, kind in (("who", "string"), ("f", "function_handle"), ("n", "int32")):
+            file.create_dataset(name, data=np.zeros((1, 6), np.int32)).attrs["MATLAB_class"] = np.bytes_(kind)
+        file["who"].attrs["MATLAB_object_decode"] = 3
+        file["nothing"] = h5py.Empty(float)
     _, said = _has_all(path)
-    assert "passed over: `who` (string)" in said
+    assert said.endswith("passed over: `f` (function_handle), `who` (string)")
+    assert _read(path)[0]["n"].tolist() == [0.0] * 6
 
 
 @pytest.mark.parametrize("channel", ["u", "theta_m", "theta_l"])

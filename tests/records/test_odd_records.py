@@ -70,10 +70,13 @@ def test_a_motor_that_stands_still_in_most_of_a_record_is_said(table: Table, tmp
 
 
 def test_an_empty_time_is_refused_in_words_where_its_counter_is_said_to_overflow(table: Table, tmp_path: Path) -> None:
-    path = _write(tmp_path / "log.csv", table | {"time": np.full(table["time"].size, np.nan)})
-    for column in (Column(), Column(modulo=65536.0)):
-        with pytest.raises(RecordError, match="column `time` must be a finite number"):
-            read_record(path, {"time": column})
+    for first in (np.nan, 1.7e9):
+        time = np.full(table["time"].size, np.nan)
+        time[0] = first
+        path = _write(tmp_path / "log.csv", table | {"time": time})
+        for column in (Column(), Column(modulo=65536.0)):
+            with pytest.raises(RecordError, match="column `time` must be a finite number"):
+                read_record(path, {"time": column})
 
 
 def _servo(torque: np.ndarray) -> Record:

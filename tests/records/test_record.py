@@ -59,6 +59,7 @@ def test_columns_are_found_by_name_and_unit(columns: dict[str, np.ndarray], tmp_
     )
     names = {"time": Column("t", "ms"), "theta_m": Column("q", "deg")}
     record = read_record(path, names, further=("extra", "absent"))
+    assert "t in ms, u in N.m, q in deg" in record.notes
     assert record.theta_l is None
     assert record.step == pytest.approx(0.005)
     np.testing.assert_allclose(record.theta_m, columns["theta_m"], atol=1e-6)

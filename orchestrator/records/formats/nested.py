@@ -95,11 +95,7 @@ def _columns(entries: Sequence[Any]) -> list[Any]:
     tables = [entry for entry in entries if isinstance(entry, Mapping)]
     if len(tables) < 2 or len(tables) != len(entries):
         return tables
-    scalar = [
-        key
-        for key in tables[0]
-        if all(isinstance(t.get(key), np.ndarray) and t[key].size == 1 and t[key].dtype.kind in "fiub" for t in tables)
-    ]
+    scalar = [key for key in tables[0] if all(isinstance(t.get(key), np.ndarray) and t[key].size == 1 for t in tables)]
     rest = [{key: value for key, value in table.items() if key not in scalar} for table in tables]
     together = {key: np.array([table[key].ravel()[0] for table in tables]) for key in scalar}
     return [together, *rest] if scalar and not any(key.lower() in _DATA for key in tables[0]) else rest

@@ -95,12 +95,10 @@ class TextSource(RecordSource):
     def _check_widths(self) -> None:
         """Refuse rows with more or fewer cells than there are columns; counting separators tells without a parse."""
         width, separator = self._dialect.width, self._dialect.separator
-        body = self._text[self._dialect.start :]
-        if separator != " " and '"' not in body:
-            rows = body.count("\n") + (0 if body.endswith("\n") or not body else 1)
-            if "\n\n" not in body and body.count(separator) == rows * (width - 1):
-                return
-        self._refuse_other_widths(self._rows())
+        body = self._text[self._dialect.start :].rstrip("\n")
+        plain = separator != " " and '"' not in body and "\n\n" not in body
+        if not plain or body.count(separator) != (body.count("\n") + 1) * (width - 1):
+            self._refuse_other_widths(self._rows())
 
     def _refuse_other_widths(self, rows: list[list[str]]) -> None:
         width, separator = self._dialect.width, self._dialect.separator

@@ -1,0 +1,77 @@
+"""A record at a lower rate: what is slow stays as it is, what is quick goes, torques are averaged."""
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import RecordError
+from orchestrator.records.arrays import Record
+from orchestrator.records.filters import decimate
+
+STEP = 1e-3
+TIME = STEP * np.arange(3000)
+
+
+def record(**changes: object) -> Record:
+    slow = np.sin(2.0 * np.pi * 3.0 * TIME)
+    columns = {"u": 2.0 * TIME, "theta_m": slow, "theta_l": 0.5 * slow, "further": {"q": 3.0 * slow}}
+    return Record(TIME, source="log.csv", notes=("CSV",), **(columns | changes))
+
+
+def test_the_rate_is_the_nearest_whole_fraction_above() -> None:
+    less = decimate(record(), 180.0)
+    assert less.step == pytest.approx(5.0 * STEP)
+    assert less.averaged == 5
+    # The filter reaches 25 rows to either side, and the mean of the torque 4 rows further.
+    assert less.time[0] == pytest.approx(25.0 * STEP)
+    assert less.size == len(range(25, 3000 - 25 - 5, 5))
+    assert less.notes == ("CSV", "brought from 1000 to 200 Hz: filter to 100 Hz, every 5th sample kept")
+    assert decimate(record(), 501.0).size == 3000
+    assert decimate(record(), 500.0).step == pytest.approx(2.0 * STEP)
+
+
+def test_slow_motion_is_neither_delayed_nor_damped_and_quick_motion_goes() -> None:
+    quick = 0.1 * np.sin(2.0 * np.pi * 160.0 * TIME)
+    plain = record()
+    less = decimate(record(theta_m=plain.theta_m + quick), 200.0)
+    slow = np.sin(2.0 * np.pi * 3.0 * less.time)
+    np.testing.assert_allclose(less.theta_m, slow, atol=2e-4)
+    np.testing.assert_allclose(less.theta_l, 0.5 * slow, atol=2e-4)
+    np.testing.assert_allclose(less.further["q"], 3.0 * slow, atol=6e-4)
+    assert decimate(record(theta_l=None), 200.0).theta_l is None
+
+
+def test_noise_stays_white_and_loses_what_the_lower_rate_does_not_show() -> None:
+    noise = np.random.default_rng(0).normal(size=TIME.size)
+    less = decimate(record(theta_m=noise), 200.0).theta_m
+    assert np.var(less) == pytest.approx(1.0 / 5.0, rel=0.15)
+    assert abs(np.corrcoef(less[:-1], less[1:])[0, 1]) < 0.15
+
+
+def test_a_torque_is_averaged_over_the_sample_that_holds_it() -> None:
+    less = decimate(record(), 200.0)
+    np.testing.assert_allclose(less.u, 2.0 * (less.time + 2.0 * STEP), atol=1e-9)
+    lost = np.zeros(TIME.size)
+    lost[1001:1003] = 0.3
+    less = decimate(record(u_deviation=lost), 200.0)
+    assert np.flatnonzero(less.u_deviation).tolist() == [np.flatnonzero(np.isclose(less.time, 1.0))[0]]
+    assert less.u_deviation.max() == pytest.approx(np.sqrt(2.0 * 0.3**2 / 5.0))
+
+
+def test_missing_samples_are_bridged_where_they_weigh_little() -> None:
+    theta = np.sin(2.0 * np.pi * 3.0 * TIME)
+    few, many = theta.copy(), theta.copy()
+    few[1017] = np.nan
+    many[1000:1040] = np.nan
+    slow = decimate(record(), 100.0)
+    np.testing.assert_allclose(decimate(record(theta_m=few), 100.0).theta_m, slow.theta_m, atol=1e-4)
+    slow = decimate(record(), 200.0)
+    lost = slow.time[np.isnan(decimate(record(theta_m=many), 200.0).theta_m)]
+    assert (lost.min(), lost.max()) == (pytest.approx(0.995), pytest.approx(1.045))
+    torque = 2.0 * TIME
+    torque[500] = np.nan
+    np.testing.assert_allclose(decimate(record(u=torque), 200.0).u, slow.u, atol=1e-9)
+
+
+def test_a_rate_that_leaves_too_few_rows_is_refused() -> None:
+    with pytest.raises(RecordError, match="`rate` must leave at least 200 rows, but 20 Hz leaves 49: ask for a higher"):
+        decimate(record(), 20.0)

@@ -1,0 +1,62 @@
+"""Dates and times of day: the instants that they mean, and what is refused with its row."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import RecordError
+from orchestrator.records.stamps import is_stamp, parse_stamps, seconds_of
+
+FILE = Path("log.csv")
+
+# Stamps, and the seconds from the first one on.
+INSTANTS = {
+    "zones, one after the other": (
+        ["2024-03-31T01:59:59+01:00", "2024-03-31T03:00:00+02:00", "2024-03-31 06:30:01.5+05:30",
+         "2024-03-30T20:00:02-0500", "2024-03-31T01:00:03Z"],
+        [0.0, 1.0, 2.5, 3.0, 4.0],
+    ),
+    "a clock past two midnights": (
+        ["23:59:59,5", "00:00:00.25", "", "20:00:00", "00:00:01"], [0.0, 0.75, np.nan, 72000.5, 86401.5],
+    ),
+    "a clock that goes back a little": (["12:00:00", "11:59:59", "12:00:01"], [0.0, -1.0, 1.0]),
+    "German, over the end of a leap February": (
+        ["29.2.2024 23:59", "01.03.2024 00:00:01", "1.3.2024 01:00:00,000001"], [0.0, 61.0, 3660.000001],
+    ),
+    "nanoseconds, and more digits than those": (
+        ["2024-05-13T08:00:00.1", "2024-05-13T08:00:00.100000001", "2024-05-13T08:00:00.100000002999"],
+        [0.0, 1e-9, 2e-9],
+    ),
+    "an empty cell first": (["", "2024-05-13 08:00:00", "2024-05-13_08:00:02"], [np.nan, 0.0, 2.0]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", INSTANTS)
+def test_stamps_are_instants(name: str) -> None:
+    cells, seconds = INSTANTS[name]
+    assert all(is_stamp(cell) for cell in cells if cell)
+    np.testing.assert_allclose(seconds_of(parse_stamps(cells, "t", FILE), "t", FILE), seconds, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("cell", ["12:00", "2024-05-13", "1.5", "2024-05-13T08:00:00.", "13.05.24 08:00:00"])
+def test_other_texts_are_no_stamps(cell: str) -> None:
+    assert not is_stamp(cell)
+
+
+@pytest.mark.parametrize(
+    ("cells", "said"),
+    [
+        (["08:00:00", "", "noon"], "row 13, column `t` must be a time like the first row's, but is `noon`"),
+        (["08:00:00", "2024-05-13 08:00:00"], "row 12, column `t` must be a time like the first row's"),
+        (["2024-02-29 08:00:00", "2023-02-29 08:00:00"], "row 12, column `t` must be a date, but is `2023-02-29 08"),
+    ],
+)
+def test_a_cell_that_is_no_such_stamp_is_named_by_its_row_in_the_file(cells: list[str], said: str) -> None:
+    with pytest.raises(RecordError, match=said):
+        parse_stamps(cells, "t", FILE, before=10)
+
+
+def test_a_column_without_a_stamp_is_refused() -> None:
+    with pytest.raises(RecordError, match="column `t` must hold times, but is empty"):
+        seconds_of(parse_stamps(["", ""], "t", FILE), "t", FILE)
