@@ -27,6 +27,11 @@ def curves(axis):
     return {line.get_label(): line.get_ydata() for line in axis.lines}
 
 
+def looks(axis):
+    """Colour, style and width of each curve of a panel."""
+    return [(line.get_color(), line.get_linestyle(), line.get_linewidth()) for line in axis.lines]
+
+
 def grid_of(axis):
     return axis.xaxis.get_gridlines()[0].get_visible()
 
@@ -47,6 +52,15 @@ def test_a_pair_shows_angles_their_difference_and_torques(drawn):
     }  # fmt: skip
     assert [values[0] for values in curves(difference).values()] == [250.0]
     assert [values[0] for values in curves(torques).values()] == [5.0, 3.0, 4.0]
+    # Curves that lie on each other are told apart by dashes, too, and the reference is in the background.
+    assert looks(angles) == [(figures.GREY, ":", 1.0), (figures.BLUE, "-", 1.5), (figures.ORANGE, "--", 1.5)]
+    assert looks(torques) == [(figures.BLUE, "-", 0.9), (figures.ORANGE, "--", 0.9), (figures.GREY, "-", 0.9)]
+    (area,) = difference.collections
+    assert set(area.get_paths()[0].vertices[:, 1]) == {0.0, 250.0}
+    for axis, (x, y) in ((axis, axis.yaxis.label.get_position()) for axis in drawn["figure"].axes):
+        place = axis.get_position()
+        assert y == 0.5  # of the panel; and left of its numbers, but within the figure
+        assert 0.0 < place.x0 + x * place.width < 0.5 * place.x0
     assert [axis.get_ylabel() for axis in drawn["figure"].axes] == [
         "load angle [rad]", "difference [mrad]", "torque [N.m]"
     ]  # fmt: skip

@@ -1,5 +1,6 @@
 """The paired loops: co-simulated, compiled and monolithic, they are the same."""
 
+import csv
 import json
 from dataclasses import replace
 
@@ -80,6 +81,9 @@ def test_sweep_command_is_reproducible_and_complete(tmp_path, capsys):
     assert results["cases"] == 8
     assert results["failed"] == 0
     assert all(s["mean_percent"] < 0.5 for s in results["statistics"])
+    rows = list(csv.DictReader((tmp_path / "a" / "sweep.csv").read_text(encoding="utf-8").splitlines()))
+    quiet, noisy = ([float(row["error"]) for row in rows if float(row["noise"]) == level] for level in (0.0, 1e-4))
+    assert sum(quiet) < 0.1 * sum(noisy)  # the noise reaches the loop
 
 
 @pytest.mark.parametrize(

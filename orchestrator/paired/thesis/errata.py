@@ -155,9 +155,9 @@ def _noise_inverse() -> Erratum:
 def _erratum_of_delay() -> Erratum:
     experiment = thesis_experiment()
     loop = make_loop(experiment)
-    zero = (np.zeros(experiment.steps + 1), np.zeros(experiment.steps + 1))
+    errors = experiment.encoder_errors(0)  # there are none
     level = 0.05 * experiment.amplitude
-    with_gap, without = (loop.run(alpha, zero)[:, 1] for alpha in (published.TABLE_4_1[-1].alpha, 0.0))
+    with_gap, without = (loop.run(alpha, errors)[:, 1] for alpha in (published.TABLE_4_1[-1].alpha, 0.0))
     reached = [float(experiment.times[np.argmax(theta > level)]) for theta in (with_gap, without)]
     return Erratum(
         9,
