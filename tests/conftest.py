@@ -3,14 +3,18 @@
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 from hypothesis import HealthCheck, settings
 
 from orchestrator.building.build import ensure_built
+from orchestrator.building.native_build import ensure_native
+from orchestrator.building.python_fmi3 import ensure_python_fmi3
 
 # What a busy computer takes longer for is no failure.
 settings.register_profile("any computer", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -63,3 +67,37 @@ def _temporary_files_end_with_the_run(tmp_path_factory: pytest.TempPathFactory) 
 def fmus() -> dict[str, Path]:
     """The three FMUs of the project, built once: model name to path."""
     return ensure_built(["Drivetrain", "LqrController", "KalmanEstimator"])
+
+
+@pytest.fixture(scope="session")
+def build_native(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Path]]:
+    """``(names, fmi=2)`` to paths of native FMUs for this platform; each is built once in a run."""
+    folder = _folder_of_all_workers(tmp_path_factory)
+
+    def build(names: Sequence[str], fmi: int = 2) -> dict[str, Path]:
+        place = folder / f"native{fmi}"
+        return _build_each(names, place, partial(ensure_native, directory=place, here=True, fmi=fmi))
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def build_python_fmi3(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Path]]:
+    """Names to paths of FMUs of FMI 3.0 that run Python; each is built once in a run."""
+    place = _folder_of_all_workers(tmp_path_factory) / "python3"
+    return lambda names: _build_each(names, place, partial(ensure_python_fmi3, directory=place))
+
+
+def _folder_of_all_workers(factory: pytest.TempPathFactory) -> Path:
+    base = factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
+def _build_each(names: Sequence[str], place: Path, ensure: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    """Build what is not there yet; a worker waits for another one that builds the same."""
+    place.mkdir(exist_ok=True)
+    paths: dict[str, Path] = {}
+    for name in names:
+        with FileLock(place / f"{name}.lock"):
+            paths |= ensure([name])
+    return paths

@@ -1,6 +1,7 @@
 """Model exchange of the native single axis: against its co-simulation, located events and differences."""
 
 import ctypes
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,6 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 
 from orchestrator.building.compilers import find_compiler
-from orchestrator.building.native_build import ensure_native
 from pyfmu_sources import servo_axis
 from pyfmu_sources.servo_axis_parameters import DEFAULTS, NAMES
 from tests.support.model_exchange import END, STEP, event_times, first_time, request, stepped_and_exchanged
@@ -46,8 +46,8 @@ OUTPUTS = ["theta_m", "omega_m", "T_m"]
 
 
 @pytest.fixture(scope="module")
-def axis(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return ensure_native(["ServoAxis"], tmp_path_factory.mktemp("native"), here=True)["ServoAxis"]
+def axis(build_native: Callable[..., dict[str, Path]]) -> Path:
+    return build_native(["ServoAxis"])["ServoAxis"]
 
 
 @pytest.mark.parametrize("name", CASES)

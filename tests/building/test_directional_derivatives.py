@@ -1,6 +1,7 @@
 """Directional derivatives of native FMUs, against differences of their own derivatives and outputs."""
 
 import ctypes
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,6 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 
 from orchestrator.building.compilers import find_compiler
-from orchestrator.building.native_build import ensure_native
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
 
@@ -59,8 +59,8 @@ CASES = {
 
 
 @pytest.fixture(scope="module")
-def plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return ensure_native(["Drivetrain"], tmp_path_factory.mktemp("native"), here=True)["Drivetrain"]
+def plant(build_native: Callable[..., dict[str, Path]]) -> Path:
+    return build_native(["Drivetrain"])["Drivetrain"]
 
 
 @pytest.fixture(scope="module")

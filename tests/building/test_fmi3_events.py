@@ -1,5 +1,6 @@
 """Co-simulation of FMI 3.0: events at their instants, early return, intermediate updates, derivatives, states."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,6 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from orchestrator.building.compilers import find_compiler
-from orchestrator.building.native_build import ensure_native
 from tests.support.fmi3_calls import Slave3
 from tests.support.native_bits import MODELS
 
@@ -24,8 +24,8 @@ AXIS_CASES: dict[str, dict[str, float]] = {
 
 
 @pytest.fixture(scope="module")
-def plants(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(list(PLANTS), tmp_path_factory.mktemp("native3"), here=True, fmi=3)
+def plants(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(list(PLANTS), fmi=3)
 
 
 def drive(slave: Slave3, n: int) -> None:

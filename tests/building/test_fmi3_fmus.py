@@ -1,6 +1,7 @@
 """FMUs of FMI 3.0 against those of FMI 2.0 that are made from the same sources."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
@@ -13,7 +14,6 @@ from lxml import etree
 from orchestrator.building.archive import read_archive
 from orchestrator.building.arrays import arrays
 from orchestrator.building.compilers import find_compiler
-from orchestrator.building.native_build import ensure_native
 from orchestrator.building.native_sources import slave_class
 from orchestrator.building.sources import catalogue, recipe_of
 from orchestrator.checking.binaries import inspect
@@ -27,13 +27,13 @@ STOP = 0.5
 
 
 @pytest.fixture(scope="module")
-def native(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(NAMES, tmp_path_factory.mktemp("native"), here=True)
+def native(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(NAMES)
 
 
 @pytest.fixture(scope="module")
-def native3(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(NAMES, tmp_path_factory.mktemp("native3"), here=True, fmi=3)
+def native3(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(NAMES, fmi=3)
 
 
 def trajectory(path: Path) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import ctypes
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,6 @@ from fmpy.validation import validate_fmu
 
 from orchestrator.building.compilers import find_compiler
 from orchestrator.building.launcher import find_toolchain
-from orchestrator.building.native_build import ensure_native
-from orchestrator.building.python_fmi3 import ensure_python_fmi3
 from orchestrator.shared.machine_code import local_compiler
 from tests.support.fmi3_calls import Slave3
 
@@ -27,10 +26,12 @@ GAP = {"alpha": 0.01, "omega_m_start": 2.0, "backlash_model": 3, "u": 3.0}
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Path]]:
+def both(
+    build_native: Callable[..., dict[str, Path]], build_python_fmi3: Callable[..., dict[str, Path]]
+) -> dict[str, dict[str, Path]]:
     return {
-        "python": ensure_python_fmi3(NAMES, tmp_path_factory.mktemp("python3")),
-        "native": ensure_native(NAMES, tmp_path_factory.mktemp("native3"), here=True, fmi=3),
+        "python": build_python_fmi3(NAMES),
+        "native": build_native(NAMES, fmi=3),
     }
 
 

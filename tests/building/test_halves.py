@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,6 @@ import pytest
 
 from benchmarks.half_drivetrains import FOLDER, STOP, compare, log_contact, simulate, solve
 from orchestrator.building.compilers import find_compiler
-from orchestrator.building.native_build import ensure_native
 from orchestrator.cli import main
 from orchestrator.master.algorithms import Adaptive
 from pyfmu_sources.load_half_slave import LoadHalf
@@ -24,8 +24,8 @@ needs_compiler = pytest.mark.skipif(find_compiler(here=True) is None, reason="no
 
 
 @pytest.fixture(scope="module")
-def halves(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(["MotorHalf", "LoadHalf"], tmp_path_factory.mktemp("halves"), here=True, fmi=3)
+def halves(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(["MotorHalf", "LoadHalf"], fmi=3)
 
 
 @needs_compiler

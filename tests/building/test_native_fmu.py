@@ -1,13 +1,13 @@
 """Native FMUs against the Python FMUs of the same source: values to the last bit, statuses, messages, states."""
 
 import importlib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from orchestrator.building.build import ensure_built
 from orchestrator.building.compilers import find_compiler
-from orchestrator.building.native_build import ensure_native
 from tests.support.native_bits import EFFECTS, MODELS, Comparison
 from tests.support.native_pair import Driver, random_calls
 
@@ -23,8 +23,8 @@ NAMES = {
 
 
 @pytest.fixture(scope="module")
-def native(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(list(NAMES), tmp_path_factory.mktemp("native"), here=True)
+def native(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(list(NAMES))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,12 +1,12 @@
 """Model exchange of the native plant, integrated by CVode, against its own co-simulation and against located events."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from orchestrator.building.compilers import find_compiler
-from orchestrator.building.native_build import ensure_native
 from pyfmu_sources import drivetrain
 from pyfmu_sources.drivetrain_parameters import parameters
 from tests.support.model_exchange import END, STEP, event_times, first_time, request, stepped_and_exchanged
@@ -36,8 +36,8 @@ OUTPUTS = ["theta_m", "theta_l", "contact"]
 
 
 @pytest.fixture(scope="module")
-def plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return ensure_native(["Drivetrain"], tmp_path_factory.mktemp("native"), here=True)["Drivetrain"]
+def plant(build_native: Callable[..., dict[str, Path]]) -> Path:
+    return build_native(["Drivetrain"])["Drivetrain"]
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -1,6 +1,7 @@
 """Own FMUs of FMI 3.0 on their input clock, driven by FMPy's low-level interface, beside those of FMI 2.0."""
 
 import ctypes
+from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
@@ -8,8 +9,6 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from orchestrator.building.native_build import ensure_native
-from orchestrator.building.python_fmi3 import ensure_python_fmi3
 from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import read_description
 from tests.support.c_fmu import have_compiler
@@ -22,13 +21,14 @@ STEP = 1e-3
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Path]]:
+def built(
+    build_native: Callable[..., dict[str, Path]], build_python_fmi3: Callable[..., dict[str, Path]]
+) -> dict[str, dict[str, Path]]:
     """Version and language to FMU by name."""
-    folder = tmp_path_factory.mktemp
     return {
-        "2": ensure_native(NAMES, folder("native2"), here=True),
-        "3": ensure_native(NAMES, folder("native3"), here=True, fmi=3),
-        "3 python": ensure_python_fmi3(["LqrController"], folder("python3")),
+        "2": build_native(NAMES),
+        "3": build_native(NAMES, fmi=3),
+        "3 python": build_python_fmi3(["LqrController"]),
     }
 
 

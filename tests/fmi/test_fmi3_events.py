@@ -1,13 +1,13 @@
 """FMUs of FMI 3.0 in event mode: as slaves by themselves, and under the master behind the walls."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from orchestrator.api.simulate import simulate
-from orchestrator.building.native_build import ensure_native
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.instances import make_slave
@@ -36,8 +36,8 @@ def started(path: Path) -> EventFmuSlave:
 
 
 @pytest.fixture(scope="module")
-def halves(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(["MotorHalf", "LoadHalf"], tmp_path_factory.mktemp("halves"), here=True, fmi=3)
+def halves(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(["MotorHalf", "LoadHalf"], fmi=3)
 
 
 # The slave by itself ----------------------------------------------------------------------------------------------

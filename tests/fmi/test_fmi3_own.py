@@ -1,13 +1,12 @@
 """Our own FMUs of FMI 3.0 beside those of 2.0: the same bits as slaves and in scenarios, mixed ones too."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from orchestrator.building.build import ensure_built
-from orchestrator.building.native_build import ensure_native
-from orchestrator.building.python_fmi3 import ensure_python_fmi3
 from orchestrator.fmi.instances import fmu_instance, make_slave
 from orchestrator.fmi.model_description import read_description
 from orchestrator.master.algorithms import GaussSeidel
@@ -26,14 +25,15 @@ ESTIMATES = ("theta_m_hat", "omega_m_hat", "theta_l_hat", "omega_l_hat", "T_l_ha
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Path]]:
+def built(
+    build_native: Callable[..., dict[str, Path]], build_python_fmi3: Callable[..., dict[str, Path]]
+) -> dict[str, dict[str, Path]]:
     """Version and language to FMU by name."""
-    folder = tmp_path_factory.mktemp
     return {
         "2 python": ensure_built(NAMES),
-        "3 python": ensure_python_fmi3(NAMES, folder("python3")),
-        "2 native": ensure_native(NAMES, folder("native2"), here=True),
-        "3 native": ensure_native(NAMES, folder("native3"), here=True, fmi=3),
+        "3 python": build_python_fmi3(NAMES),
+        "2 native": build_native(NAMES),
+        "3 native": build_native(NAMES, fmi=3),
     }
 
 

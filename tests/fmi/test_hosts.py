@@ -12,6 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,6 @@ import pytest
 
 from orchestrator.building.build import ensure_built
 from orchestrator.building.launcher import find_toolchain
-from orchestrator.building.native_build import ensure_native
 from tests.support import paired_loop
 from tests.support.fmu_calls import OK, RawFmu
 from tests.support.paired_loop import CONNECTIONS, INSTANCES, RECORDED, START_VALUES, STEP
@@ -44,12 +44,12 @@ def without_hints() -> dict[str, str]:
 
 
 @pytest.fixture(scope="module", params=["python", "native"])
-def fmus(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def fmus(request: pytest.FixtureRequest, build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
     """The FMUs that run Python, then the native ones of the same sources."""
     names = ["Drivetrain", "LqrController", "KalmanEstimator"]
     if request.param == "python":
         return ensure_built(names)
-    return ensure_native(names, tmp_path_factory.mktemp("native"), here=True)
+    return build_native(names)
 
 
 @pytest.fixture(scope="module")

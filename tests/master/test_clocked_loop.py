@@ -1,13 +1,13 @@
 """The loop of plant, estimator and controller on clocks, beside the one that samples by itself (FMI 2.0)."""
 
 import dataclasses
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orchestrator.building.native_build import ensure_native
 from orchestrator.fmi.clocks import ClockTimes
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi
@@ -27,13 +27,13 @@ THIRD = Fraction(1, 3000)
 
 
 @pytest.fixture(scope="module")
-def two(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(NAMES, tmp_path_factory.mktemp("native2"), here=True)
+def two(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(NAMES)
 
 
 @pytest.fixture(scope="module")
-def three(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(NAMES, tmp_path_factory.mktemp("native3"), here=True, fmi=3)
+def three(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(NAMES, fmi=3)
 
 
 def run(

@@ -2,6 +2,7 @@
 
 import importlib.util
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,6 @@ import pytest
 from lxml import etree
 
 from orchestrator.api.ssp import export_ssp
-from orchestrator.building.native_build import ensure_native
 from orchestrator.errors import FmuError, InputError, ScenarioError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel, Jacobi
@@ -50,8 +50,8 @@ def texts_of(package: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> dict[int, dict[str, Path]]:
-    return {fmi: ensure_native(FMUS, tmp_path_factory.mktemp(f"fmi{fmi}"), here=True, fmi=fmi) for fmi in (2, 3)}
+def built(build_native: Callable[..., dict[str, Path]]) -> dict[int, dict[str, Path]]:
+    return {fmi: build_native(FMUS, fmi=fmi) for fmi in (2, 3)}
 
 
 @pytest.fixture(scope="module", params=["3.0", "mixed"])

@@ -1,11 +1,11 @@
 """FMUs of FMI 3.0 in the loop of a black box: the bits of FMI 2.0, mixed ones too; answers other than OK are told."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orchestrator.building.native_build import ensure_native
 from orchestrator.diagnosis.fmu.coupled_fmus import Batch, CoupledFmus, LoadRequest, Run
 from orchestrator.errors import FmuError, SlaveError
 from tests.support.ball3 import build_ball
@@ -18,10 +18,9 @@ TABLE = np.random.default_rng(0).uniform(-20.0, 20.0, (400, 1))
 
 
 @pytest.fixture(scope="module")
-def halves(tmp_path_factory: pytest.TempPathFactory) -> dict[int, dict[str, Path]]:
-    folder = tmp_path_factory.mktemp
+def halves(build_native: Callable[..., dict[str, Path]]) -> dict[int, dict[str, Path]]:
     names = ["MotorHalf", "LoadHalf"]
-    return {fmi: ensure_native(names, folder(f"halves{fmi}"), here=True, fmi=fmi) for fmi in (2, 3)}
+    return {fmi: build_native(names, fmi=fmi) for fmi in (2, 3)}
 
 
 def run(motor: Path, load: Path) -> np.ndarray:
