@@ -1,6 +1,7 @@
 """Headers of shared libraries, held against binutils and against libraries that others built."""
 
 import shutil
+import struct
 import subprocess
 import sys
 from importlib.resources import files
@@ -65,6 +66,27 @@ def test_libraries_of_pythonfmu(folder: str, form: str) -> None:
 )
 def test_damaged_headers_are_no_exception(data: bytes, expected: str) -> None:
     assert inspect(data).format == expected
+
+
+@pytest.mark.parametrize(
+    ("data", "kind", "bits", "machine", "shared"),
+    [
+        (windows_library(), "PE", 64, "x86", True),
+        (windows_library(0x14C), "PE", 32, "x86", True),
+        (windows_library(0xAA64), "PE", 64, "arm", True),
+        (windows_library(0x1C4), "PE", 0, "machine 452", True),
+        (b"\xca\xfe\xba\xbe", "Mach-O", 64, "fat", True),
+        (b"\xca\xfe\xba\xbf", "Mach-O", 64, "fat", True),
+        (b"\xcf\xfa\xed\xfe" + struct.pack("<III", 0x0100000C, 0, 6), "Mach-O", 64, "arm", True),
+        (b"\xce\xfa\xed\xfe" + struct.pack("<III", 7, 0, 8), "Mach-O", 32, "x86", True),
+        (b"\xcf\xfa\xed\xfe" + struct.pack("<III", 0x01000012, 0, 2), "Mach-O", 64, "cpu 16777234", False),
+    ],
+)
+def test_headers_say_for_which_machine_a_library_is(
+    data: bytes, kind: str, bits: int, machine: str, shared: bool
+) -> None:
+    header = inspect(data)
+    assert (header.format, header.bits, header.machine, header.shared) == (kind, bits, machine, shared)
 
 
 _LIBRARIES = [p.read_bytes()[:100_000] for p in sorted(BINARIES.glob("*/*")) if p.is_file()]

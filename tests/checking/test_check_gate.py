@@ -87,6 +87,13 @@ def test_the_only_library_is_run_whatever_its_name(tmp_path: Path) -> None:
     assert not report.ok
 
 
+def test_of_several_libraries_that_of_the_model_is_run(tmp_path: Path) -> None:
+    files = fmu_files()
+    report = check_fmu(write_fmu(tmp_path / "two.fmu", files | {f"{LIBRARY[:-3]}_more.so": files[LIBRARY]}), QUICK)
+    assert {f.rule for f in report.findings if f.severity == "error"} == set()
+    assert report.executed
+
+
 def test_an_fmu_without_a_library_for_this_machine_passes_when_only_reading_is_asked_for(tmp_path: Path) -> None:
     files = fmu_files()
     del files[LIBRARY]

@@ -143,6 +143,18 @@ def test_what_cannot_be_mended_is_refused_and_leaves_no_file(fault: str, tmp_pat
     assert not target.exists()
 
 
+def test_an_unpacked_fmu_is_mended_into_a_packed_one(tmp_path: Path) -> None:
+    for name, data in without("InitialUnknowns").items():
+        place = tmp_path / "model" / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(data)
+    target = tmp_path / "mended.fmu"
+    assert any("added `der(x)`" in line for line in mend_fmu(tmp_path / "model", target).done)
+    assert errors(target) == set()
+    with zipfile.ZipFile(target) as archive:
+        assert set(archive.namelist()) == set(fmu_files())
+
+
 def test_a_good_fmu_is_left_alone_and_no_fmu_is_overwritten(tmp_path: Path) -> None:
     path = build_c_fmu(tmp_path)
     assert mend_fmu(path, tmp_path / "b.fmu").done == ()

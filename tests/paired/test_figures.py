@@ -108,6 +108,7 @@ def test_errors_are_in_percent_above_a_floor(drawn):
     draw_errors(drawn["to"], ACTUAL, np.array([0.011, 0.02, 0.03]), NOISE, "Errors")
     (axis,) = drawn["figure"].axes
     quiet, noisy = curves(axis).values()
+    assert tuple(drawn["figure"].get_size_inches()) == (7.0, 4.2)
     np.testing.assert_allclose(quiet, [10.0, 1e-7])
     np.testing.assert_allclose(noisy, [25.0])
     assert (axis.get_yscale(), axis.get_title(), axis.get_ylabel()) == ("log", "Errors", "error of the estimate [%]")

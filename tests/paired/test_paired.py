@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.errors import ChildError, SimulationError
+from orchestrator.paired.apart import run_pair_within
 from orchestrator.paired.compiled_loop import COLUMNS, make_loop
 from orchestrator.paired.cosimulation import LoopSession
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.pair import run_pair
+from orchestrator.paired.sizes import Sizes, read_sizes
+from orchestrator.shared.isolation.jail import Jail
 from tests.support.monolithic_loop import monolithic_loop
 
 
@@ -53,6 +57,32 @@ def test_estimate_of_a_pair(fmus):
     assert "outside 0.002 to 0.1 rad" in outside.no_estimate
 
 
+def test_a_run_within_a_time_is_the_run_or_says_why_not(fmus, monkeypatch):
+    inside = run_pair_within(60.0, Experiment(), fmus, 0.024, 3, {"plant.J_l": 5.5})
+    here = run_pair(Experiment(), fmus, 0.024, 3, {"plant.J_l": 5.5})
+    assert (inside.total, inside.estimate) == (here.total, here.estimate)
+    with pytest.raises(SimulationError, match=r"must take at most 0.05 s \(`time_limit`\), but takes longer"):
+        run_pair_within(0.05, Experiment(), fmus, 0.024)
+
+    def end(*_, **more):
+        raise ChildError("it was ended by signal 9", "signal")
+
+    monkeypatch.setattr(Jail, "call", end)
+    with pytest.raises(SimulationError, match="the run must come to its end, but it was ended by signal 9"):
+        run_pair_within(60.0, Experiment(), fmus, 0.024)
+
+
+@pytest.mark.parametrize(
+    ("text", "specification", "count"),
+    [
+        ("random:1", "lograndom:0.002:0.1", 1), ("random:1000000000", "lograndom:0.002:0.1", 10**9),
+        ("range:0.002:0.1:1", "range:0.002:0.1:1", 0), (" 0.01,0.02 ", "0.01,0.02", 0),
+    ],
+)  # fmt: skip
+def test_sizes_that_are_just_allowed(text, specification, count):
+    assert read_sizes(text, Experiment()) == Sizes(specification, count)
+
+
 def test_simulate_command(tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["simulate", "--alpha", "0.02", "--noise", "1e-4", "--out", str(out)]) == 0
@@ -84,6 +114,10 @@ def test_sweep_command_is_reproducible_and_complete(tmp_path, capsys):
     rows = list(csv.DictReader((tmp_path / "a" / "sweep.csv").read_text(encoding="utf-8").splitlines()))
     quiet, noisy = ([float(row["error"]) for row in rows if float(row["noise"]) == level] for level in (0.0, 1e-4))
     assert sum(quiet) < 0.1 * sum(noisy)  # the noise reaches the loop
+    for row in rows:
+        off = abs(float(row["estimate"]) - float(row["alpha"]))
+        assert float(row["error"]) == pytest.approx(off, abs=1e-12)
+        assert float(row["error_percent"]) == pytest.approx(100.0 * off / float(row["alpha"]), abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -47,9 +47,7 @@ class Driver(FmuInstance):
         """Take note of the options of the instantiation."""
 
     def get(self, variables: Sequence[ProbedVariable], when: str = "") -> list[Any]:
-        """Read variables of one base type; a null text is None."""
-        if not variables:
-            return []
+        """Read variables of one base type, one or more; a null text is None."""
         function, arguments = self._get_call(variables)
         (values,) = self.call(function, *arguments, when=when)
         return self._got(variables, values)
