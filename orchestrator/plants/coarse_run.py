@@ -5,7 +5,7 @@ located: a sample in which friction may turn round or teeth meet is run in short
 """
 
 import math
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
 from orchestrator.plants.sample import is_usual, parameters_of, sample_of
+from orchestrator.shared.cores import cache_once
 from orchestrator.shared.numba_cache import ALGEBRA, njit_on_disk
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ def coarse_runner_of(plant: Plant, p: Any) -> Any:
     return _coarse_runner(plant, is_usual(plant, p))
 
 
-@cache
+@cache_once
 def _coarse_runner(plant: Plant, usual: bool) -> Any:
     prepared, sample = sample_of(plant)
     parameters = parameters_of(plant, usual)

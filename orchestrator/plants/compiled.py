@@ -21,6 +21,7 @@ import numba
 
 import pyfmu_sources
 from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.cores import cache_once
 from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 from orchestrator.shared.output import write_text
 
@@ -37,7 +38,7 @@ _PACKAGE = pyfmu_sources.__name__
 _SOURCES = Path(pyfmu_sources.__file__).parent
 
 
-@cache
+@cache_once
 def compile_module(name: str) -> ModuleType:
     """Return a copy of ``pyfmu_sources.NAME`` whose functions are compiled by numba (at their first call)."""
     full_name = f"_compiled_{name}"

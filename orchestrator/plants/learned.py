@@ -5,7 +5,6 @@ values are parameters of the analysis alone.
 """
 
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.description import CompiledEquations, Plant
 from orchestrator.plants.sample import complete_equations, sample_of
+from orchestrator.shared.cores import cache_once
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 from pyfmu_sources.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
 
@@ -54,7 +54,7 @@ def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     return ("law.argument", tuple(f"law.knot_{n}" for n in range(KNOTS)), tuple(f"law.value_{n}" for n in range(KNOTS)))
 
 
-@cache
+@cache_once
 def with_law(plant: Plant) -> Plant:
     """Return a plant with such a law, which is off until its argument is set."""
     code, knots, values = names()
@@ -65,8 +65,8 @@ def with_law(plant: Plant) -> Plant:
     )
     first = len(plant.names)
     extended = replace(plant, nuisances=(*plant.nuisances, *added), realised=np.asarray, learned=True, _index={})
-    extended = replace(extended, stage=cache(lambda: _stage(plant, first)), _index={})
-    return replace(extended, runner=cache(lambda: _runner(extended)), _index={})
+    extended = replace(extended, stage=cache_once(lambda: _stage(plant, first)), _index={})
+    return replace(extended, runner=cache_once(lambda: _runner(extended)), _index={})
 
 
 def _stage(plant: Plant, first: int) -> CompiledEquations:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from orchestrator.plants.description import CompiledEquations, Plant
+from orchestrator.shared.cores import cache_once
 from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
 NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
@@ -139,7 +140,7 @@ def complete_equations(equations: CompiledEquations) -> CompiledEquations:
     )
 
 
-@cache
+@cache_once
 def sample_of(plant: Plant) -> Sample:
     """Return the compiled equations of one sample.
 
@@ -197,7 +198,7 @@ def sample_of(plant: Plant) -> Sample:
     return Sample(prepare, sample)
 
 
-@cache
+@cache_once
 def parameters_of(plant: Plant, usual: bool) -> Any:
     """Return ``parameters(p)``, compiled: the parameters as a tuple, which no array of results may overlap.
 

@@ -1,14 +1,16 @@
-"""How many cores this process may use, and work that is spread over them."""
+"""How many cores this process may use, work that is spread over them, and results that their threads share."""
 
 import os
 from collections.abc import Callable, Sequence
-from threading import Semaphore, Thread
-from typing import Any, TypeVar
+from functools import cache, wraps
+from threading import RLock, Semaphore, Thread
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
 T = TypeVar("T")
 R = TypeVar("R")
+P = ParamSpec("P")
 
 
 def usable_cores() -> int:
@@ -71,8 +73,14 @@ def map_on_threads(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     return [results[place] for place in range(len(items))]
 
 
-def run_pair(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
-    """Return the results of two functions, called at once where a core is idle."""
-    calls: tuple[Callable[[], Any], ...] = (first, second)
-    one, other = map_on_threads(lambda call: call(), calls)
-    return one, other
+def cache_once(function: Callable[P, R]) -> Callable[P, R]:
+    """Return ``function`` with its results kept: of threads that ask at once, one computes, and all get the same."""
+    kept: Callable[..., R] = cache(function)
+    lock = RLock()
+
+    @wraps(function)
+    def ask(*args: P.args, **kwargs: P.kwargs) -> R:
+        with lock:
+            return kept(*args, **kwargs)
+
+    return ask

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit
+from numba import config, njit, types
 from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import FunctionCache, IndexDataCacheFile, _CacheLocator
 
@@ -44,10 +44,13 @@ def njit_on_disk(**options: Any) -> Callable[[Any], Any]:
     """Return a decorator like ``numba.njit`` that keeps machine code for later processes, where there is a place.
 
     A function with a closure is kept under a digest of all that it reaches; where that is not known, not at all.
+    A call with a number that stands in the source, ``f(x, 0)``, uses the machine code of any other number.
     """
 
     def decorate(function: Any) -> Any:
         dispatcher = njit(**options)(function)
+        template = dispatcher.get_call_template  # of a call in compiled code: numbers in the source are no types
+        dispatcher.get_call_template = lambda args, kws: template(tuple(map(types.unliteral, args)), kws)
         # Without a folder that can be written the function is compiled in every process.
         with contextlib.suppress(RuntimeError, OSError):
             if function.__closure__ is None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.shared import cores
-from orchestrator.shared.cores import map_on_threads, run_pair
+from orchestrator.shared.cores import cache_once, map_on_threads
 
 
 def test_results_come_in_order_of_their_items() -> None:
@@ -67,14 +67,31 @@ def test_a_thread_that_waits_gives_its_core_to_what_it_waits_for(monkeypatch) ->
         time.sleep(0.2)  # until the other has ended and waits
         map_on_threads(lambda n: at_once.wait(timeout=10.0), range(2))  # breaks where one thread must do both
 
-    run_pair(ends, spreads)
-    run_pair(spreads, ends)
+    map_on_threads(lambda call: call(), (ends, spreads))
+    map_on_threads(lambda call: call(), (spreads, ends))
     assert cores._SPARE.acquire(blocking=False)
     assert not cores._SPARE.acquire(blocking=False)
 
 
-def test_two_functions_give_two_results() -> None:
-    assert run_pair(lambda: "one", lambda: 2) == ("one", 2)
+def test_threads_that_ask_at_once_get_one_result(monkeypatch) -> None:
+    monkeypatch.setattr(cores, "_SPARE", threading.Semaphore(1))
+    asked = threading.Barrier(2)
+    made = []
+
+    @cache_once
+    def make(name: str) -> object:
+        time.sleep(0.1)
+        made.append(name)
+        return object()
+
+    def ask(name: str) -> object:
+        asked.wait(timeout=10.0)
+        return make(name)
+
+    first, second = map_on_threads(ask, ("same", "same"))
+    assert first is second
+    assert made == ["same"]
+    assert make("other") is not first
 
 
 def test_what_numpy_is_to_be_silent_about_holds_in_every_thread(monkeypatch) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from numba import njit
 
 from orchestrator.shared import numba_cache
 
@@ -111,6 +112,19 @@ def test_predictors_are_compiled_once_per_machine(tmp_path: Path) -> None:
         for _ in range(2)
     ]
     assert hits == [0, 1]
+
+
+def test_numbers_in_the_source_share_the_machine_code_of_all_numbers() -> None:
+    @numba_cache.njit_on_disk()
+    def add(x, n):
+        return x + n
+
+    @njit
+    def thrice(x, n):
+        return add(x, 0) + add(x, 1) + add(x, n)
+
+    assert thrice(1.5, 2) == 7.5
+    assert len(add.signatures) == 1
 
 
 def test_names_of_machine_code_do_not_meet_those_of_other_processes() -> None:

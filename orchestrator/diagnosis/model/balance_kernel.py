@@ -4,7 +4,6 @@ Angles and speeds of the bodies are those that were measured; states that no enc
 inertia, the memory of a shaft) are integrated beside them by classical Runge-Kutta steps, one a sample.
 """
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
 from orchestrator.plants.sample import is_usual, parameters_of
+from orchestrator.shared.cores import cache_once
 from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ def acceleration_kernel(plant: Plant, p: Array) -> Any:
     return _kernel(plant, is_usual(plant, p))
 
 
-@cache
+@cache_once
 def _kernel(plant: Plant, usual: bool) -> Any:
     rates, parameters = plant.stage().rates, parameters_of(plant, usual)
     first = plant.bodies[0].speed
@@ -106,7 +106,7 @@ def hidden_load_kernel(plant: Plant, p: Array) -> Any:
     return _hidden_load_kernel(plant, is_usual(plant, p))
 
 
-@cache
+@cache_once
 def _hidden_load_kernel(plant: Plant, usual: bool) -> Any:
     rates, parameters = plant.stage().rates, parameters_of(plant, usual)
     ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant, Resonance, Shaft
 from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD, LEAD, SHIFT
+from orchestrator.shared.cores import cache_once
 from pyfmu_sources import drivetrain_parameters as dt
 from pyfmu_sources.backlash_models import GRADUAL, MODELS
 
@@ -36,7 +36,7 @@ def refusal(values: Mapping[str, float]) -> str:
     return f"`backlash_model` must be {', '.join(others)} or {last} for a diagnosis, but is {chosen.name}"
 
 
-@cache
+@cache_once
 def _whole() -> Any:
     """Return ``whole(x, u)``, compiled: the state of the FMU's equations.
 
@@ -115,7 +115,7 @@ def _flanks() -> tuple[Any, Any]:
     return flanks, meets
 
 
-@cache
+@cache_once
 def _stage() -> CompiledEquations:
     """Return the compiled equations, with the damping of teeth that meet growing with their penetration."""
     from orchestrator.plants.compiled import compile_module
@@ -145,7 +145,7 @@ def _stage() -> CompiledEquations:
     return CompiledEquations(friction, smooth_stage, (end, end + 1), rest, *_flanks())
 
 
-@cache
+@cache_once
 def _runner() -> Any:
     """Return the compiled, event-located simulation."""
     from orchestrator.plants.compiled import compile_module

@@ -1,6 +1,5 @@
 """One inertia, or mass, behind the lag of its drive: the FMU ``ServoAxis``."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant
 from orchestrator.plants.measurement import EARLY_TORQUE, LEAD
+from orchestrator.shared.cores import cache_once
 from pyfmu_sources import servo_axis_parameters as ap
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ _SHARED = ("coulomb_friction@motor", "stribeck_friction@motor", "input_delay@act
 SERVO_AXIS_BANK = tuple(effect for effect in DRIVETRAIN_BANK if effect.label in _SHARED)
 
 
-@cache
+@cache_once
 def stage() -> CompiledEquations:
     """Return the compiled equations."""
     from numba import njit
@@ -62,7 +62,7 @@ def stage() -> CompiledEquations:
     return CompiledEquations(friction, smooth_stage, (end, end), rest_levels, flanks, meets)
 
 
-@cache
+@cache_once
 def runner() -> Any:
     """Return the compiled, event-located simulation."""
     from orchestrator.plants.compiled import compile_module
