@@ -32,10 +32,7 @@ def default_directory(fmi: int = 2) -> Path:
     """Return where FMUs live: ``fmus/`` of the repository; of an installed package, ``fmus/`` in the current folder.
 
     A repository that the user cannot write is an installed package, too. FMUs of FMI 3.0 have a folder of their own
-    in it, because they have the same names.
-
-    Args:
-        fmi: version of FMI, 2 or 3.
+    in it, because they have the same names. ``fmi``: version of FMI, 2 or 3.
     """
     beside = ROOT / "fmus"
     folder = beside if (ROOT / "pyproject.toml").exists() and os.access(beside, os.W_OK) else Path("fmus")
@@ -109,11 +106,7 @@ def is_trusted(path: Path) -> bool:
 
 
 def stamp_of(path: Path) -> str | None:
-    """Return the fingerprint inside the FMU at ``path``; ``None`` where there is none.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Return the fingerprint inside the FMU at ``path``, 64 hexadecimal digits; ``None`` where there is none."""
     try:
         with zipfile.ZipFile(path) as archive:
             found = _STAMP.search(archive.read("modelDescription.xml"))

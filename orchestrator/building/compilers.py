@@ -42,11 +42,7 @@ class Target:
     machines: tuple[str, ...]
 
     def folders(self, fmi: int) -> tuple[str, ...]:
-        """Return its folders in ``binaries/``.
-
-        Args:
-            fmi: version of FMI, 2 or 3.
-        """
+        """Return its folders in ``binaries/`` for a version of FMI, 2 or 3."""
         return (self.folder,) if fmi == 2 else self.folders3
 
 

@@ -93,11 +93,7 @@ def _indicators(cls: Any) -> Iterator[FmuVariable]:
 
 
 def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, bytes]:
-    """Return the members of ``sources/``: file name to content.
-
-    Args:
-        fmi: version of FMI, 2 or 3.
-    """
+    """Return the members of ``sources/`` for a version of FMI, 2 or 3: file name to content."""
     translated = translate_slave(cls, _runtime_names(), fmi)
     files = ", ".join(path.name for path in closure(recipe.module) if path.stem not in _PYTHON_ONLY)
     text = _FILE.format(

@@ -102,11 +102,7 @@ def _import_names(path: Path) -> list[str]:
 
 
 def digest(parts: Iterable[bytes]) -> str:
-    """Return a SHA-256 of ``parts``, hexadecimal, in which their borders count.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Return a SHA-256 of ``parts``, 64 hexadecimal digits, in which their borders count."""
     total = hashlib.sha256()
     for part in parts:
         total.update(len(part).to_bytes(8, "little") + part)

@@ -9,11 +9,7 @@ from orchestrator.building.sources import digest
 
 
 def stamp(description: Element, fingerprint: str) -> None:
-    """Put in the fingerprint, by which a stale FMU is recognised.
-
-    Args:
-        fingerprint: 64 hexadecimal digits.
-    """
+    """Put in the fingerprint, 64 hexadecimal digits, by which a stale FMU is recognised."""
     if description.attrib["fmiVersion"] == "3.0":
         annotations = ElementTree.SubElement(description, "Annotations")
         tool = ElementTree.SubElement(annotations, "Annotation", {"type": "backlash-cosim"})

@@ -63,11 +63,7 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
 
 
 def runtime_files() -> dict[str, bytes]:
-    """Return the files of PythonFMU that a slave needs when it runs.
-
-    Returns:
-        File name -> content.
-    """
+    """Return the content of the files of PythonFMU that a slave needs when it runs, by their names."""
     import pythonfmu
 
     folder = Path(pythonfmu.__file__).parent
@@ -113,11 +109,7 @@ def _complete(
 
 
 def pythonfmu_license() -> bytes:
-    """Return PythonFMU's licence.
-
-    Returns:
-        Its text in UTF-8.
-    """
+    """Return the text of PythonFMU's licence, in UTF-8."""
     files = distribution("pythonfmu").files or []
     path = next((file for file in files if file.name.upper().startswith("LICENSE")), None)
     return path.read_binary() if path is not None else b"PythonFMU is distributed under the MIT license.\n"

@@ -87,11 +87,7 @@ class FolderFiles(FmuFiles):
 
 
 def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[Finding]]:
-    """Open an FMU (file or unpacked folder) and check its archive.
-
-    Returns:
-        The files, or None when the archive is not fit to be read, and the findings.
-    """
+    """Open an FMU (file or unpacked folder) and check its archive; None when it is not fit to be read."""
     if path.is_dir():
         return FolderFiles(path), list(_folder_findings(path, limits))
     try:

@@ -183,11 +183,7 @@ def _static_only(folder: str, names: set[str]) -> bool:
 
 
 def misfit(library: LibraryHeader, path: str, wanted: Platform, native: bool) -> Finding | None:
-    """Why a library cannot be loaded on a platform, as far as its header tells.
-
-    Returns:
-        The finding, or None when it can.
-    """
+    """Why a library cannot be loaded on a platform, as far as its header tells; None when it can."""
     if library.format != wanted.format or not library.shared:
         found = f"a {library.format} file" if library.shared else "an executable, not a shared library"
         return Finding("binary.format", path, f"the library must be a {wanted.format} shared library, but is {found}")

@@ -145,11 +145,7 @@ class Description:
         return next((i for i in self.interfaces if i.kind == kind), None)
 
     def identity(self, v: DescribedVariable) -> int | None:
-        """The number by which ModelStructure names a variable.
-
-        Returns:
-            Its index, counted from 1, or its value reference.
-        """
+        """The number by which ModelStructure names a variable: its index, counted from 1, or its value reference."""
         return v.index if self.dialect is FMI2 else v.reference
 
     def variable(self, number: int | None) -> DescribedVariable | None:

@@ -11,11 +11,7 @@ from orchestrator.shared import xml_grammar
 
 
 def attributes_of(kind: str, version: str) -> frozenset[str]:
-    """The attributes that the standard has for a type.
-
-    Args:
-        version: "2.0" or "3.0".
-    """
+    """The attributes that version "2.0" or "3.0" of the standard has for a type."""
     return xml_grammar.attributes_of(_grammar(version), kind)
 
 

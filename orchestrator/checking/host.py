@@ -103,11 +103,7 @@ class Host:
         return ""
 
     def text(self, function: str) -> str | None:
-        """Call a function without arguments that returns a text.
-
-        Returns:
-            What it returned; None: a null pointer.
-        """
+        """Call a function without arguments that returns a text; None: a null pointer."""
         value = getattr(self._handle, function)()
         return None if value is None else value[:_LONGEST_TEXT].decode("utf-8", "replace")
 

@@ -5,7 +5,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping
 
-from orchestrator.checking.description import DescribedVariable, Description, SimpleType, number
+from orchestrator.checking.description import DescribedVariable, Description, SimpleType, integer, number
 from orchestrator.checking.dialects import NUMERIC, REAL, VARIABILITIES, FmiDialect
 from orchestrator.checking.findings import Finding
 
@@ -20,7 +20,7 @@ def check_variables(d: Description) -> Iterator[Finding]:
     """All findings about ModelVariables."""
     yield from _names(d)
     types = {t.name: t for t in d.types}
-    states = {_as_int(v.own.get("derivative")) for v in d.variables}
+    states = {integer(v.own.get("derivative")) for v in d.variables}
     for v in d.variables:
         yield from _combination(d.dialect, v)
         yield from _start(d.dialect, v)
@@ -170,8 +170,8 @@ def _check_declared_type(types: Mapping[str, SimpleType], v: DescribedVariable) 
         message = f"start of `{v.name}` must be the value of an item of `{name}`, but is {odd[0]}"
         yield Finding("variable.start-range", v.path("start"), message)
     for attribute, sign in (("min", 1), ("max", -1)):
-        outer = _as_float(declared.attributes.get(attribute))
-        inner = _as_float(v.own.get(attribute))
+        outer = number(declared.attributes.get(attribute), "Real")
+        inner = number(v.own.get(attribute), "Real")
         if outer is not None and inner is not None and sign * inner < sign * outer:
             message = f"{attribute} of `{v.name}` must not widen that of `{name}` ({outer:g}), but is {inner:g}"
             yield Finding("variable.bounds-exceed-type", v.path(attribute), message)
@@ -185,7 +185,7 @@ def _real_only(d: Description, v: DescribedVariable, states: Collection[int | No
             yield Finding("variable.unit", v.path("unit"), message)
     yield from _display_unit(d, v, v.own.get("displayUnit"))
     if "derivative" in v.own:
-        target = d.variable(_as_int(v.own["derivative"]))
+        target = d.variable(integer(v.own["derivative"]))
         if target is None or target is v or target.kind not in REAL or v.variability != "continuous":
             message = f"`{v.name}` must be continuous and the derivative of another floating point variable, but is not"
             yield Finding("variable.derivative", v.path("derivative"), message)
@@ -269,17 +269,3 @@ def _settable(v: DescribedVariable) -> bool:
 
 def _or(value: float | int | None, default: float) -> float:
     return default if value is None else float(value)
-
-
-def _as_float(text: str | None) -> float | None:
-    try:
-        return None if text is None else float(text)
-    except ValueError:
-        return None
-
-
-def _as_int(text: str | None) -> int | None:
-    try:
-        return None if text is None else int(text)
-    except ValueError:
-        return None

@@ -22,11 +22,7 @@ _FACTOR = re.compile(r"([A-Za-z%]+|1)\^?(-?[0-9]+)?")
 
 
 def dimension_of(name: str) -> dict[str, int] | None:
-    """Exponents of the SI base units of a name such as ``N.m.s/rad`` or ``kg.m2``; None when it is not understood.
-
-    Returns:
-        Exponent by symbol of the base unit; zero exponents may be left out.
-    """
+    """Exponents of SI base units of a name such as ``N.m.s/rad``, zeros may lack; None when it is not understood."""
     total: dict[str, int] = {}
     sign = 1
     for part in re.split(r"([/.*])", name.replace(" ", "").replace("(", "").replace(")", "") if _simple(name) else "?"):

@@ -55,10 +55,6 @@ def _parser() -> etree.XMLParser:
 
 
 def xpath(element: etree._Element, attribute: str = "", name: str = "modelDescription.xml") -> str:
-    """Where an element is, such as ``modelDescription.xml:/fmiModelDescription/ModelVariables/ScalarVariable[3]``.
-
-    Returns:
-        The path, after the file's name and a colon.
-    """
+    """Where an element is: ``modelDescription.xml:/fmiModelDescription/ModelVariables/ScalarVariable[3]``."""
     path = element.getroottree().getpath(element)
     return f"{name}:{path}" + (f"/@{attribute}" if attribute else "")

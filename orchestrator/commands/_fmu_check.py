@@ -20,11 +20,7 @@ from orchestrator.shared.version import __version__
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Check FMUs and return the exit code: 0 all are ok, 1 one fails, 2 bad input.
-
-    Returns:
-        The exit code; 130 after Ctrl-C.
-    """
+    """Check FMUs and return the exit code: 0 all are ok, 1 one fails, 2 bad input, 130 after Ctrl-C."""
     parser = Parser(prog="fmu-check", description="check FMUs for FMI compliance")
     parser.add_argument("--version", action="version", version=__version__)
     parser.add_argument("fmus", nargs="+", type=Path, metavar="FMU", help="FMUs, unpacked FMUs or folders with FMUs")

@@ -83,11 +83,7 @@ class CaseProgress:
 
 
 def line(progress: Progress, rate: float) -> str:
-    """Return progress in words; ``rate`` in cases per second.
-
-    Args:
-        rate: [1/s].
-    """
+    """Return progress in words; ``rate`` is in cases per second."""
     left = f", {_duration((progress.total - progress.done) / rate)} left" if rate > 0.0 else ""
     return f"{progress.done} of {progress.total} cases, {rate:.1f} per second{left}, {progress.failed} failed"
 

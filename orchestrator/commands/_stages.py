@@ -48,11 +48,7 @@ class Stages:
         self._stage, self._expected, self._begun = stage, seconds, time.monotonic()
 
     def at(self, stage: str, share: float) -> None:
-        """Say what is done now, and which share of the piece of work is behind.
-
-        Args:
-            share: 0 to 1.
-        """
+        """Say what is done now, and which share (0 to 1) of the piece of work is behind."""
         self._stage = stage
         if share > 0.0:
             self._expected = (time.monotonic() - self._begun) / min(share, 1.0)

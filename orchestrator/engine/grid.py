@@ -29,11 +29,7 @@ class Design(Protocol):
     def __len__(self) -> int: ...
 
     def row(self, index: int) -> tuple[Value, ...]:
-        """Return the values of row ``index``, ``0 <= index < len(self)``.
-
-        Args:
-            index: of the row, from 0.
-        """
+        """Return the values of row ``index``, ``0 <= index < len(self)``."""
 
     def definition(self) -> Mapping[str, Any]:
         """Return plain JSON data that determine every row."""

@@ -22,6 +22,7 @@ import numpy as np
 from orchestrator.engine.cases import Outcome, Status
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.shared.operating_system import PLAIN_FILE, close_and_remove, lock, sync_folder, write_at
+from orchestrator.shared.output import make_directories, remove_empty
 
 FORMAT = "backlash-cosim journal 1"
 _CHUNK = 1 << 20
@@ -46,14 +47,14 @@ class Journal:
         self.done = 0
         self.failed = 0
         self._bits = bytearray((total + 7) // 8)
-        self._made = _make_directories(path.parent)
+        self._made = make_directories(path.parent)
         try:
             self._descriptor = _open(path)
         except OSError as error:
-            _remove_directories(self._made)
+            remove_empty(self._made)
             raise OutputError(f"cannot write {path}: {error.strerror}") from None
         except ScenarioError:
-            _remove_directories(self._made)
+            remove_empty(self._made)
             raise
         try:
             self._lock()
@@ -121,7 +122,7 @@ class Journal:
 
     def _remove(self) -> None:
         close_and_remove(self._descriptor, self.path)
-        _remove_directories(self._made)
+        remove_empty(self._made)
 
     def discard(self) -> None:
         """Remove the file: its content is in the published results now."""
@@ -281,22 +282,3 @@ def _open(path: Path) -> int:
         os.close(descriptor)
         raise ScenarioError(f"{path} must be the journal of a sweep, but is no plain file of its own: remove it")
     return descriptor
-
-
-def _make_directories(directory: Path) -> list[Path]:
-    missing = [p for p in (directory, *directory.parents) if not p.exists()]
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(
-            f"`out` must be a writable directory, but {directory} is not: {error.strerror}", "out"
-        ) from None
-    return missing
-
-
-def _remove_directories(directories: list[Path]) -> None:
-    for path in directories:
-        try:
-            path.rmdir()
-        except OSError:
-            return

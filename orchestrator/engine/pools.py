@@ -52,11 +52,7 @@ class Pool(Protocol):
         """Return the outcome of a case that its executor has given up, ``None`` when ``error`` is no such thing."""
 
     def slots(self) -> int:
-        """Return how many cases can run at the same time, at present.
-
-        Returns:
-            The number, at least 0.
-        """
+        """Return how many cases can run at the same time, at present."""
 
     def close(self) -> None:
         """End everything now; cases that are running are not finished."""
@@ -186,11 +182,7 @@ def contents(work: Work) -> dict[str, bytes]:
 
 
 def assignment(work: Work, pickled_work: bytes, supply: Supply, limits: CaseLimits) -> Assignment:
-    """Return what worker processes are told.
-
-    Args:
-        limits: time [s] and memory [bytes] per case.
-    """
+    """Return what worker processes are told; ``limits``: time [s] and memory [bytes] per case."""
     return Assignment(pickled_work, supply.paths, limits.time, limits.memory, len(work.columns), work.walls)
 
 

@@ -44,11 +44,7 @@ class Work:
 
 
 def file_hash(path: Path) -> str:
-    """Return the sha256 of a file's content.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Return the sha256 of a file's content, 64 hexadecimal digits."""
     try:
         with path.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -123,11 +123,7 @@ def draw_flanks(path: Path, estimate: Estimate) -> None:
 
 
 def draw_design(path: Path, time: Array, best: Excitation) -> None:
-    """Draw the proposed torque record.
-
-    Args:
-        time: (n,) [s].
-    """
+    """Draw the proposed torque record over its times (n,) [s]."""
     figure, (axis,) = _figure(1, (8.0, 3.6))
     axis.step(time, best.u, where="post", color=BLUE, linewidth=0.9)
     axis.set_xlabel("time [s]")

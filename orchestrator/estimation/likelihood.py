@@ -181,11 +181,7 @@ class Likelihood:
         return gradient, information, self.with_options(information=known)
 
     def scores(self, point: Point, free: NDArray[np.int64]) -> Array:
-        """Return what each row adds to the gradient (k,) of half the objective, without the prior.
-
-        Returns:
-            Shape (n, k).
-        """
+        """Return what each row adds to the gradient of half the objective, without the prior: (n, k)."""
         base = point.result
         error, spread, back = self._differences(point, free)
         white = (base.errors / np.sqrt(base.variances)).ravel()

@@ -68,11 +68,7 @@ class GapProblem:
         return np.array([unknown.mean for unknown in self.unknowns])
 
     def index(self, name: str) -> int:
-        """Return the place of an unknown in the vector.
-
-        Returns:
-            The place, from 0.
-        """
+        """Return the place of an unknown in the vector, from 0."""
         return self.names.index(name)
 
 

@@ -112,11 +112,7 @@ class GapMap:
         self._room = _noise_below(calibration)
 
     def estimate(self, total: float) -> GapEstimate:
-        """Return the half-gap that the metric ``total`` [rad] stands for.
-
-        Args:
-            total: the metric S [rad].
-        """
+        """Return the half-gap that the metric ``total`` [rad] stands for."""
         calibration = self._calibration
         low, high = np.exp(calibration.log_sum[0]), np.exp(calibration.log_sum[-1])
         if low * np.exp(-self._room) <= total < low:
@@ -134,11 +130,7 @@ class GapMap:
 
 
 def estimate_gap(calibration: Calibration, total: float) -> GapEstimate:
-    """Return the half-gap that the metric ``total`` [rad] stands for, see ``GapMap.estimate``.
-
-    Args:
-        total: S [rad].
-    """
+    """Return the half-gap that the metric ``total`` [rad] stands for, see ``GapMap.estimate``."""
     return GapMap(calibration).estimate(total)
 
 

@@ -36,11 +36,7 @@ class RegulatorDesign:
 
 
 def pair_system(experiment: Experiment, alpha: float, seed: int, start: Mapping[str, float | str]) -> LiveSystem:
-    """Return both loops with the values of a run; the loop with a gap comes first.
-
-    Args:
-        alpha: half-gap [rad].
-    """
+    """Return both loops with the values of a run; the loop with the half-gap ``alpha`` [rad] comes first."""
     values, given = loop_values(experiment), plant_values(experiment, alpha) | dict(start)
     instances: list[LiveInstance] = []
     connections: list[tuple[str, str]] = []

@@ -16,12 +16,7 @@ RECORDED = ("plant.theta_m", "plant.theta_l", "estimator.theta_l_hat", "controll
 
 
 def scenario_of_pair(experiment: Experiment, fmus: Mapping[str, Path], alpha: float, reference: float) -> Scenario:
-    """Return both loops with half-gap ``alpha`` [rad] in the first, led to the load angle ``reference`` [rad].
-
-    Args:
-        alpha: [rad].
-        reference: [rad].
-    """
+    """Return both loops with half-gap ``alpha`` [rad] in the first, led to the load angle ``reference`` [rad]."""
     for name, value, low in (("alpha", alpha, 0.0), ("reference", reference, -1e12)):
         if not low <= value <= 1e12:
             raise ScenarioError(f"`{name}` must lie in [{low:g}, 1e12] rad, but is {value!r}")

@@ -87,11 +87,7 @@ class SweepPlan:
 
 
 def sweep_work(plan: SweepPlan, fmus: Mapping[str, Path], calibrations: Mapping[float, Calibration]) -> Work:
-    """Return what a worker process does for each case.
-
-    Args:
-        calibrations: by noise level [rad].
-    """
+    """Return what a worker process does for each case; the calibrations are by noise level [rad]."""
     return Work(
         prepare=_prepare,
         run=_run,
@@ -155,11 +151,7 @@ class SweepArrays:
     upper: Array
 
     def statistics(self) -> dict[float, ErrorStatistics]:
-        """Return the statistics of each noise level.
-
-        Returns:
-            Statistics by noise level [rad].
-        """
+        """Return the statistics of each noise level, by the level [rad]."""
         found = {}
         for level in np.unique(self.noise):
             chosen = self.noise == level

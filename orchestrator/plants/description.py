@@ -172,11 +172,7 @@ class Plant:
         return self.table[place] if place < len(self.table) else self.nuisances[place - len(self.table)]
 
     def index(self, name: str) -> int:
-        """Return the place of a parameter in the flat tuple.
-
-        Returns:
-            The place, from 0.
-        """
+        """Return the place of a parameter in the flat tuple, from 0."""
         if name not in self._index:
             raise ValueError(f"{name!r} is not a parameter of {self.name}")
         return self._index[name]
@@ -250,11 +246,7 @@ class Plant:
         return plain
 
     def substeps(self, p: Array, h: float) -> int:
-        """Return how many Runge-Kutta steps a sample of ``h`` [s] needs.
-
-        Args:
-            h: [s].
-        """
+        """Return how many Runge-Kutta steps a sample of ``h`` [s] needs."""
         # The drive's lag does not count: it is solved exactly, and moved by nothing else.
         kept = [row for row, place in enumerate(self.states) if place != self.drive.torque]
         modes = np.linalg.eigvals(self.jacobian(p)[np.ix_(kept, kept)])

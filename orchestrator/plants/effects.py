@@ -22,11 +22,7 @@ class ParameterTable(Protocol):
     """What an effect asks of the plant that it belongs to."""
 
     def index(self, name: str) -> int:
-        """Return the place of a parameter in the plant's tuple.
-
-        Returns:
-            The place, from 0.
-        """
+        """Return the place of a parameter in the plant's tuple, from 0."""
 
     def entry(self, place: int) -> Parameter:
         """Return the table row of a parameter."""
@@ -87,11 +83,7 @@ class SignalScales:
 
 
 def rms(values: Array) -> float:
-    """Return the root of the mean square, never zero.
-
-    Args:
-        values: any shape.
-    """
+    """Return the root of the mean square of values of any shape, never zero."""
     return float(np.sqrt(np.mean(values * values))) + 1e-300
 
 

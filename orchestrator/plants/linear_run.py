@@ -34,11 +34,7 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
 
     It fills out (n, 2), the angles, from start (8,); in each sample the request ``early`` (n,) acts for ``first`` [s],
     then ``late`` (n,). Over each of both pieces the motion is the exponential of the plant's matrix: no error of a
-    step adds up.
-
-    Args:
-        first: length of the first piece [s].
-        h: length of a sample [s].
+    step adds up. ``first``: length of the first piece [s]; ``h``: length of a sample [s].
     """
     A, B = plant.jacobian(p), plant.request_column(p)
     places = list(state_places(plant, p))

@@ -45,11 +45,7 @@ def check_finite(values: Array, name: str, source: str) -> None:
 
 
 def check_range(values: Array, name: str, source: str) -> None:
-    """Refuse angles that no encoder reaches.
-
-    Args:
-        values: (n,) [rad].
-    """
+    """Refuse angles (n,) [rad] that no encoder reaches."""
     far = np.flatnonzero(np.abs(values) > LARGEST_ANGLE)
     if far.size:
         where = f"{source}: row {far[0] + 1}, column `{name}`"
@@ -60,11 +56,7 @@ def check_range(values: Array, name: str, source: str) -> None:
 
 
 def check_driven(u: Array, label: str, source: str) -> None:
-    """Refuse a torque that is zero throughout.
-
-    Args:
-        u: (n,) [N.m].
-    """
+    """Refuse a torque ``u`` (n,) that is zero throughout."""
     if not np.any(u[np.isfinite(u)]):
         raise RecordError(
             f"{source}: column `{label}` must drive the machine, but is 0 in all {u.size} rows: name the right one by "

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.arrays import MINIMUM_ROWS, Record
+from orchestrator.records.arrays import MINIMUM_ROWS, Record, interpolate_missing
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def decimate(record: Record, rate: float) -> Record:
             f"{record.source}: `rate` must leave at least {MINIMUM_ROWS} rows, but {rate:g} Hz leaves {centres.size}"
             ": ask for a higher rate"
         )
-    held = np.convolve(_fill(record.u), taps, "same")
+    held = np.convolve(interpolate_missing(record.u), taps, "same")
     held = np.convolve(held, np.ones(factor) / factor, "full")[factor - 1 :][: record.size]
     columns = {
         name: None if values is None else _at(values, taps, centres)
@@ -72,17 +72,9 @@ def _low_pass(factor: int) -> Array:
     return np.asarray(taps / taps.sum())
 
 
-def _fill(values: Array) -> Array:
-    good = np.isfinite(values)
-    if good.all() or not good.any():
-        return values
-    places = np.arange(values.size)
-    return np.interp(places, places[good], values[good])
-
-
 def _at(values: Array, taps: Array, centres: NDArray[np.int64]) -> Array:
     """Return the filtered values at ``centres``, NaN where too many of their samples are missing."""
-    out: Array = np.convolve(_fill(values), taps, "same")[centres]
+    out: Array = np.convolve(interpolate_missing(values), taps, "same")[centres]
     missing = np.isnan(values)
     if missing.any():
         weight = np.convolve(missing.astype(float), np.abs(taps) / np.abs(taps).sum(), "same")[centres]

@@ -51,14 +51,7 @@ def parse_stamps(cells: Sequence[str], label: str, path: Path, before: int = 0) 
 
 
 def seconds_of(stamps: NDArray[Any], label: str, path: Path) -> NDArray[np.float64]:
-    """Return stamps as seconds from the first one on.
-
-    Args:
-        stamps: (n,) datetime64.
-
-    Returns:
-        Shape (n,); NaN where there is no stamp.
-    """
+    """Return stamps (n,), datetime64, as seconds (n,) from the first one on; NaN where there is none."""
     stamps = stamps.astype("datetime64[ns]")
     good = ~np.isnat(stamps)
     if not good.any():

@@ -14,11 +14,7 @@ P = ParamSpec("P")
 
 
 def usable_cores() -> int:
-    """Return the number of cores that this process may use, which may be fewer than the machine has.
-
-    Returns:
-        At least 1.
-    """
+    """Return the number of cores that this process may use, at least 1 and maybe fewer than the machine has."""
     if hasattr(os, "sched_getaffinity"):  # not on every system
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

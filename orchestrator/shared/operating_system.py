@@ -76,11 +76,7 @@ def resident_memory(pid: int) -> tuple[int, int]:
 
 
 def memory_usage() -> int:
-    """Return the private writable memory of this process.
-
-    Returns:
-        Bytes; 0 where the system does not tell.
-    """
+    """Return the private writable memory of this process in bytes; 0 where the system does not tell."""
     try:
         return int(Path("/proc/self/statm").read_bytes().split()[5]) * mmap.PAGESIZE
     except (OSError, IndexError):
@@ -100,11 +96,7 @@ def set_limits(limits: Mapping[str, int]) -> None:
 
 
 def kill_group(process: "subprocess.Popen[bytes]") -> bool:
-    """Kill the process group that a child leads.
-
-    Returns:
-        Whether anything was in the group; False where there are no groups.
-    """
+    """Kill the process group that a child leads; tell whether anything was in it."""
     if not hasattr(os, "killpg"):
         return False
     try:

@@ -25,18 +25,13 @@ DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by 
 @contextmanager
 def stage_output(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path]:
     """Yield a staging directory whose files are moved into ``directory`` when the block ends without error."""
-    made: list[Path] = []
+    made = make_directories(directory)
     try:
-        missing = [p for p in (directory, *directory.parents) if not p.exists()]
-        directory.mkdir(parents=True, exist_ok=True)
-        made = missing
         _remove_abandoned(directory)
         staging = Path(tempfile.mkdtemp(prefix=f"{STAGING}{os.getpid()}-", dir=directory))
     except OSError as error:
-        _remove_empty(made)
-        raise OutputError(
-            f"`out` must be a writable directory, but {directory} is not: {error.strerror}", "out"
-        ) from None
+        remove_empty(made)
+        raise _unwritable(directory, error) from None
     try:
         yield staging
         stale = [name for name in replaces if not (staging / name).exists()]
@@ -51,7 +46,7 @@ def stage_output(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path
         raise
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-        _remove_empty(made)
+        remove_empty(made)
 
 
 def _full(folder: Path) -> bool:
@@ -66,11 +61,7 @@ def _full(folder: Path) -> bool:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write ``text`` to ``path`` so that no reader ever sees a part of it.
-
-    Args:
-        text: its content, written as UTF-8.
-    """
+    """Write ``text``, in UTF-8, to ``path`` so that no reader ever sees a part of it."""
     handle, part = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
@@ -115,7 +106,22 @@ def _publish(staging: Path, directory: Path) -> None:
             os.replace(source, target)
 
 
-def _remove_empty(directories: list[Path]) -> None:
+def make_directories(directory: Path) -> list[Path]:
+    """Make a directory and its parents; return those that were missing, the innermost first."""
+    missing = [p for p in (directory, *directory.parents) if not p.exists()]
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritable(directory, error) from None
+    return missing
+
+
+def _unwritable(directory: Path, error: OSError) -> OutputError:
+    return OutputError(f"`out` must be a writable directory, but {directory} is not: {error.strerror}", "out")
+
+
+def remove_empty(directories: list[Path]) -> None:
+    """Remove directories up to the first that is not empty."""
     for path in directories:
         try:
             path.rmdir()

@@ -70,11 +70,7 @@ def settings_of(content: dict[str, Any], kind: type[S], where: str = "settings")
 
 
 def as_tables(settings: Settings) -> dict[str, Any]:
-    """Return settings as nested tables of plain values, for a result file.
-
-    Returns:
-        Group -> name -> value.
-    """
+    """Return settings as nested tables of plain values, for a result file: by group and name."""
     tables = msgspec.to_builtins(settings)
     assert isinstance(tables, dict)
     return tables

@@ -165,11 +165,7 @@ class KnownUnit:
 
 
 def dimension_of(**exponents: int) -> Dimension:
-    """Return the exponents of ``BASES``.
-
-    Args:
-        exponents: by the names of ``BASES``; those left out are 0.
-    """
+    """Return the exponents of ``BASES``, given by their names; those left out are 0."""
     return tuple(exponents.get(base, 0) for base in BASES)
 
 

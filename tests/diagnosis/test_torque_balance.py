@@ -7,7 +7,7 @@ from orchestrator.diagnosis.data.signals import prepare_signals, smooth
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.plant_effects import effect_parameters
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
-from orchestrator.diagnosis.report.simulation import RunSignals, simulate
+from orchestrator.diagnosis.report.simulation import RunSignals, Simulation
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.records.model_file import default_model
@@ -61,7 +61,7 @@ def exact_record(values):
         p[DRIVETRAIN.index(name)] = value
     u = requests()
     signals = RunSignals(STEP, u, np.zeros((u.size, 2)), np.ones(2), 1.0, 10.0)
-    angles = simulate(DRIVETRAIN, p, np.zeros(8), signals, slice(0, u.size))
+    angles = Simulation(DRIVETRAIN, p, signals).run(np.zeros(8), slice(0, u.size))
     columns = {"time": STEP * np.arange(u.size), "u": u, "theta_m": angles[:, 0], "theta_l": angles[:, 1]}
     return record_from_columns(columns, "exact"), p
 

@@ -124,11 +124,7 @@ def describe(kind: Kind) -> str:
 
 
 def size_of(kind: Kind) -> int:
-    """Return how many numbers a value holds.
-
-    Returns:
-        The number; 1 for what is no tuple.
-    """
+    """Return how many numbers a value holds: 1 for what is no tuple."""
     if isinstance(kind, Tuple):
         return sum(size_of(item) for item in kind.items)
     return 1
@@ -201,11 +197,7 @@ class KindNames:
 
 
 def field_name(kind: Tuple, n: int) -> str:
-    """Return the name of the field ``n`` of a tuple that is not uniform.
-
-    Args:
-        n: its place, from 0.
-    """
+    """Return the name of the field ``n``, from 0, of a tuple that is not uniform."""
     if kind.names:
         return kind.names[n]
     return ORDINALS[n] if n < len(ORDINALS) else f"item{n + 1}"

@@ -147,11 +147,7 @@ class Program:
     # Lengths of `tuple[float, ...]` -----------------------------------------------------------------------------
 
     def note_index(self, index: int) -> None:
-        """Note that an item of a flat tuple of unknown length is read.
-
-        Args:
-            index: from 0.
-        """
+        """Note that an item of a flat tuple of unknown length is read, by its index from 0."""
         self._largest_index = max(self._largest_index, index)
 
     def note_values(self, length: int) -> None:

@@ -211,11 +211,7 @@ def compound(scope: Scope, kind: Kind, parts: str) -> Code:
 
 
 def item_of(code: Code, n: int) -> Code:
-    """Return the item ``n`` of a tuple that has a name.
-
-    Args:
-        n: its place, from 0.
-    """
+    """Return the item ``n``, from 0, of a tuple that has a name."""
     assert isinstance(code.kind, Tuple)
     field = f"v[{n}]" if code.kind.uniform else field_name(code.kind, n)
     return Code(member(code) + field, code.kind.items[n], place=True)

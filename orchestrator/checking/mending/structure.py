@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from lxml import etree
 
-from orchestrator.checking.description import DescribedVariable, Description
+from orchestrator.checking.description import DescribedVariable, Description, integer
 from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.rules_structure import initial_unknowns_of
@@ -44,7 +44,7 @@ def _write(
     spare = {d.identity(v) for v in allowed}
     entries: dict[int, etree._Element] = {}
     for entry in old:
-        number = _number(entry.get(name))
+        number = integer(entry.get(name))
         if number is not None and (number in numbers or number in spare):
             entries.setdefault(number, entry)
     for number in numbers:
@@ -76,10 +76,3 @@ def _position(structure: etree._Element, tag: str, order: Sequence[str]) -> int:
     """Where elements of a tag begin."""
     before = order[: order.index(tag)]
     return sum(child.tag in before for child in structure)
-
-
-def _number(text: str | None) -> int | None:
-    try:
-        return None if text is None else int(text)
-    except ValueError:
-        return None

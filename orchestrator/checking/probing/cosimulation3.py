@@ -123,11 +123,7 @@ class CoSimulation3(EventDriver):
 
 
 def enter_initialisation_3(driver: Any, start: float, stop: float | None) -> None:
-    """Into initialisation mode of FMI 3.0.
-
-    Args:
-        start, stop: of the experiment [s].
-    """
+    """Into initialisation mode of FMI 3.0, for an experiment from ``start`` to ``stop`` [s]."""
     tolerance = driver.job.tolerance
     driver.call(
         "EnterInitializationMode", ("bool", tolerance is not None), ("double", tolerance or 0.0), ("double", start),

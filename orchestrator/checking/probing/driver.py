@@ -102,11 +102,7 @@ class Driver(FmuInstance):
         return [value for i in range(len(variables)) for value in found[i]]
 
     def enter_initialisation(self, start: float, stop: float | None) -> None:
-        """From a new or reset instance into initialisation.
-
-        Args:
-            start, stop: of the experiment [s].
-        """
+        """From a new or reset instance into initialisation, for an experiment from ``start`` to ``stop`` [s]."""
         raise NotImplementedError
 
     def exit_initialisation(self) -> None:
@@ -119,12 +115,7 @@ class Driver(FmuInstance):
         self.exit_initialisation()
 
     def advance(self, t: float, size: float, when: str = "") -> None:
-        """Go from one communication point to the next.
-
-        Args:
-            t: beginning of the step [s].
-            size: its length [s].
-        """
+        """Go from the communication point ``t`` [s] to the next, ``size`` [s] later."""
         raise NotImplementedError
 
     def report_discard(self, when: str) -> None:

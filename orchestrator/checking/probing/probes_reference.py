@@ -31,11 +31,7 @@ class Tube:
         self.worst: tuple[float, str] = (1.0, "")
 
     def compare(self, values: list[Any], row: Row) -> None:
-        """Look at the values of one row.
-
-        Args:
-            row: time [s] and the reference's values.
-        """
+        """Look at the values of one row: time [s] and the reference's values."""
         off = [abs(float(x) - row[i]) / w for x, (i, _), w in zip(values, self.columns, self.half_widths, strict=True)]
         largest = max(off, default=0.0)
         self.outside += largest > 1.0

@@ -39,11 +39,7 @@ LOGGER = ctypes.CFUNCTYPE(
 
 
 def fill_in(address: int, arguments: Sequence[int | float]) -> str:
-    """Return the text of a message.
-
-    Args:
-        address: of the format; 0 for none.
-    """
+    """Return the text of a message, whose format is at ``address``; 0 for none."""
     template = _text(address)
     words = iter([int(v) for v in arguments[_PASSED_OVER : _PASSED_OVER + _MOST_CONVERSIONS]])
     doubles = iter([float(v) for v in arguments[_PASSED_OVER + _MOST_CONVERSIONS :]])

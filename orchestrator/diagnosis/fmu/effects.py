@@ -12,6 +12,7 @@ from orchestrator.diagnosis.fmu.bank import BANK, CUT, INPUT, OUTPUT, PORT, FmuE
 from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
 from orchestrator.plants.compiled import compile_module
+from orchestrator.shared.inference.noise import rms
 from orchestrator.shared.numba_cache import njit_on_disk
 
 Array = NDArray[np.float64]
@@ -97,11 +98,11 @@ def find_effects(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
     for k, name in enumerate(problem.inputs):
         u = data.file_inputs[:, k]
         if float(np.ptp(u)) > 0.0:
-            scales = PlaceScales(h / data.factor, _rms(u), float(np.max(np.abs(u))), u)
+            scales = PlaceScales(h / data.factor, rms(u), float(np.max(np.abs(u))), u)
             found += [FmuEffect(kind, name, scales) for kind in BANK.values() if kind.where == INPUT]
     for k, name in enumerate(problem.outputs):
         y = data.outputs[:, k]
-        scales = PlaceScales(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
+        scales = PlaceScales(h, rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
         found += [FmuEffect(kind, name, scales) for kind in BANK.values() if kind.where == OUTPUT]
     for name, motion in port_motions(problem, nominal).items():
         port = problem.map.ports[name]
@@ -112,7 +113,7 @@ def find_effects(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
         top = 0.5 * np.pi / max(float(np.quantile(np.abs(motion.v), 0.8)) * h, 1e-300)
         phases = LEAST_PHASE + 0.5 * np.arange(MOST_CYCLES)
         cycles = tuple(float(phase) / span for phase in phases if phase < top * span)
-        position, speed, acceleration = (_rms(x) or 1.0 for x in (motion.x, motion.v, motion.a))
+        position, speed, acceleration = (rms(x) or 1.0 for x in (motion.x, motion.v, motion.a))
         scales = PlaceScales(h, effort, effort, motion.x, 0.0, position, span, speed, acceleration, angular,
                               cycles=cycles)  # fmt: skip
         left_out: tuple[str, ...] = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
@@ -155,13 +156,9 @@ def _of_cuts(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
             effort = nominal[:, reads.index(cut.effort)]
             if cut.far is not None:
                 problem.sign[name] = -1.0 if float(np.mean(effort * twist)) < 0.0 else 1.0
-            scales = PlaceScales(problem.h, size, span, near, span=span, effort=_rms(effort) or 1.0)
+            scales = PlaceScales(problem.h, size, span, near, span=span, effort=rms(effort) or 1.0)
             found.append(FmuEffect(BANK["compliance"], name, scales))
     return found
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def candidate_effects(

@@ -55,11 +55,7 @@ class Whitening:
         return np.asarray((self.series(residuals)[:, self.rows] * self.active).ravel())
 
     def series(self, residuals: Array) -> Array:
-        """Return whitened residuals (channels, n) at every row.
-
-        Args:
-            residuals: (channels, n) of the record.
-        """
+        """Return whitened residuals (channels, n) at every row, of those of the record (channels, n)."""
         spectra = rfft(residuals * self.taper, self.length, axis=1)
         weighted = np.stack(
             [
@@ -107,11 +103,7 @@ def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
 
 
 def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings, quiet: bool = False) -> Whitening:
-    """Return the weights that residuals of a model ask for.
-
-    Args:
-        residuals: (channels, n) of the model.
-    """
+    """Return the weights that residuals (channels, n) of a model ask for."""
     plain = band_only(model, settings)
     segment = min(model.size // 4, 1024)
     frequencies = welch(residuals[0], 1.0 / model.step, nperseg=segment, detrend=False)[0]

@@ -81,9 +81,5 @@ def apply_lag(values: Array, lag: float, step: float) -> Array:
 
 
 def shift_signal(values: Array, samples: float) -> Array:
-    """Return a signal (n,) that is later by some ``samples``, interpolated by cubic splines.
-
-    Args:
-        values: (n,).
-    """
+    """Return a signal (n,) that is later by some ``samples``, interpolated by cubic splines."""
     return values if samples == 0.0 else np.asarray(shift_samples(values, samples, order=3, mode="nearest"))

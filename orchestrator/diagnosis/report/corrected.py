@@ -53,11 +53,7 @@ class BeforeAfter:
 
 
 def fmu_name(plant: str, source: str) -> str:
-    """Return a model identifier made of the plant's name and the record's.
-
-    Returns:
-        At most 80 characters.
-    """
+    """Return a model identifier made of the plant's name and the record's, at most 80 characters long."""
     stem = re.sub(r"[^A-Za-z0-9_]+", "_", Path(source).stem).strip("_") or "record"
     return f"{plant}_{stem}"[:80]
 

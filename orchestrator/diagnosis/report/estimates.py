@@ -45,11 +45,7 @@ def effect_estimates(
     problem: FitProblem, fitted: FittedModel, label: str, names: Callable[[tuple[float, ...]], Mapping[str, float]],
     units: Mapping[str, str], level: float,
 ) -> dict[str, ValueEstimate]:  # fmt: skip
-    """Return the estimates of an effect's parameters.
-
-    Args:
-        names: values of the effect -> parameters by short name.
-    """
+    """Return the estimates of an effect's parameters; ``names`` makes parameters by short name of its values."""
     values, effect = fitted.point.effects[label], problem.effects[label]
     covariance, width = value_covariance(fitted), interval_width(problem, level)
     centre = names(values)
@@ -114,11 +110,7 @@ def report_effect(
     result: SearchResult, evidence: EffectEvidence, names: Callable[[Values], Mapping[str, float]],
     units: Mapping[str, str], record: RecordEvidence, settings: DiagnosisSettings, in_model: bool,
 ) -> GradedEffect:  # fmt: skip
-    """Return an effect as it is reported.
-
-    Args:
-        names: values of the effect -> parameters by short name.
-    """
+    """Return an effect as it is reported; ``names`` makes parameters by short name of its values."""
     label = evidence.label
     name, _, site = label.partition("@")
     grade, lowered = grade_effect(evidence, record, settings)

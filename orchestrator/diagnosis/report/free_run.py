@@ -64,10 +64,7 @@ def free_run(
 
     Where impacts make the end of a run depend on its start in no simple way, a run that has not come close is sought
     again over growing parts of its length; not where it answers to its start as a linear system does, nor where it
-    follows not even the first of them.
-
-    Args:
-        guess: (8,) first guess of the state at the part's first sample.
+    follows not even the first of them. ``guess``: (8,) first guess of the state at the part's first sample.
     """
     model = Simulation(plant, p, signals, history)
     first = _closest(model, guess, part)

@@ -66,11 +66,7 @@ class RunSignals:
         return float(np.max(np.abs(self.angles[ahead:, 0] - self.angles[:-ahead, 0]))) / ahead
 
     def angles_in_time(self, plant: Plant, p: Array) -> Array:
-        """Return the angles (n, channels) as they were: what the log has late is put earlier.
-
-        Returns:
-            The angles [rad].
-        """
+        """Return the angles (n, channels) [rad] as they were: what the log has late is put earlier."""
         late = plant.value(p, SHIFT.name) if SHIFT.name in plant.names else 0.0
         if late == 0.0 or self.channels == 1:
             return self.angles
@@ -217,18 +213,6 @@ class Simulation:
         memory = (float(start[7]), asked) if self.history else (0.0, UNASKED)
         own = self.plant.fmu_values(self.p)
         self.plant.runner()((*start[:7].tolist(), *memory), own, early, late, first, self.signals.step, out)
-
-
-def simulate(plant: Plant, p: Array, start: Array, signals: RunSignals, part: slice, history: bool = True) -> Array:
-    """Return one run (n, 2) of a model over a part of a record.
-
-    Args:
-        start: (8,) state at the part's first sample.
-
-    Returns:
-        The angles [rad].
-    """
-    return Simulation(plant, p, signals, history).run(start, part)
 
 
 def _requests(u: Array, begin: int, count: int, first: int) -> Array:

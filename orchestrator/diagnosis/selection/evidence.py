@@ -121,13 +121,7 @@ def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, 
 def leave_out_possible(
     searched: SearchResult, evidence: Sequence[EffectEvidence], record: RecordEvidence, settings: DiagnosisSettings
 ) -> tuple[SearchResult, list[EffectEvidence]]:
-    """Return the result without effects that are not even likely: a model that had them might predict worse.
-
-    What leaves may take what another effect rests on: sizes count as they are in what remains.
-
-    Returns:
-        The result, and the evidence with the sizes there.
-    """
+    """Return result and evidence without effects that are not even likely: with them it might predict worse."""
     result = searched
     while labels := [
         one.label

@@ -113,14 +113,7 @@ def _whiten_hats(problem: FitProblem, argument: LawArgument, knots: Array) -> Ar
 
 
 def simple_terms(s: Array) -> dict[str, Array]:
-    """Return the simple terms of a formula at some arguments, by their names.
-
-    Args:
-        s: (n,) arguments.
-
-    Returns:
-        Each term (n,).
-    """
+    """Return the simple terms (n,) of a formula at the arguments ``s`` (n,), by their names."""
     return {
         "1": np.ones_like(s), "s": s, "sign(s)": np.sign(s), "|s|": np.abs(s), "s |s|": s * np.abs(s), "s^2": s**2,
         "s^3": s**3, "sin(s)": np.sin(s), "cos(s)": np.cos(s),

@@ -32,11 +32,7 @@ class Angle:
     count: float
 
     def at(self, time: Array) -> Array:
-        """Return the angle [rad] at some moments, by a local cubic between the edges.
-
-        Args:
-            time: (m,) [s].
-        """
+        """Return the angle [rad] at some times (m,) [s], by a local cubic between the edges."""
         return np.asarray(self._curve(np.clip(time, self.time[0], self.time[-1])))
 
     @cached_property

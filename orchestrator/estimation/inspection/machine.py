@@ -5,15 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model, ModelParameter
 from orchestrator.records.plausibility import check_plausible, momentum_balance, smooth
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.inverse import pseudo_inverse
-
-Array = NDArray[np.float64]
 
 LAGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # s, tried for the drive
 LEAST_LAG = 1e-9  # s, of a drive that has none

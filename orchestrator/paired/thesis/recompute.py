@@ -23,11 +23,7 @@ def _compare(
 
 
 def model_behind_the_gains() -> Array:
-    """Return the A with which every printed gain was made: eq. 3.5 with the misprinted A(2,2).
-
-    Returns:
-        Shape (6, 6).
-    """
+    """Return the A (6, 6) with which every printed gain was made: eq. 3.5 with the misprinted A(2,2)."""
     A = six_state_model(DrivetrainValues()).A.copy()
     A[1, 1] = published.A22_BEHIND_THE_GAINS
     return A

@@ -38,11 +38,7 @@ def robust_noise(values: Array) -> float:
 
 
 def rms(values: Array) -> float:
-    """Return the root mean square of all values.
-
-    Args:
-        values: of any shape.
-    """
+    """Return the root mean square of all values of an array of any shape."""
     return float(np.sqrt(np.mean(values**2)))
 
 

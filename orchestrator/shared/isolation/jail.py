@@ -127,11 +127,7 @@ class Jail:
         self.close()
 
     def start(self, time_limit: float = START_LIMIT) -> None:
-        """Wait until the entry point has returned its handler; ``call`` does so by itself.
-
-        Args:
-            time_limit: [s].
-        """
+        """Wait at most ``time_limit`` [s] until the entry point returned its handler, as ``call`` does by itself."""
         if not self.started:
             found = self._exchange(b"", time_limit, 1 << 20)
             if self._wanted:

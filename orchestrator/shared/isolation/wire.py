@@ -79,11 +79,7 @@ def _unpack(code: int, data: memoryview) -> Any:
 
 
 def send(link: socket.socket, data: bytes, deadline: float = math.inf, tick: Tick = lambda: None) -> None:
-    """Send one frame.
-
-    Args:
-        tick: called every ``SLICE`` seconds while waiting.
-    """
+    """Send one frame; ``tick`` is called every ``SLICE`` seconds while waiting."""
     rest = memoryview(_LENGTH.pack(len(data)) + data)
     link.settimeout(None if deadline == math.inf else SLICE)
     while rest:
