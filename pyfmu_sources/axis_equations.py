@@ -22,13 +22,11 @@ from .effects import (
     dependent_friction,
     directional_friction,
     end_stop_torque,
-    gravity_torque,
     periodic,
     periodic_slope,
     quadratic_drag,
     sliding_friction,
     spring_torque,
-    torque_ripple,
 )
 from .servo_axis_parameters import (
     P_B,
@@ -109,13 +107,13 @@ def drive_torque(x: State, p: Parameters, u: float) -> float:
 
 def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
     """Return the torque on the axis [N.m] of all but dry friction."""
-    torque = drive_torque(x, p, u) + torque_ripple(x[0], p[P_RIPPLE], p[P_RIPPLE_N], p[P_RIPPLE_PHASE])
+    torque = drive_torque(x, p, u) + periodic(x[0], p[P_RIPPLE], p[P_RIPPLE_N], p[P_RIPPLE_PHASE])
     if p[P_RIPPLE_2] != 0.0 or p[P_RIPPLE_3] != 0.0:
-        torque += torque_ripple(x[0], p[P_RIPPLE_2], 2.0 * p[P_RIPPLE_N], p[P_RIPPLE_2_PHASE])
-        torque += torque_ripple(x[0], p[P_RIPPLE_3], 3.0 * p[P_RIPPLE_N], p[P_RIPPLE_3_PHASE])
+        torque += periodic(x[0], p[P_RIPPLE_2], 2.0 * p[P_RIPPLE_N], p[P_RIPPLE_2_PHASE])
+        torque += periodic(x[0], p[P_RIPPLE_3], 3.0 * p[P_RIPPLE_N], p[P_RIPPLE_3_PHASE])
     torque -= p[P_B] * x[1] + quadratic_drag(x[1], p[P_DRAG]) + p[P_LOAD_TORQUE] + T_l
     torque -= directional_friction(x[1], p[P_DIRECTION])
-    torque -= gravity_torque(x[0], p[P_GRAVITY], p[P_GRAVITY_PHASE])
+    torque -= periodic(x[0], p[P_GRAVITY], 1.0, p[P_GRAVITY_PHASE])
     if p[P_SPRING] != 0.0 or p[P_SPRING_CUBIC] != 0.0:
         torque -= spring_torque(x[0], p[P_SPRING], p[P_SPRING_CUBIC], p[P_SPRING_ANGLE])
     if x[0] > p[P_STOP_UPPER] or x[0] < p[P_STOP_LOWER]:
@@ -137,8 +135,6 @@ def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
 
     Args:
         sign: direction of dry friction, -1 to 1; a smooth approximation passes ``tanh(speed/width)``.
-        u: requested torque [N.m], delayed and saturated already, held.
-        T_l: external load torque [N.m], held.
     """
     asked = u
     follows = 0.0
@@ -183,11 +179,7 @@ def leaves_sliding(p: Parameters) -> float:
 
 
 def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> State:
-    """Return the derivative of ``x``; an axis in mode 0 bends its bristle, or sticks where it has none.
-
-    Args:
-        mode: direction of sliding, 0: none.
-    """
+    """Return the derivative of ``x``; an axis in mode 0 bends its bristle, or sticks where it has none."""
     if mode != 0:
         return rates(x, float(mode), p, u, T_l)
     if builds_up(p):
@@ -200,11 +192,7 @@ def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> Stat
 
 
 def slip_at_rest(x: State, p: Parameters, u: float, T_l: float) -> int:
-    """Return the direction in which an axis at rest starts to slide, 0 when friction holds it.
-
-    Returns:
-        -1, 0 or 1.
-    """
+    """Return the direction (-1 or 1) in which an axis at rest starts to slide, 0 when friction holds it."""
     push = sliding_torque((x[0], 0.0, x[2], x[3], x[4]), p, u, T_l)
     if push > capacity(x, p):
         return 1
@@ -223,20 +211,12 @@ def initial_mode(x: State, p: Parameters, u: float) -> int:
 
 
 def settled(x: State, p: Parameters) -> int:
-    """Return the direction of sliding of an axis whose bristle has settled, or 0.
-
-    Returns:
-        -1, 0 or 1.
-    """
+    """Return the direction of sliding (-1 or 1) of an axis whose bristle has settled, or 0."""
     if has_settled(x[3], x[1], reach(x, p), leaves_sliding(p), falls(p)):
         return 1 if x[1] > 0.0 else -1
     return 0
 
 
 def past_stop(x: State, p: Parameters) -> int:
-    """Return the end stop at which the axis is: -1, 0 (none) or 1.
-
-    Returns:
-        -1, 0 or 1.
-    """
+    """Return the end stop at which the axis is: -1, 0 (none) or 1."""
     return 1 if x[0] > p[P_STOP_UPPER] else -1 if x[0] < p[P_STOP_LOWER] else 0

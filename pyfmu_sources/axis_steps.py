@@ -128,11 +128,7 @@ def along(x: State, h: float, r: State) -> State:
 
 
 def driven(x: State, after: State, p: Parameters, u: float, h: float) -> State:
-    """Return the state ``after`` with the drive's torque as it is then: ``u + (drive - u) exp(-h / tau)``.
-
-    Args:
-        h: time between both [s].
-    """
+    """Return the state ``after``, ``h`` [s] later, with the drive's torque then: ``u + (drive - u) exp(-h / tau)``."""
     if p[P_TAU] <= 0.0 or filtered(p):
         return after
     return (after[0], after[1], u + (x[2] - u) * exp(-h / p[P_TAU]), after[3], after[4])
@@ -156,11 +152,7 @@ def smooth_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: flo
 
 
 def slowing_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float, least: float) -> float:
-    """Return when within ``h`` [s] an axis that slides falls to the speed ``least`` [rad/s] (bisection).
-
-    Args:
-        least: [rad/s].
-    """
+    """Return when within ``h`` [s] an axis that slides falls to the speed ``least`` [rad/s] (bisection)."""
     low, high = 0.0, h
     for _ in range(50):
         middle = 0.5 * (low + high)

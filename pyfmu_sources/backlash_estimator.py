@@ -55,12 +55,7 @@ class NoiseSettings(NamedTuple):
 
 
 def covariance(r: int, c: int) -> int:
-    """Return where the covariance of states ``r`` and ``c`` stands in a filter.
-
-    Args:
-        r: row, from 0.
-        c: column, from 0.
-    """
+    """Return where the covariance of states ``r`` and ``c`` (from 0) stands in a filter."""
     return STATES + STATES * r + c
 
 
@@ -92,11 +87,7 @@ def start(
 
 
 def distance_variance(f: Filter, side: float) -> float:
-    """Return the part of the variance [rad2] of the distance to a flank that does not concern the motor's angle.
-
-    Args:
-        side: flank, -1.0 or 1.0.
-    """
+    """Return the part of the variance [rad2] of the distance to a flank that does not concern the motor's angle."""
     return (
         f[covariance(2, 2)]
         + f[covariance(8, 8)]
@@ -120,12 +111,7 @@ def flank(distance: float, variance: float) -> tuple[float, float]:
 
 
 def predict(f: Filter, m: Model, u: float, h: float, s: SettingValues) -> None:
-    """Advance a filter by ``h`` [s] with the torque request ``u`` [N.m] held.
-
-    Args:
-        u: requested torque [N.m].
-        h: step [s], short beside the shaft's oscillation.
-    """
+    """Advance a filter by ``h`` [s], short beside the shaft's oscillation, with the request ``u`` [N.m] held."""
     J_m, J_l, k, c, b_m, b_l, i, tau = m
     mean = 1.0 / i
     cross = -2.0 * mean * f[covariance(0, 2)] + mean * mean * f[covariance(0, 0)]

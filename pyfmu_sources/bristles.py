@@ -164,7 +164,6 @@ def bent_sign(bristle: float, rate: float, reach: float, stiffness: float, dampi
     """Return the direction of friction (-1 to 1 without damping) of a bristle that bends at ``rate`` [rad/s].
 
     Args:
-        rate: [rad/s].
         stiffness: of the bristle [N.m/rad].
         damping: of the bristle [N.m.s/rad].
     """
@@ -188,12 +187,7 @@ def has_settled(bristle: float, speed: float, reach: float, leaving: float, fall
 
 
 def bent(x: State, z_m: float, z_l: float) -> State:
-    """Return the state with the bristles at ``z_m`` and ``z_l`` [rad].
-
-    Args:
-        z_m: of the motor's bristle [rad].
-        z_l: of the load's [rad].
-    """
+    """Return the state with the bristles of motor and load at ``z_m`` and ``z_l`` [rad]."""
     return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], z_m, z_l, x[10], x[11])
 
 

@@ -73,11 +73,7 @@ def joined(x: State, side: int, p: Parameters) -> State:
 
 
 def parted(x: State, wound: float) -> State:
-    """Return the state with the twist ``wound`` [rad] left in the shaft, whose hysteresis starts anew.
-
-    Args:
-        wound: [rad].
-    """
+    """Return the state with the twist ``wound`` [rad] left in the shaft, whose hysteresis starts anew."""
     return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], wound, x[8], x[9], 0.0, x[11])
 
 
@@ -97,14 +93,7 @@ def after_event(
     held_m: float,
     held: float,
 ) -> tuple[State, int]:
-    """Return state and contact after the guard ``which`` of ``contact`` has turned negative.
-
-    Args:
-        push_m: torque on the motor [N.m] without the shaft's.
-        push: torque [N.m] on motor and load as one body, load side.
-        held_m: dry friction [N.m] that holds a motor at rest.
-        held: dry friction [N.m], load side, that holds motor and load as one body.
-    """
+    """Return state and contact after the guard ``which`` of ``contact`` has turned negative."""
     model = int(p[P_MODEL])
     if contact == 0:
         flank = 1 if which == 0 else -1

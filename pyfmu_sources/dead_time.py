@@ -21,12 +21,7 @@ def is_new(requests: Requests, u: float) -> int:
 
 
 def request_at(requests: Requests, n: int, u: float, time: float) -> Request:
-    """Return the request number ``n``; the one behind the last is what is requested now, ``u`` at ``time``.
-
-    Args:
-        n: number, from 0.
-        time: [s].
-    """
+    """Return request ``n`` (from 0); the one behind the last is what is requested now, ``u`` at ``time`` [s]."""
     if n < len(requests):
         return requests[n]
     return (time, u)

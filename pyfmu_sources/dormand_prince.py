@@ -57,11 +57,7 @@ def is_quick(p: Parameters, h: float) -> bool:
 
 
 def driven(x: State, after: State, quick: bool, p: Parameters, u: float, h: float) -> State:
-    """Return the state ``after`` with the torque of a quick drive as it is then: ``u + (T_m - u) exp(-h / tau)``.
-
-    Args:
-        h: time between both [s].
-    """
+    """Return ``after``, ``h`` [s] later, with the torque of a quick drive then: ``u + (T_m - u) exp(-h / tau)``."""
     if not quick:
         return after
     torque = u + (x[4] - u) * exp(-h / p[P_TAU])

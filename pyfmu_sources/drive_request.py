@@ -34,11 +34,7 @@ def ramp_time(request: float, u: float, time_constant: float, limit: float) -> f
 
 
 def ramp_target(request: float, u: float, time_constant: float, limit: float, duration: float) -> float:
-    """Return a request [N.m] so far away that what follows it changes at its ``limit`` for ``duration`` [s].
-
-    Args:
-        duration: [s].
-    """
+    """Return a request [N.m] so far away that what follows it changes at its ``limit`` for ``duration`` [s]."""
     reach = 2.0 * limit * (duration + max(time_constant, RAMP_END))
     return request + reach if u > request else request - reach
 

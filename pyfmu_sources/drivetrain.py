@@ -83,22 +83,14 @@ def initial_mode(x: State, p: Parameters) -> Mode:
 
 
 def reported_contact(x: State, mode: Mode, p: Parameters) -> int:
-    """Return the output ``contact``: the flank that touches; without a gap, the one the shaft is wound to.
-
-    Returns:
-        -1, 0 or 1.
-    """
+    """Return the output ``contact``: the flank (-1, 0, 1) that touches; without a gap, that the shaft is wound to."""
     if backlash_model(p) != NONE:
         return 1 if mode[0] > 0 else -1 if mode[0] < 0 else 0
     return contact_of(twist(x, p), 0.0)
 
 
 def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, table: Table) -> tuple[State, Mode]:
-    """Return state and mode after ``h`` [s] with the inputs held.
-
-    Args:
-        h: step [s], positive.
-    """
+    """Return state and mode after ``h`` [s], positive, with the inputs held."""
     if table[4]:
         if x[11] == UNASKED and (p[P_FILTER] > 0.0 or p[P_RATE] < BIG):
             x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)

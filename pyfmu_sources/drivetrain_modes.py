@@ -34,11 +34,7 @@ def state_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> St
 
 
 def rates_and_outputs(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> tuple[State, Outputs]:
-    """Return the derivatives, and the outputs theta_m, theta_l, omega_m, omega_l, T_m and T_shaft.
-
-    Args:
-        u: requested torque [N.m].
-    """
+    """Return the derivatives, and the outputs theta_m, theta_l, omega_m, omega_l, T_m and T_shaft; limits ``u``."""
     shaft = shaft_torque(x, mode, p, T_l)
     outputs = (x[0] + p[P_OFFSET_M], x[2] + p[P_OFFSET_L], x[1], x[3], x[4], shaft)
     return (state_rates(x, mode, p, saturated(u, p[P_LIMIT]), T_l), outputs)
@@ -63,11 +59,7 @@ def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Ind
 
 
 def asked_first(x: State, u: float) -> State:
-    """Return a state whose drive has settled at what is asked first.
-
-    Args:
-        u: requested torque [N.m], saturated already.
-    """
+    """Return a state whose drive has settled at what is asked first."""
     return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
 
 
@@ -84,11 +76,7 @@ def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> O
 
 
 def beside(x: State, r: State, h: float) -> State:
-    """Return ``x + h r``; the drive's filter, which may not have been asked yet, stays.
-
-    Args:
-        h: time [s].
-    """
+    """Return ``x + h r``, ``h`` in s; the drive's filter, which may not have been asked yet, stays."""
     return (
         x[0] + h * r[0], x[1] + h * r[1], x[2] + h * r[2], x[3] + h * r[3], x[4] + h * r[4], x[5] + h * r[5],
         x[6] + h * r[6], x[7] + h * r[7], x[8] + h * r[8], x[9] + h * r[9], x[10] + h * r[10], x[11],
@@ -98,11 +86,7 @@ def beside(x: State, r: State, h: float) -> State:
 def after_events(
     x: State, mode: Mode, which: int, events: int, p: Parameters, u: float, T_l: float
 ) -> tuple[State, Mode, int]:
-    """Return state, mode and number of events in a row once no guard is violated.
-
-    Args:
-        u: requested torque [N.m], saturated already.
-    """
+    """Return state, mode and number of events in a row once no guard is violated."""
     if which != NO_EVENT:
         x, mode = switched(x, mode, which, events, p, u, T_l)
         events += 1

@@ -251,11 +251,7 @@ class Drivetrain(PlantSlave):
         return indicators(self._x, self._mode, self._p, u, self.real[T_L])
 
     def update(self, time: float) -> None:
-        """Give an event its effect, and settle state and mode at the inputs of the moment.
-
-        Args:
-            time: [s].
-        """
+        """Give an event at ``time`` [s] its effect, and settle state and mode at the inputs of the moment."""
         u = self._acting_request()
         events = 0 if time - self._event_time > QUIET else self._events
         x, mode, events = after_events(self._x, self._mode, self._event, events, self._p, u, self.real[T_L])

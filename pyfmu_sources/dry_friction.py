@@ -44,11 +44,7 @@ def capacity_of_both(x: State, p: Parameters) -> float:
 
 
 def direction(value: float) -> int:
-    """Return the sign of ``value``, 1 for zero.
-
-    Returns:
-        -1 or 1.
-    """
+    """Return the sign of ``value``, -1 or 1; 1 for zero."""
     return -1 if value < 0.0 else 1
 
 
@@ -72,23 +68,12 @@ def push_on_both(x: State, p: Parameters, T_l: float) -> float:
 
 
 def slip_after_stop(push: float, capacity: float) -> int:
-    """Return the direction in which a part that stands still starts to slide, or 0 when it sticks.
-
-    Returns:
-        -1, 0 or 1.
-    """
+    """Return the direction (-1 or 1) in which a part that stands still starts to slide, or 0 when it sticks."""
     return 0 if abs(push) <= capacity else direction(push)
 
 
 def slip_of(speed: float, push: float, capacity: float, dry: bool) -> int:
-    """Return the direction in which a part of any speed slides, or 0 when it sticks; without friction never 0.
-
-    Args:
-        speed: [rad/s].
-
-    Returns:
-        -1, 0 or 1.
-    """
+    """Return the direction (-1, 1) in which a part of any ``speed`` [rad/s] slides; 0: its friction holds it."""
     if not dry or speed != 0.0:
         return direction(speed)
     return slip_after_stop(push, capacity)

@@ -3,8 +3,8 @@
 Each is a plain function of floats. An effect whose amplitude is zero returns exactly zero, so that a plant with
 every effect off is the thesis's plant to the last bit.
 
-In all functions: ``angle`` [rad]; ``speed`` [rad/s]; ``theta_m``: motor angle [rad]; ``phase``: at angle zero [rad];
-``stiffness`` [N.m/rad]; ``cubic`` [N.m/rad3].
+In all functions: ``angle`` [rad]; ``speed`` [rad/s]; ``phase``: at angle zero [rad]; ``stiffness`` [N.m/rad];
+``cubic`` [N.m/rad3].
 """
 
 from math import cos, exp, sin
@@ -20,9 +20,6 @@ def sine(angle: float) -> float:
 def cosine(angle: float) -> float:
     """Return the cosine, and 0 for an angle that is not finite."""
     return cos(angle) if abs(angle) <= LARGEST else 0.0
-
-
-# --- input -------------------------------------------------------------------------------------------------
 
 
 # --- motor and load ----------------------------------------------------------------------------------------
@@ -46,13 +43,6 @@ def sliding_friction(speed: float, coulomb: float, sliding: float, breakaway: fl
     return coulomb + sliding + (breakaway - sliding) * exp(-ratio * ratio)
 
 
-def torque_ripple(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the torque [N.m] that a position-dependent ripple adds at the motor angle ``theta_m`` [rad]."""
-    if amplitude == 0.0:
-        return 0.0
-    return amplitude * sine(cycles_per_rev * theta_m + phase)
-
-
 def periodic(angle: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
     """Return ``amplitude sin(cycles_per_rev angle + phase)``, in the unit of the amplitude."""
     if amplitude == 0.0:
@@ -61,14 +51,17 @@ def periodic(angle: float, amplitude: float, cycles_per_rev: float, phase: float
 
 
 def periodic_slope(angle: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the derivative of :func:`periodic` by the angle.
-
-    Returns:
-        The derivative, in the unit of the amplitude a radian.
-    """
+    """Return the derivative of :func:`periodic` by the angle, in the unit of the amplitude a radian."""
     if amplitude == 0.0:
         return 0.0
     return amplitude * cycles_per_rev * cosine(cycles_per_rev * angle + phase)
+
+
+def periodic_curvature(angle: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
+    """Return the second derivative of :func:`periodic` by the angle, in the unit of the amplitude a radian squared."""
+    if amplitude == 0.0:
+        return 0.0
+    return -amplitude * cycles_per_rev * cycles_per_rev * sine(cycles_per_rev * angle + phase)
 
 
 def dependent_friction(
@@ -87,11 +80,7 @@ def dependent_friction(
 
 
 def spring_torque(angle: float, stiffness: float, cubic: float, rest: float) -> float:
-    """Return the torque [N.m] against a part of a spring or a cable that is at rest at the angle ``rest`` [rad].
-
-    Args:
-        rest: [rad].
-    """
+    """Return the torque [N.m] against a part of a spring or a cable that is at rest at the angle ``rest`` [rad]."""
     if stiffness == 0.0 and cubic == 0.0:
         return 0.0
     way = angle - rest
@@ -119,12 +108,7 @@ def end_stop_torque(
 
 
 def set_in(depth: float, onset: float) -> float:
-    """Return which part (0 to 1) of the damping of teeth acts at a ``depth`` [rad], for damping that sets in slowly.
-
-    Args:
-        depth: of contact [rad].
-        onset: depth over which it sets in [rad].
-    """
+    """Return which part (0 to 1) of the damping of teeth acts at a ``depth`` [rad], if set in over ``onset`` [rad]."""
     return 1.0 - exp(-abs(depth) / onset)
 
 
@@ -158,24 +142,8 @@ def bristle_rate(bristle: float, speed: float, reach: float) -> float:
 # --- drive -------------------------------------------------------------------------------------------------
 
 
-def gravity_torque(theta_l: float, amplitude: float, phase: float) -> float:
-    """Return the torque against the load [N.m] of an unbalanced mass at the load angle ``theta_l`` [rad].
-
-    Args:
-        theta_l: load angle [rad].
-    """
-    if amplitude == 0.0:
-        return 0.0
-    return amplitude * sine(theta_l + phase)
-
-
 def quadratic_drag(omega_l: float, coefficient: float) -> float:
-    """Return the torque against the load [N.m] of a drag that grows with the square of its speed [rad/s].
-
-    Args:
-        omega_l: speed of the load [rad/s].
-        coefficient: [N.m.s2/rad2].
-    """
+    """Return the torque against the load [N.m] of a drag: ``coefficient`` [N.m.s2/rad2] by speed [rad/s] squared."""
     return coefficient * omega_l * abs(omega_l)
 
 
@@ -184,9 +152,6 @@ def directional_friction(speed: float, difference: float) -> float:
 
     Half of what the coefficients of the two directions differ by is ``difference`` [N.m.s/rad]: a torque
     ``b speed + difference |speed|`` is ``(b + difference) speed`` forward and ``(b - difference) speed`` backward.
-
-    Args:
-        difference: [N.m.s/rad].
     """
     return difference * abs(speed)
 
@@ -202,27 +167,6 @@ def resonance_torque(angle: float, speed: float, inertia: float, frequency: floa
 
 
 # --- shaft -------------------------------------------------------------------------------------------------
-
-
-def twist_error(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the twist [rad] that an eccentric gear adds at the motor angle ``theta_m`` [rad]."""
-    if amplitude == 0.0:
-        return 0.0
-    return amplitude * sine(cycles_per_rev * theta_m + phase)
-
-
-def twist_error_slope(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the derivative of :func:`twist_error` by ``theta_m`` [rad/rad]."""
-    if amplitude == 0.0:
-        return 0.0
-    return amplitude * cycles_per_rev * cosine(cycles_per_rev * theta_m + phase)
-
-
-def twist_error_curvature(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the second derivative of :func:`twist_error` by ``theta_m`` [rad/rad2]."""
-    if amplitude == 0.0:
-        return 0.0
-    return -amplitude * cycles_per_rev * cycles_per_rev * sine(cycles_per_rev * theta_m + phase)
 
 
 def hardening_torque(twist: float, cubic: float, stiffness: float, sharpness: float) -> float:

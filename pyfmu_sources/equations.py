@@ -98,20 +98,16 @@ from .effects import (
     dependent_friction,
     directional_friction,
     end_stop_torque,
-    gravity_torque,
     hardening_torque,
     hysteresis_rate,
     periodic,
+    periodic_curvature,
     periodic_slope,
     quadratic_drag,
     resonance_torque,
     set_in,
     sliding_friction,
     spring_torque,
-    torque_ripple,
-    twist_error,
-    twist_error_curvature,
-    twist_error_slope,
 )
 
 State = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
@@ -153,12 +149,12 @@ def shaft_damping(p: Parameters) -> float:
 
 def twist(x: State, p: Parameters) -> float:
     """Return the twist [rad], ``theta_m / i - theta_l`` plus the error of an eccentric gear."""
-    return x[0] / p[P_I] - x[2] + twist_error(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
+    return x[0] / p[P_I] - x[2] + periodic(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
 def twist_slope(x: State, p: Parameters) -> float:
     """Return the derivative of the twist by the motor angle [rad/rad], which is 1/i for an ideal gear."""
-    return 1.0 / p[P_I] + twist_error_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
+    return 1.0 / p[P_I] + periodic_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
 def lever_arm(x: State, p: Parameters) -> float:
@@ -167,7 +163,7 @@ def lever_arm(x: State, p: Parameters) -> float:
     The arm of teeth that conserve energy is :func:`twist_slope`. That of a gear whose teeth only stand off their
     places, or of an encoder that sits off its axis, keeps its length.
     """
-    return 1.0 / p[P_I] + p[P_ECC_LEVER] * twist_error_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
+    return 1.0 / p[P_I] + p[P_ECC_LEVER] * periodic_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
 def twist_rate(x: State, p: Parameters) -> float:
@@ -176,12 +172,7 @@ def twist_rate(x: State, p: Parameters) -> float:
 
 
 def contact_of(angle: float, alpha: float) -> int:
-    """Return the flank (-1, 0, 1) at which a ``twist`` angle [rad] lies for a half-gap ``alpha`` [rad].
-
-    Args:
-        angle: the twist [rad].
-        alpha: half-gap [rad].
-    """
+    """Return the flank (-1, 0, 1) at which a twist ``angle`` [rad] lies for a half-gap ``alpha`` [rad]."""
     if angle > alpha:
         return 1
     if angle < -alpha:
@@ -225,16 +216,12 @@ def friction_l(x: State, transmitted: float, p: Parameters) -> float:
 
 
 def ripple(theta_m: float, p: Parameters) -> float:
-    """Return the ripple of the motor's torque [N.m] with its harmonics.
-
-    Args:
-        theta_m: motor angle [rad].
-    """
+    """Return the ripple of the motor's torque [N.m] with its harmonics at the motor's angle [rad]."""
     cycles = p[P_RIPPLE_N]
-    torque = torque_ripple(theta_m, p[P_RIPPLE], cycles, p[P_RIPPLE_PHASE])
+    torque = periodic(theta_m, p[P_RIPPLE], cycles, p[P_RIPPLE_PHASE])
     if p[P_RIPPLE_2] != 0.0 or p[P_RIPPLE_3] != 0.0:
-        torque += torque_ripple(theta_m, p[P_RIPPLE_2], 2.0 * cycles, p[P_RIPPLE_2_PHASE])
-        torque += torque_ripple(theta_m, p[P_RIPPLE_3], 3.0 * cycles, p[P_RIPPLE_3_PHASE])
+        torque += periodic(theta_m, p[P_RIPPLE_2], 2.0 * cycles, p[P_RIPPLE_2_PHASE])
+        torque += periodic(theta_m, p[P_RIPPLE_3], 3.0 * cycles, p[P_RIPPLE_3_PHASE])
     return torque
 
 
@@ -249,7 +236,7 @@ def motor_torque(x: State, transmitted: float, sign_m: float, p: Parameters) -> 
 def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l: float) -> float:
     """Return the torque on the load [N.m] without the shaft's: external, friction, gravity, drag, springs, stops."""
     against = T_l + p[P_LOAD_TORQUE] + p[P_B_L] * x[3] + sign_l * friction_l(x, transmitted, p)
-    against += gravity_torque(x[2], p[P_GRAVITY], p[P_GRAVITY_PHASE]) + quadratic_drag(x[3], p[P_DRAG])
+    against += periodic(x[2], p[P_GRAVITY], 1.0, p[P_GRAVITY_PHASE]) + quadratic_drag(x[3], p[P_DRAG])
     if p[P_RES_J] > 0.0:
         against += resonance_torque(x[2] - x[5], x[3] - x[6], p[P_RES_J], p[P_RES_W], p[P_RES_ZETA])
     if p[P_DIRECTION_L] != 0.0:
@@ -289,7 +276,7 @@ def rigid_acceleration(x: State, sign_m: float, sign_l: float, p: Parameters, T_
 
 def gear_acceleration(x: State, p: Parameters) -> float:
     """Return the load's acceleration [rad/s2] that an eccentric gear makes of a constant motor speed."""
-    return twist_error_curvature(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE]) * x[1] * x[1]
+    return periodic_curvature(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE]) * x[1] * x[1]
 
 
 def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u: float, T_l: float) -> State:

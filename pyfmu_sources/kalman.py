@@ -26,11 +26,7 @@ def product(row: Vector6, x: Vector6) -> float:
 
 
 def predict(x: Vector6, u: float, A: Matrix6, B: Vector6) -> Vector6:
-    """Return the state one sample later with the torque request ``u`` [N.m] held.
-
-    Args:
-        u: [N.m].
-    """
+    """Return the state one sample later with the torque request ``u`` [N.m] held."""
     return (
         product(A[0], x) + B[0] * u,
         product(A[1], x) + B[1] * u,

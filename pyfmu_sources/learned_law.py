@@ -37,11 +37,7 @@ def straight(s: float, p: Law, knot_at: int, value_at: int) -> float:
 
 
 def kind_of(law: Law) -> int:
-    """Return what a law follows.
-
-    Returns:
-        1 to 7.
-    """
+    """Return what a law follows, 1 to 7."""
     return int(law[L_FORM]) % WITH_SPEED
 
 
@@ -84,14 +80,7 @@ def law_torque(law: Law, clock: float, motion: Motion) -> float:
 
 
 def at_bodies(law: Law, torque: float, ratio: float) -> tuple[float, float]:
-    """Return a law's torque where it acts.
-
-    Args:
-        torque: of the law [N.m].
-
-    Returns:
-        Torques against the motor and against the load [N.m].
-    """
+    """Return a law's ``torque`` [N.m] where it acts: against the motor and against the load."""
     kind = kind_of(law)
     if kind == TWIST:
         return (torque / ratio, -torque)

@@ -171,12 +171,7 @@ class WithLaw(_Base):
         return (float(self._form), clock, since, value("period", 1.0), value("dry", 0.0), *knots, *values)
 
     def advance(self, time: float, step: float) -> None:
-        """Integrate with the inputs held.
-
-        Args:
-            time: [s].
-            step: [s].
-        """
+        """Integrate from ``time`` [s] over ``step`` [s] with the inputs held."""
         before, self._now = self._now, time
         try:
             super().advance(time, step)

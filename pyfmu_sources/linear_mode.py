@@ -88,11 +88,7 @@ def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float
 
 
 def evaluate(coefficients: Coefficients, time: float) -> State6:
-    """Return the state of a scaled Taylor series at ``time`` in [0, 1].
-
-    Args:
-        time: 0 to 1.
-    """
+    """Return the state of a scaled Taylor series at ``time`` in [0, 1]."""
     a, b, c, d, e, f = coefficients[TERMS]
     for n in range(TERMS - 1, -1, -1):
         term = coefficients[n]
@@ -106,11 +102,7 @@ def evaluate(coefficients: Coefficients, time: float) -> State6:
 
 
 def guard_count(contact: int, p: Parameters) -> int:
-    """Return how many ways the mode ``contact`` can end.
-
-    Returns:
-        0, 1 or 2.
-    """
+    """Return how many ways (0, 1 or 2) the mode ``contact`` can end."""
     if backlash_model(p) == NONE or (is_rigid(p) and p[P_ALPHA] == 0.0):
         return 0
     return 2 if contact in (0, -2, 2) else 1

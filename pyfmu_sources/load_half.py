@@ -28,21 +28,12 @@ LOOSE = 1e-9  # of the half-gap and 1 rad
 
 
 def held_motion(theta_m: float, omega_m: float) -> Motion:
-    """Return the motion of held inputs: a constant angle [rad], and a constant speed [rad/s] for the damping alone.
-
-    Args:
-        theta_m: [rad].
-        omega_m: [rad/s].
-    """
+    """Return the motion of held inputs: a constant angle [rad], and a constant speed [rad/s] for the damping alone."""
     return (theta_m, 0.0, 0.0, 0.0, omega_m, 0.0, 0.0)
 
 
 def cubic_motion(theta: float, omega: float, theta_end: float, omega_end: float, h: float) -> Motion:
-    """Return the motion that has these angles [rad] and speeds [rad/s] at both ends of ``h`` [s] (Hermite's cubic).
-
-    Args:
-        h: [s].
-    """
+    """Return the motion that has these angles [rad] and speeds [rad/s] at both ends of ``h`` [s] (Hermite's cubic)."""
     mean = (theta_end - theta) / h
     second = (3.0 * mean - 2.0 * omega - omega_end) / h
     third = (omega + omega_end - 2.0 * mean) / (h * h)
@@ -50,11 +41,7 @@ def cubic_motion(theta: float, omega: float, theta_end: float, omega_end: float,
 
 
 def moved(motion: Motion, t: float) -> Motion:
-    """Return a motion with its time counted from ``t`` [s].
-
-    Args:
-        t: [s].
-    """
+    """Return a motion with its time counted from ``t`` [s]."""
     a, b, c, d, e, f, g = motion
     return (
         a + t * (b + t * (c + t * d)),
@@ -97,15 +84,7 @@ def settled(x: State, contact: int, p: Parameters, theta_m: float, speed: float)
 
 
 def change(contact: int, follows: int) -> int:
-    """Return the guard that leads from one contact to another, or ``NO_EVENT``.
-
-    Args:
-        contact: -1, 0 or 1.
-        follows: -1, 0 or 1.
-
-    Returns:
-        0, 1 or ``NO_EVENT``.
-    """
+    """Return the guard (0, 1) that leads from one contact to another, or ``NO_EVENT``."""
     if contact == follows:
         return NO_EVENT
     return 1 if contact == 0 and follows == -1 else 0
@@ -143,15 +122,7 @@ def guards(x: State, contact: int, p: Parameters, theta_m: float) -> tuple[float
 
 
 def after(contact: int, which: int) -> int:
-    """Return the contact that follows when the guard ``which`` ends one.
-
-    Args:
-        contact: -1, 0 or 1.
-        which: 0 or 1.
-
-    Returns:
-        -1, 0 or 1.
-    """
+    """Return the contact that follows when the guard ``which`` (0 or 1) ends one."""
     if contact != 0:
         return 0
     return 1 if which == 0 else -1
@@ -160,11 +131,7 @@ def after(contact: int, which: int) -> int:
 def solution(
     x: State, contact: int, p: Parameters, motion: Motion, T_l: float, step: float
 ) -> tuple[State, float, int]:
-    """Return the state at the first event within ``step`` [s], at what share of it, and the guard.
-
-    Args:
-        step: short enough for the series [s].
-    """
+    """Return the state at the first event within a short ``step`` [s], at what share of it, and the guard."""
     touches = 1.0 if contact != 0 else 0.0
     k, c, i = touches * p[P_K], touches * p[P_C], p[P_I]
     theta: Series = [x[0]]
@@ -201,11 +168,7 @@ def solution(
 
 
 def value(series: Series, time: float) -> float:
-    """Return a power series at ``time``.
-
-    Args:
-        time: 0 to 1.
-    """
+    """Return a power series at ``time``, 0 to 1."""
     total = series[TERMS]
     for n in range(TERMS - 1, -1, -1):
         total = series[n] + time * total

@@ -22,11 +22,7 @@ def rates_and_outputs(x: State, p: Parameters, u: float, T_shaft: float) -> tupl
 
 
 def advance(x: State, p: Parameters, u: float, T_shaft: float, h: float) -> State:
-    """Return the state after ``h`` [s] with the inputs held.
-
-    Args:
-        h: length of the step [s].
-    """
+    """Return the state after ``h`` [s] with the inputs held."""
     count = 1 + int(h * (p[P_B] / p[P_J] + 1.0 / p[P_TAU]))
     step = h / count
     for _ in range(count):

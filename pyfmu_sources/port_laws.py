@@ -39,20 +39,12 @@ def has_memory(kind: int) -> bool:
 
 
 def distance_of(kind: int, q1: float, q3: float) -> float:
-    """Return the distance over which a law with memory builds up.
-
-    Args:
-        q1: second parameter of the law.
-    """
+    """Return the distance over which a law with memory builds up. ``q1``: second parameter of the law."""
     return q3 if kind == STRIBECK else q1
 
 
 def resistance(kind: int, x: float, v: float, a: float, z: float, q0: float, q1: float, q2: float) -> float:
-    """Return the force against the motion.
-
-    Args:
-        z: how far dry friction or hysteresis has built up, -1 to 1.
-    """
+    """Return the force against the motion. ``z``: how far dry friction or hysteresis has built up, -1 to 1."""
     if kind in (COULOMB, HYSTERESIS):
         return q0 * z
     if kind == STRIBECK:

@@ -50,12 +50,7 @@ class SampledSlave(SlaveBase):
         self.begin()
 
     def advance(self, time: float, step: float) -> None:
-        """Hold the outputs, or take every sample that is due by the end of the step.
-
-        Args:
-            time: [s].
-            step: [s].
-        """
+        """Hold the outputs, or take every sample that is due by the end of the step, ``time + step`` [s]."""
         period = self.real[self.sample_time_reference]
         slack = SLACK * period
         end = time + step

@@ -65,11 +65,7 @@ def advance(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) 
 
 
 def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, int]:
-    """Return :func:`advance` for a request whose ramp does not end inside the step.
-
-    Args:
-        h: length of the step [s].
-    """
+    """Return :func:`advance` for a request whose ramp does not end inside the step."""
     elapsed = 0.0
     pieces = 0
     event = True

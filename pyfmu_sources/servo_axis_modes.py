@@ -37,11 +37,7 @@ ROOMS = 2.0
 
 
 def decided(x: State, mode: int, p: Parameters, u: float) -> int:
-    """Return the direction of sliding, from the state and the request if nothing has decided it yet.
-
-    Returns:
-        -1, 0 or 1.
-    """
+    """Return the direction of sliding (-1, 0, 1), from state and request if nothing has decided it yet."""
     if mode == UNDECIDED:
         mode = initial_mode(x, p, u)
     return 1 if mode == 0 and not is_dry(p) else mode
@@ -53,11 +49,7 @@ def is_dry(p: Parameters) -> bool:
 
 
 def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) -> tuple[State, Outputs]:
-    """Return the derivatives, and the outputs theta_m, omega_m and T_m.
-
-    Args:
-        u: requested torque [N.m].
-    """
+    """Return the derivatives, and the outputs theta_m, omega_m and T_m; limits ``u``."""
     asked = saturated(u, p[P_LIMIT])
     outputs = (x[0] + p[P_OFFSET], x[1], drive_torque(x, p, asked))
     return (mode_rates(x, mode, p, asked, T_l), outputs)
@@ -87,11 +79,7 @@ def stop_room(x: State) -> float:
 
 
 def to_stop(x: State, stop: int, p: Parameters) -> float:
-    """Return how far [rad] the axis is from reaching an end stop, or from leaving the one at which it is.
-
-    Args:
-        stop: at which it is: -1, 0 (none) or 1.
-    """
+    """Return how far [rad] the axis is from an end stop or, with ``stop`` -1 or 1, from leaving that one."""
     if p[P_STOP_UPPER] >= BIG and p[P_STOP_LOWER] <= -BIG:
         return 1.0
     if stop == 1:
@@ -111,11 +99,7 @@ def indicators(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: flo
 
 
 def after_events(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: float) -> tuple[State, int, int]:
-    """Return state, direction of sliding and end stop once none of them is at its end.
-
-    Args:
-        u: requested torque [N.m], saturated already.
-    """
+    """Return state, direction of sliding and end stop once none of them is at its end."""
     mode = decided(x, mode, p, u)
     if slipping(x, mode, p, u, T_l) < -slipping_room(x, mode):
         if builds_up(p):

@@ -130,11 +130,7 @@ class ServoAxis(PlantSlave):
         return indicators(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
 
     def update(self, time: float) -> None:
-        """Settle state and mode at an event, at the inputs of the moment.
-
-        Args:
-            time: [s].
-        """
+        """Settle state and mode at an event at ``time`` [s], at the inputs of the moment."""
         u = self._acting_request()
         x, mode, stop = after_events(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
         self._x = x

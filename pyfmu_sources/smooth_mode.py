@@ -24,11 +24,7 @@ WORK_OF_EVENT = 15
 
 
 def dipped(x: State, k1: State, after: State, k7: State, mode: Mode, p: Parameters, h: float) -> float:
-    """Return the moment inside a step at which a twist or a speed turns back, or 0 when none does.
-
-    Returns:
-        The moment [s].
-    """
+    """Return the moment [s] inside a step at which a twist or a speed turns back, or 0 when none does."""
     turn = 0.0
     rate = twist_rate(x, p)
     rate_after = twist_rate(after, p)
