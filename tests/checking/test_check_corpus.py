@@ -12,12 +12,14 @@ from tests.support.broken_ball3 import behavioural
 from tests.support.broken_ball3_xml import static
 from tests.support.broken_fmus import QUICK, Broken, corpus, good
 from tests.support.c_fmu import REFERENCE, build_c_fmu, fmu_files, have_compiler, write_fmu
+from tests.support.outlined_findings import outline_of, outlines
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
 )
 DOCS = Path(__file__).parents[2] / "docs" / "check.md"
 CORPUS = corpus() if have_compiler() else []
+OUTLINES = outlines("2")
 
 
 def test_the_good_fmu_has_no_finding(tmp_path: Path) -> None:
@@ -33,6 +35,7 @@ def test_names_the_rule(broken: Broken, tmp_path: Path) -> None:
     report = check_fmu(path, broken.options)
     named = {f.rule for f in report.findings if f.severity != "info"}
     assert named == {broken.rule}, "\n".join(f"{f.rule} {f.path}: {f.message}" for f in report.findings)
+    assert outline_of(report) == OUTLINES[broken.name]
 
 
 @pytest.mark.parametrize(
@@ -112,7 +115,7 @@ def test_the_corpus_is_large_and_covers_the_rules() -> None:
     covered = {b.rule for b in CORPUS} | {m.rule for m in (*behavioural(), *static())}
     assert len(CORPUS) >= 40
     assert f"{len(CORPUS)} FMUs, each broken by one mutation" in DOCS.read_text(encoding="utf-8")
-    assert len({b.name for b in CORPUS}) == len(CORPUS)
+    assert [b.name for b in CORPUS] == list(OUTLINES)
     uncovered = {r for r, rule in RULES.items() if rule.severity != "info"} - covered
     assert uncovered == NOT_IN_THE_CORPUS
 

@@ -30,12 +30,14 @@ from tests.support.broken_ball3_xml import static
 from tests.support.c_fmu import have_compiler, write_fmu
 from tests.support.c_fmu import model_description as model_description_2
 from tests.support.fuzz_fmu import damaged_tree
+from tests.support.outlined_findings import outline_of, outlines
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
 )
 STATIC = static()
 BEHAVIOURAL = behavioural()
+OUTLINES = outlines("3")
 FIRST = {mutant.rule: mutant.name for mutant in reversed(BEHAVIOURAL)}
 NOBODYS = (
     # What none of four other checkers saw.
@@ -124,15 +126,17 @@ def test_a_solver_goes_on_in_shorter_steps_where_derivatives_are_discarded(tmp_p
     assert report.executed
 
 
-def _named(mutant: Mutant, folder: Path) -> set[str]:
+def _check_findings(mutant: Mutant, folder: Path) -> None:
     path = folder / "broken.fmu"
     mutant.make(path)
-    return {f.rule for f in check_fmu(path, mutant.options).findings}
+    report = check_fmu(path, mutant.options)
+    assert mutant.rule in {f.rule for f in report.findings}
+    assert outline_of(report) == OUTLINES[mutant.name]
 
 
 @pytest.mark.parametrize("mutant", STATIC, ids=lambda m: m.name)
 def test_what_is_read_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:
-    assert mutant.rule in _named(mutant, tmp_path)
+    _check_findings(mutant, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +145,7 @@ def test_what_is_read_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> No
     ids=lambda m: m.name,
 )
 def test_behaviour_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:
-    assert mutant.rule in _named(mutant, tmp_path)
+    _check_findings(mutant, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +164,7 @@ def test_a_state_that_is_not_nulled_is_that_of_the_function_of_fmi3(tmp_path: Pa
 
 
 def test_there_are_many_and_each_has_a_name() -> None:
-    assert len({m.name for m in (*STATIC, *BEHAVIOURAL)}) == len(STATIC) + len(BEHAVIOURAL)
+    assert [m.name for m in (*STATIC, *BEHAVIOURAL)] == list(OUTLINES)
     assert len(STATIC) >= 150
     assert len(BEHAVIOURAL) >= 40
 
