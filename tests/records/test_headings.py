@@ -153,6 +153,17 @@ def test_two_records_in_one_file_are_refused(tmp_path: Path, columns: dict[str, 
     _same(path, columns, {}, header=52)  # the advice: LINE of the names that are meant
 
 
+@pytest.mark.parametrize("more", ["motor angle error [rad]", "motor speed [rad/s]", "motor angle limit", "motor rpm"])
+def test_a_channel_beside_the_angle_is_not_taken_for_it(
+    tmp_path: Path, columns: dict[str, np.ndarray], more: str
+) -> None:
+    path = tmp_path / "log.csv"
+    further = {"further": 0.0 * columns["time"]}
+    path.write_text(f"{more},time,u,motor angle [rad],load angle [rad]\n" + _rows(further | columns, ","))
+    notes = _same(path, columns, {})
+    assert "`motor angle [rad]` taken as theta_m" in notes
+
+
 def test_numbers_of_channels_above_the_names(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
     path = tmp_path / "log.csv"
     path.write_text("1,2,3,4\ntime,u,theta_m,theta_l\n" + _rows(columns, ","))

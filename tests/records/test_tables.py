@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.io
 
 from orchestrator.diagnosis.fmu.mapping import InputEntry, Options, OutputEntry
 from orchestrator.diagnosis.fmu.record import read_fmu_record
@@ -137,6 +138,13 @@ def test_columns_by_number_and_a_stated_line(tmp_path: Path) -> None:
     _write(path, "time,Q,T,T\n", "{t},{q},{y},{y}")
     assert column_names(path) == ["time", "Q", "T", "T"]
     with pytest.raises(RecordError, match="2 of them: name it by number, such as `#3`"):
+        read_fmu_record(path, _map())
+
+
+def test_columns_of_two_lengths_are_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"time": 0.5 * np.arange(ROWS), "Q": INPUT, "T": OUTPUT[:-1]})
+    with pytest.raises(RecordError, match="column `T` must have as many rows as `time`, but has 149, not 150: name"):
         read_fmu_record(path, _map())
 
 

@@ -160,7 +160,7 @@ def _decode(path: Path) -> tuple[str, str]:
             ) from None
         encoding = "cp1252"
         text = raw.decode(encoding, errors="replace")
-    if "\x00" in text[:100_000] or text.count("\x00"):
+    if "\x00" in text:
         raise RecordError(
             f"{path}: must be CSV, Parquet, MDF4, MAT or NumPy, but is another binary format: export it as CSV"
         )
