@@ -112,8 +112,9 @@ def test_sweep_command_is_reproducible_and_complete(tmp_path, capsys):
     assert results["failed"] == 0
     assert all(s["mean_percent"] < 0.5 for s in results["statistics"])
     rows = list(csv.DictReader((tmp_path / "a" / "sweep.csv").read_text(encoding="utf-8").splitlines()))
-    quiet, noisy = ([float(row["error"]) for row in rows if float(row["noise"]) == level] for level in (0.0, 1e-4))
-    assert sum(quiet) < 0.1 * sum(noisy)  # the noise reaches the loop
+    sums = {level: {row["alpha"]: row["S"] for row in rows if float(row["noise"]) == level} for level in (0.0, 1e-4)}
+    assert sums[0.0].keys() == sums[1e-4].keys()
+    assert all(sums[0.0][alpha] != noisy for alpha, noisy in sums[1e-4].items())  # the noise reaches the loop
     for row in rows:
         off = abs(float(row["estimate"]) - float(row["alpha"]))
         assert float(row["error"]) == pytest.approx(off, abs=1e-12)
