@@ -57,9 +57,9 @@ def test_a_pair_shows_angles_their_difference_and_torques(drawn):
     assert looks(torques) == [(figures.BLUE, "-", 0.9), (figures.ORANGE, "--", 0.9), (figures.GREY, "-", 0.9)]
     (area,) = difference.collections
     assert set(area.get_paths()[0].vertices[:, 1]) == {0.0, 250.0}
-    for axis in drawn["figure"].axes:  # what a panel shows stands left of its numbers, but within the figure
+    for axis in drawn["figure"].axes:  # what a panel shows stands left of its numbers, a little within the figure
         place = axis.get_position()
-        assert 0.0 < place.x0 + axis.yaxis.label.get_position()[0] * place.width < 0.5 * place.x0
+        assert 8.0 * (place.x0 + axis.yaxis.label.get_position()[0] * place.width) == pytest.approx(figures.LABEL)
     assert [axis.get_ylabel() for axis in drawn["figure"].axes] == [
         "load angle [rad]", "difference [mrad]", "torque [N.m]"
     ]  # fmt: skip
