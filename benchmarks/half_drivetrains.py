@@ -88,11 +88,11 @@ def _guards(side: int, alpha: float) -> list[Any]:
 # The halves --------------------------------------------------------------------------------------------------------
 
 
-def couple(paths: Mapping[str, Path], alpha: float) -> System:
-    """Return both FMUs, coupled, under the square torque."""
+def couple(paths: Mapping[str, Path], alpha: float, tolerance: float | None = None) -> System:
+    """Return both FMUs, coupled, under the square torque; ``tolerance`` is that of their own solvers."""
     instances = (
-        fmu_instance("motor", paths["MotorHalf"], events=True),
-        fmu_instance("load", paths["LoadHalf"], {"alpha": alpha}, events=True),
+        fmu_instance("motor", paths["MotorHalf"], {}, tolerance, events=True),
+        fmu_instance("load", paths["LoadHalf"], {"alpha": alpha}, tolerance, events=True),
     )
     connections = (
         Connection("motor.theta_m", "load.theta_m"),

@@ -13,18 +13,27 @@ from orchestrator.master.protocol import NativeCalls, NativeTransfer
 
 
 def native_calls(
-    functions: Functions, inputs: Sequence[Access], outputs: Sequence[Access], python: bool
+    functions: Functions,
+    inputs: Sequence[Access],
+    outputs: Sequence[Access],
+    python: bool,
+    step: tuple[int, str] | None = None,
 ) -> NativeCalls | None:
-    """Return addresses for calls from machine code."""
+    """Return addresses for calls from machine code.
+
+    Args:
+        step: address and name of what steps in place of the FMU's own function.
+    """
     sent, received = _transfers(functions, inputs, "Set"), _transfers(functions, outputs, "Get")
     if sent is None or received is None:
         return None
     name = "fmi2DoStep" if functions.version == "2.0" else "fmi3DoStep"
+    address, name = (_address(functions.library, name), name) if step is None else step
     return NativeCalls(
         component=int(functions.component.value or 0),
-        do_step=_address(functions.library, name),
+        do_step=address,
         step_name=name,
-        reports=functions.version != "2.0",
+        reports=functions.version != "2.0" and step is None,
         inputs=sent,
         outputs=received,
         python=python,

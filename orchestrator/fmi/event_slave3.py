@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from orchestrator.errors import SlaveError
 from orchestrator.fmi.clocked import ClockedTransfers
+from orchestrator.fmi.events_alone import EventsAlone
 from orchestrator.fmi.intermediate import IntermediateUpdates
 from orchestrator.fmi.messages import ERROR
 from orchestrator.fmi.model_description import FmuDescription
@@ -18,16 +19,12 @@ from orchestrator.fmi.timed_clocks import TimedClocks
 from orchestrator.master.protocol import (
     EventSlave,
     EventUpdate,
-    RunEndedError,
     Signals,
     StepDiscardedError,
     StepOutcome,
     Transfer,
 )
 from orchestrator.master.result import RunRemark
-
-MOST_EVENTS = 100
-"""Events and instants in a row without any time between them that ``do_step`` takes."""
 
 
 class _State(NamedTuple):
@@ -39,7 +36,7 @@ class _State(NamedTuple):
     reached: float | None
 
 
-class EventFmuSlave(Fmu3Slave, EventSlave):
+class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
     """See ``FmuSlave`` and ``EventSlave``. Early return is always allowed: without it an FMU passes over its events."""
 
     def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
@@ -143,39 +140,10 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
         if self.model.clocks:
             names = ", ".join(self.model.clocks)
             raise SlaveError(f"{self.name}: its clocks ({names}) must be ticked, but this run knows no events")
-        end, now, standing = time + step, time, 0
-        near = 1e-12 * max(1.0, abs(end))
-        if self._in_event_mode:
-            self._settle(now)
-        while True:
-            due = min(self._next_event, self._timed.next_time())
-            event = due <= now + near
-            if not event and end - now > near:
-                before = now
-                now, event = (outcome := self.step(now, min(due, end) - now)).reached, outcome.event
-                if outcome.ends_run:
-                    text = f"{self.name}: fmi3DoStep from t = {before:g} s"
-                    raise RunEndedError(text, self.name, now, outcome.ends_run)
-                event = event or due <= now + near
-                standing = 0 if now - before > near else standing
-            if event:
-                standing += 1
-                if standing > MOST_EVENTS:
-                    raise SlaveError(f"{self.name}: events at t = {now:g} s must come to an end, but do not")
-                self.enter_event_mode()
-                self._settle(now)
-            elif end - now <= near:
-                return
+        super().do_step(time, step)
 
-    def _settle(self, time: float) -> None:
-        for _ in range(MOST_EVENTS):
-            update = self.update_discrete_states()
-            if update.ends_run:
-                raise RunEndedError(f"{self.name}: an event at t = {time:g} s", self.name, time)
-            if not update.again:
-                self.leave_event_mode()
-                return
-        raise SlaveError(f"{self.name}: instants at t = {time:g} s must come to an end, but do not")
+    def _due(self) -> float:
+        return min(self._next_event, self._timed.next_time())
 
     # Event mode ------------------------------------------------------------------------------------------------
 

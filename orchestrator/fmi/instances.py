@@ -7,6 +7,8 @@ from pathlib import Path
 from orchestrator.errors import FmuError, ScenarioError
 from orchestrator.fmi.clocks import ClockTimes, times_problem
 from orchestrator.fmi.event_slave3 import EventFmuSlave
+from orchestrator.fmi.exchange2 import Exchange2Slave
+from orchestrator.fmi.exchange3 import Exchange3Slave
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.fmi.slave2 import Fmu2Slave
@@ -17,9 +19,15 @@ from orchestrator.master.values import coerce_value
 
 
 def make_slave(name: str, path: Path, description: FmuDescription | None = None) -> FmuSlave:
-    """Return a new instance of the FMU at ``path``, of its version of FMI."""
+    """Return a new instance of the FMU at ``path``, of its version; for model exchange where it has nothing else."""
     known = read_description(path) if description is None else description
-    kind = Fmu2Slave if known.version == "2.0" else EventFmuSlave if known.model.has_events else Fmu3Slave
+    kind: type[FmuSlave]
+    if known.version == "2.0":
+        kind = Exchange2Slave if known.exchange else Fmu2Slave
+    elif known.exchange:
+        kind = Exchange3Slave
+    else:
+        kind = EventFmuSlave if known.model.has_events else Fmu3Slave
     return kind(name, path, known)
 
 
@@ -52,6 +60,7 @@ def fmu_instance(
     solver_tolerance: float | None = None,
     events: bool = False,
     clocks: Mapping[str, ClockTimes] | None = None,
+    exchange: bool = False,
 ) -> Instance:
     """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
 
@@ -59,16 +68,17 @@ def fmu_instance(
         solver_tolerance: relative, for the FMU's own solver.
         events: whether event mode is used where the FMU has it.
         clocks: times of clocks, by name; see ``times_problem``.
+        exchange: an FMU for both is used as model exchange.
     """
-    description, rest = read_configured(path, start or {}, events)
+    description, rest = read_configured(path, start or {}, events, exchange)
     if clocks:
         description = _with_times(description, clocks)
     return Instance(name, description.model, FmuFactory(path, description), rest, solver_tolerance)
 
 
-def read_configured(path: Path, start: Start, events: bool) -> tuple[FmuDescription, Start]:
+def read_configured(path: Path, start: Start, events: bool, exchange: bool = False) -> tuple[FmuDescription, Start]:
     """Return the description of an FMU with values of its structural parameters, and the other start values."""
-    description = read_description(path, events)
+    description = read_description(path, events, exchange=exchange)
     given: dict[str, Value] = {}
     for name in description.structural.intersection(start):
         raw = start[name]
@@ -82,7 +92,7 @@ def read_configured(path: Path, start: Start, events: bool) -> tuple[FmuDescript
         given[name] = value
     if not given:
         return description, start
-    description = read_description(path, events, given)
+    description = read_description(path, events, given, exchange)
     rest = {name: value for name, value in start.items() if name not in given}
     _require_whole_arrays(description, rest)
     return description, rest

@@ -1,4 +1,4 @@
-"""What the master needs of a model description of FMI 2.0 or 3.0 for co-simulation; ``check`` looks at all the rest."""
+"""What the master needs of a model description of FMI 2.0 or 3.0; ``check`` looks at all the rest."""
 
 import re
 import zipfile
@@ -13,13 +13,13 @@ from orchestrator.errors import FmuError
 from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, UnusableError, clock_names, read_clocks
+from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange2, read_exchange3
 from orchestrator.master.protocol import ModelInterface, Unit, Value, Variable
 
 MAXIMUM_XML = 64 * 2**20
 """Bytes of XML beyond which a model description is refused: ten times the largest seen in the wild."""
 
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-_INTERFACES = {"ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,8 @@ class FmuDescription:
         configured: values that these are given before an instance is initialised, where they are not the FMU's own.
         resized: names of the elements of arrays that have no start value, for that is for another size.
         left_out: what of the FMU is not there for the master, in words; empty for nothing.
+        exchange: what it takes to integrate it; ``None``: it integrates itself, for it is for co-simulation.
+        inputs: names of the inputs that may change while it is integrated.
     """
 
     model: ModelInterface
@@ -55,17 +57,22 @@ class FmuDescription:
     configured: Mapping[str, Value] = field(default_factory=dict)
     resized: frozenset[str] = frozenset()
     left_out: str = ""
+    exchange: Exchange | None = None
+    inputs: frozenset[str] = frozenset()
 
 
-def read_description(path: Path, events: bool = True, configured: Mapping[str, Value] | None = None) -> FmuDescription:
+def read_description(
+    path: Path, events: bool = True, configured: Mapping[str, Value] | None = None, exchange: bool = False
+) -> FmuDescription:
     """Read the model description of the FMU at ``path``, a file or the folder of an unpacked one.
 
     Args:
         events: event mode is used where the FMU has it.
         configured: values of structural parameters, which are set in configuration mode.
+        exchange: an FMU for both is used as model exchange.
     """
     content, python = _read_unpacked(path) if path.is_dir() else _read_archive(path)
-    description = parse_description(content, str(path), python, configured)
+    description = parse_description(content, str(path), python, configured, exchange)
     if events or not description.model.has_events:
         return description
     clocks = [*description.model.clocks, *description.events.timed]
@@ -116,7 +123,11 @@ def _read_unpacked(folder: Path) -> tuple[bytes, bool]:
 
 
 def parse_description(
-    content: bytes, origin: str, python: bool = False, configured: Mapping[str, Value] | None = None
+    content: bytes,
+    origin: str,
+    python: bool = False,
+    configured: Mapping[str, Value] | None = None,
+    exchange: bool = False,
 ) -> FmuDescription:
     """Parse a model description; see ``read_description``."""
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
@@ -127,50 +138,63 @@ def parse_description(
     version = root.get("fmiVersion") or ""
     if root.tag != "fmiModelDescription" or not re.fullmatch(r"2\.0|3\.\d+", version):
         raise FmuError(f"{origin}: must be an FMI 2.0 or 3.0 FMU, but has fmiVersion {version!r}")
-    cosimulation = root.find("CoSimulation")
-    if cosimulation is None:
-        has = " and ".join(words for tag, words in _INTERFACES.items() if root.find(tag) is not None)
-        alone = f": it is for {has} alone" if has else ""
-        raise FmuError(f"{origin}: must be an FMU for co-simulation, but has no CoSimulation element{alone}")
+    found = [root.find("ModelExchange")] if exchange else [root.find("CoSimulation"), root.find("ModelExchange")]
+    interface = next((element for element in found if element is not None), None)
+    if interface is None and exchange:
+        raise FmuError(f"{origin}: must be an FMU for model exchange, as is asked for, but is for co-simulation alone")
+    if interface is None:
+        alone = ": it is for scheduled execution alone" if root.find("ScheduledExecution") is not None else ""
+        raise FmuError(f"{origin}: must be an FMU for co-simulation or model exchange, but is for neither{alone}")
     try:
         if version == "2.0":
-            return _description2(root, cosimulation, python)
-        return _description3(root, cosimulation, python, configured or {})
+            return _description2(root, interface, python)
+        return _description3(root, interface, python, configured or {})
     except UnusableError as error:
         raise FmuError(f"{origin}: {error}") from None
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise FmuError(f"{origin}: modelDescription.xml must follow FMI {version}, but does not: {error}") from None
 
 
-def _description2(root: etree._Element, cosimulation: etree._Element, python: bool) -> FmuDescription:
+def _description2(root: etree._Element, interface: etree._Element, python: bool) -> FmuDescription:
     variables, accesses = variables2.read_variables(root)
     names = _unique([v.name for v in variables])
+    exchange = None if interface.tag == "CoSimulation" else read_exchange2(root, interface)
+    inputs = continuous_inputs({v.name: v for v in variables}) if exchange else frozenset[str]()
     model = ModelInterface(
         name=root.attrib["modelName"],
         variables=dict(zip(names, variables, strict=True)),
         units=_units(root),
         feedthrough=variables2.read_feedthrough(root, variables),
-        can_save_state=_flag(cosimulation, "canGetAndSetFMUstate"),
-        can_vary_step=_flag(cosimulation, "canHandleVariableCommunicationStepSize"),
+        can_save_state=_flag(interface, "canGetAndSetFMUstate"),
+        can_vary_step=exchange is not None or _flag(interface, "canHandleVariableCommunicationStepSize"),
+        has_events=exchange is not None,
+        inputs_inside_steps=inputs,
     )
     return FmuDescription(
         model=model,
         version="2.0",
         guid=root.attrib["guid"],
-        identifier=_identifier(cosimulation),
+        identifier=_identifier(interface),
         python=python or "PythonFMU" in (root.get("generationTool") or ""),
-        once=_flag(cosimulation, "canBeInstantiatedOnlyOncePerProcess"),
+        once=_flag(interface, "canBeInstantiatedOnlyOncePerProcess"),
         access=dict(zip(names, accesses, strict=True)),
+        exchange=exchange,
+        inputs=inputs,
     )
 
 
 def _description3(
-    root: etree._Element, cosimulation: etree._Element, python: bool, configured: Mapping[str, Value]
+    root: etree._Element, interface: etree._Element, python: bool, configured: Mapping[str, Value]
 ) -> FmuDescription:
     found = variables3.read_variables(root, configured)
     variables: Sequence[Variable] = found.scalars
     names = _unique([v.name for v in variables])
-    has_events = _flag(cosimulation, "hasEventMode")
+    exchange = None if interface.tag == "CoSimulation" else read_exchange3(root, interface)
+    inputs = continuous_inputs({v.name: v for v in variables}) if exchange else frozenset[str]()
+    has_events = exchange is not None or _flag(interface, "hasEventMode")
+    if exchange and found.clocks:
+        text = "which are ticked in co-simulation only, but it is for model exchange"
+        raise UnusableError(f"it has clocks ({clock_names(list(found.clocks))}), {text}")
     clocks, events, left_out = read_clocks(found)
     if found.clocks and not has_events:
         raise ValueError(f"it has clocks ({clock_names(list(found.clocks))}), but no event mode")
@@ -179,22 +203,20 @@ def _description3(
         variables=dict(zip(names, variables, strict=True)),
         units=_units(root),
         feedthrough=variables3.read_feedthrough(root, found),
-        can_save_state=_flag(cosimulation, "canGetAndSetFMUState"),
-        can_vary_step=_flag(cosimulation, "canHandleVariableCommunicationStepSize"),
+        can_save_state=_flag(interface, "canGetAndSetFMUState"),
+        can_vary_step=exchange is not None or _flag(interface, "canHandleVariableCommunicationStepSize"),
         has_events=has_events,
-        output_derivatives=int(cosimulation.get("maxOutputDerivativeOrder", "0")) if has_events else 0,
-        inputs_inside_steps=events.inside
-        if has_events and _flag(cosimulation, "providesIntermediateUpdate")
-        else frozenset(),
+        output_derivatives=int(interface.get("maxOutputDerivativeOrder", "0")) if has_events else 0,
+        inputs_inside_steps=events.inside if has_events and _flag(interface, "providesIntermediateUpdate") else inputs,
         clocks=clocks,
     )
     return FmuDescription(
         model=model,
         version="3.0",
         guid=root.attrib["instantiationToken"],
-        identifier=_identifier(cosimulation),
+        identifier=_identifier(interface),
         python=python or "PythonFMU" in (root.get("generationTool") or ""),
-        once=_flag(cosimulation, "canBeInstantiatedOnlyOncePerProcess"),
+        once=_flag(interface, "canBeInstantiatedOnlyOncePerProcess"),
         access=dict(zip(names, found.accesses, strict=True)),
         events=events,
         arrays=found.arrays,
@@ -202,6 +224,8 @@ def _description3(
         configured=configured,
         resized=frozenset(found.resized),
         left_out=_note_on_unusable(found.binaries, left_out),
+        exchange=exchange,
+        inputs=inputs,
     )
 
 
@@ -217,8 +241,8 @@ def _unique(names: list[str]) -> list[str]:
     return names
 
 
-def _identifier(cosimulation: etree._Element) -> str:
-    identifier = cosimulation.attrib["modelIdentifier"]
+def _identifier(interface: etree._Element) -> str:
+    identifier = interface.attrib["modelIdentifier"]
     if not identifier.replace("_", "a").isalnum():
         raise ValueError(f"modelIdentifier {identifier!r} is no C identifier")
     return identifier

@@ -11,6 +11,7 @@ from orchestrator.errors import ChildError, SlaveError
 from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import FmuDescription
+from orchestrator.fmi.model_exchange import ExchangeSlave
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.protocol import (
     EventSlave,
@@ -72,7 +73,7 @@ class _Host:
         return self._outcome_of(lambda: self._slave.do_step(time, step))
 
     def step(self, time: float, step: float) -> list[Any]:
-        assert isinstance(self._slave, EventFmuSlave)
+        assert isinstance(self._slave, (EventFmuSlave, ExchangeSlave))
         slave, found = self._slave, [StepOutcome(time, False)]
         said = self._outcome_of(lambda: found.append(slave.step(time, step)))
         return [said, found[-1].reached, found[-1].event, found[-1].ends_run]
@@ -89,7 +90,7 @@ class _Host:
         return [DONE, "", 0.0, ""]
 
     def update_discrete_states(self) -> list[Any]:
-        assert isinstance(self._slave, EventFmuSlave)
+        assert isinstance(self._slave, (EventFmuSlave, ExchangeSlave))
         update = self._slave.update_discrete_states()
         return [update.again, update.next_event, update.ends_run]
 

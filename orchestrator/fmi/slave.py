@@ -60,6 +60,7 @@ class FmuSlave(Slave):
         self._worst = OK
         self._closed = False
         self._reached: float | None = None  # s, in a run
+        self._tolerance: float | None = None
         self._once = ""
         self._sets: dict[tuple[str, ...], tuple[list[VariableBatch], list[Value]]] = {}
         self._reserve()

@@ -1,4 +1,4 @@
-"""Instances of FMI 2.0 for co-simulation, loaded through FMPy."""
+"""Instances of FMI 2.0, loaded through FMPy, and those for co-simulation."""
 
 import ctypes
 import math
@@ -17,8 +17,8 @@ from orchestrator.master.protocol import Value
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # of fmi2StatusKind
 
 
-class Fmu2Slave(FmuSlave):
-    """See ``FmuSlave``."""
+class Fmu2Instance(FmuSlave):
+    """What instances for co-simulation and for model exchange share."""
 
     PREFIX = "fmi2"
     STATE = "FMUstate"
@@ -26,18 +26,16 @@ class Fmu2Slave(FmuSlave):
     def __init__(self, name: str, path: Path, description: FmuDescription | None = None) -> None:
         self._early: list[Mapping[str, Value]] | None = []  # set before the experiment was set up; None: it is
         super().__init__(name, path, description)
-        self._step = self._library.fmi2DoStep
-        self._step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
-        self._step.restype = ctypes.c_int
 
     def _instantiate(self) -> tuple[Any, ctypes.c_void_p]:
-        from fmpy.fmi2 import FMU2Slave
+        from fmpy.fmi2 import FMU2Model, FMU2Slave
 
+        kind = FMU2Model if self._description.exchange else FMU2Slave
         folder = extract_fmu(self.path)
         identifier, python = self._description.identifier, self._description.python
         library = library_of(self.name, self.path, folder, identifier, "2.0")
         try:
-            self._fmu = FMU2Slave(
+            self._fmu = kind(
                 guid=self._description.guid,
                 modelIdentifier=identifier,
                 unzipDirectory=str(folder),
@@ -60,16 +58,6 @@ class Fmu2Slave(FmuSlave):
         if not self._description.python:
             self._fmu.freeLibrary()
 
-    def _ends_run(self) -> str:
-        ends = ctypes.c_int(0)
-        answered = self._library.fmi2GetBooleanStatus(self._component, _TERMINATED, ctypes.byref(ends)) == OK
-        return "fmi2Discard, terminated" if answered and ends.value else ""
-
-    def last_successful_time(self) -> float | None:
-        time = ctypes.c_double(math.nan)
-        status = self._library.fmi2GetRealStatus(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(time))
-        return time.value if status == OK and math.isfinite(time.value) else None
-
     def set(self, values: Mapping[str, Value]) -> None:
         """Set variables of any type by name; what is set before :meth:`begin` is set once more by that."""
         if self._early is not None:
@@ -79,6 +67,7 @@ class Fmu2Slave(FmuSlave):
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
         """Set the experiment up and enter initialisation mode."""
         self.messages.clear()
+        self._tolerance = tolerance
         self._call(
             "SetupExperiment",
             ctypes.c_int(tolerance is not None),
@@ -93,13 +82,33 @@ class Fmu2Slave(FmuSlave):
         self._call("EnterInitializationMode")
         self._reached = start
 
+    def reset(self) -> None:
+        super().reset()
+        self._early = []
+
+
+class Fmu2Slave(Fmu2Instance):
+    """An instance for co-simulation."""
+
+    def __init__(self, name: str, path: Path, description: FmuDescription | None = None) -> None:
+        super().__init__(name, path, description)
+        self._step = self._library.fmi2DoStep
+        self._step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+        self._step.restype = ctypes.c_int
+
+    def _ends_run(self) -> str:
+        ends = ctypes.c_int(0)
+        answered = self._library.fmi2GetBooleanStatus(self._component, _TERMINATED, ctypes.byref(ends)) == OK
+        return "fmi2Discard, terminated" if answered and ends.value else ""
+
+    def last_successful_time(self) -> float | None:
+        time = ctypes.c_double(math.nan)
+        status = self._library.fmi2GetRealStatus(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(time))
+        return time.value if status == OK and math.isfinite(time.value) else None
+
     def try_step(self, time: float, step: float) -> None:
         status = self._step(self._component, time, step, 1)
         self._reached = time
         if status:
             self._check(status, "fmi2DoStep")
         self._reached = time + step
-
-    def reset(self) -> None:
-        super().reset()
-        self._early = []

@@ -1,7 +1,8 @@
-"""Instances of FMI 3.0 for co-simulation, without event mode."""
+"""Instances of FMI 3.0, and those for co-simulation without event mode."""
 
 import ctypes
 import math
+from abc import abstractmethod
 from ctypes import c_bool, c_double, c_size_t, c_void_p
 from pathlib import Path
 from typing import Any
@@ -21,34 +22,17 @@ TERMINATES = "fmi3DoStep, terminateSimulation"
 NEAR = 1e-6
 """Share of a step within which the end of the step and the time that the FMU came to are one."""
 
-_ALWAYS = [
-    "InstantiateCoSimulation",
-    "FreeInstance",
-    "EnterInitializationMode",
-    "ExitInitializationMode",
-    "DoStep",
-    "Terminate",
-    "Reset",
-]
+_ALWAYS = ["FreeInstance", "EnterInitializationMode", "ExitInitializationMode", "Terminate", "Reset"]
 
 
-class Fmu3Slave(FmuSlave):
-    """See ``FmuSlave``."""
+class Fmu3Instance(FmuSlave):
+    """What instances for co-simulation and for model exchange share."""
 
     PREFIX = "fmi3"
     STATE = "FMUState"
 
     def __init__(self, name: str, path: Path, description: FmuDescription | None = None) -> None:
         super().__init__(name, path, description)
-        self._rolls_back = False
-        self._astray = (math.nan, 0, 0.0)  # first [s], count, farthest [s]
-        self._flags = (c_bool * 3)()  # event, end of the run, early return
-        self._last = c_double()
-        addresses = [ctypes.addressof(self._flags) + k for k in range(3)]
-        self._said_by_step = (*map(c_void_p, addresses), c_void_p(ctypes.addressof(self._last)))
-        self._step = self._library.fmi3DoStep
-        self._step.argtypes = [c_void_p, c_double, c_double, c_bool, *[c_void_p] * 4]
-        self._step.restype = ctypes.c_int
         self._configure()
 
     def _necessary_functions(self) -> list[str]:
@@ -66,6 +50,10 @@ class Fmu3Slave(FmuSlave):
             self.set(self._description.configured)
             self._call("ExitConfigurationMode")
 
+    def reset(self) -> None:
+        super().reset()
+        self._configure()
+
     def _instantiate(self) -> tuple[Any, c_void_p]:
         folder, description = extract_fmu(self.path), self._description
         path = library_of(self.name, self.path, folder, description.identifier, description.version)
@@ -78,46 +66,38 @@ class Fmu3Slave(FmuSlave):
         lacking = [name for name in self._necessary_functions() if not hasattr(library, f"fmi3{name}")]
         if lacking:
             raise FmuError(f"{self.name}: the binary of {self.path} must have fmi3{lacking[0]}, but has not")
-        library.fmi3InstantiateCoSimulation.restype = c_void_p
         library.fmi3FreeInstance.restype = None
         environment, log = log_message_callback(self._inbox)
-        references, update = self._intermediate()
         resources = folder / "resources"
-        component = library.fmi3InstantiateCoSimulation(
+        named = (
             self.name.encode(),
             description.guid.encode(),
             f"{resources}/".encode() if resources.is_dir() else None,
-            c_bool(False),
-            c_bool(True),
-            c_bool(self.model.has_events),
-            c_bool(self.model.has_events),
-            references,
-            c_size_t(len(references)),
-            c_void_p(environment),
-            log,
-            update,
         )
+        component = self._instance(library, (*named, c_bool(False), c_bool(True)), (c_void_p(environment), log))
         if not component:
-            hint = " (`events = false` runs it without event mode)" if self.model.has_events else ""
+            hint = " (`events = false` runs it without event mode)" if self._asks_for_events else ""
             raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._last_message()}{hint}")
         return library, c_void_p(component)
 
-    def _intermediate(self) -> tuple[Any, Any]:
-        """Return the variables that intermediate updates set, and the function that does it, if any."""
-        return (ctypes.c_uint * 0)(), None
+    @abstractmethod
+    def _instance(self, library: Any, first: tuple[Any, ...], last: tuple[Any, ...]) -> int | None:
+        """Return the address of a new instance, given the first and the last arguments that make one."""
+
+    @property
+    def _asks_for_events(self) -> bool:
+        """Whether it is made for event mode, where it need not be."""
+        return False
 
     def _free(self) -> None:
         self._library.fmi3FreeInstance(self._component)
         if not self._description.python:
             free_library(self._library)
 
-    def last_successful_time(self) -> float | None:
-        """Return where the FMU is after a step that it discarded: where it was, for FMI 3.0 discards all of it."""
-        return self._reached
-
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
         """Enter initialisation mode."""
         self.messages.clear()
+        self._tolerance = tolerance
         self._call(
             "EnterInitializationMode",
             c_bool(tolerance is not None),
@@ -127,6 +107,44 @@ class Fmu3Slave(FmuSlave):
             c_double(stop or 0.0),
         )
         self._reached = start
+
+
+class Fmu3Slave(Fmu3Instance):
+    """An instance for co-simulation."""
+
+    def __init__(self, name: str, path: Path, description: FmuDescription | None = None) -> None:
+        super().__init__(name, path, description)
+        self._rolls_back = False
+        self._astray = (math.nan, 0, 0.0)  # first [s], count, farthest [s]
+        self._flags = (c_bool * 3)()  # event, end of the run, early return
+        self._last = c_double()
+        addresses = [ctypes.addressof(self._flags) + k for k in range(3)]
+        self._said_by_step = (*map(c_void_p, addresses), c_void_p(ctypes.addressof(self._last)))
+        self._step = self._library.fmi3DoStep
+        self._step.argtypes = [c_void_p, c_double, c_double, c_bool, *[c_void_p] * 4]
+        self._step.restype = ctypes.c_int
+
+    def _needed(self) -> list[str]:
+        return ["InstantiateCoSimulation", "DoStep", *super()._needed()]
+
+    @property
+    def _asks_for_events(self) -> bool:
+        return self.model.has_events
+
+    def _instance(self, library: Any, first: tuple[Any, ...], last: tuple[Any, ...]) -> int | None:
+        create, events = library.fmi3InstantiateCoSimulation, c_bool(self.model.has_events)
+        create.restype = c_void_p
+        references, update = self._intermediate()
+        made: int | None = create(*first, events, events, references, c_size_t(len(references)), *last, update)
+        return made
+
+    def _intermediate(self) -> tuple[Any, Any]:
+        """Return the variables that intermediate updates set, and the function that does it, if any."""
+        return (ctypes.c_uint * 0)(), None
+
+    def last_successful_time(self) -> float | None:
+        """Return where the FMU is after a step that it discarded: where it was, for FMI 3.0 discards all of it."""
+        return self._reached
 
     def try_step(self, time: float, step: float) -> None:
         end = self._last.value = time + step
@@ -174,7 +192,6 @@ class Fmu3Slave(FmuSlave):
     def reset(self) -> None:
         super().reset()
         self._rolls_back = False
-        self._configure()
 
     def raise_for_status(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
         if status >= ENDED:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -64,6 +64,7 @@ class _Instance(_Strict, frozen=True, kw_only=True):
     fmu: str
     parameters: dict[str, Any] = {}
     clocks: dict[str, _Clock] = {}
+    interface: Literal["co_simulation", "model_exchange"] = "co_simulation"
     solver_tolerance: float | None = None
 
 
@@ -260,7 +261,8 @@ class _Reader:
             clocks = {key: self._clock(clock, f"{path}.clocks.{key}") for key, clock in instance.clocks.items()}
             try:
                 fmu = self._fmu(instance.fmu)
-                found.append(fmu_instance(name, fmu, start, instance.solver_tolerance, self._events, clocks))
+                exchange = instance.interface == "model_exchange"
+                found.append(fmu_instance(name, fmu, start, instance.solver_tolerance, self._events, clocks, exchange))
             except ScenarioError as error:
                 self.problems.append(Problem(path, str(error)))
             except FmuError as error:

@@ -66,13 +66,17 @@ class _Made:
     solver_tolerance: float | None
     events: bool
     clocks: Mapping[str, ClockTimes]
+    exchange: bool
 
     @classmethod
     def of(cls, instance: Instance) -> "_Made":
         assert isinstance(instance.create, FmuFactory)
-        told = {name: instance.model.clocks[name] for name in instance.create.description.events.told}
+        description = instance.create.description
+        told = {name: instance.model.clocks[name] for name in description.events.told}
         clocks = {name: ClockTimes(clock.interval, clock.shift) for name, clock in told.items()}
-        return cls(dict(instance.start), instance.solver_tolerance, instance.model.has_events, clocks)
+        start = {**instance.start, **description.configured}
+        exchange = description.exchange is not None
+        return cls(start, instance.solver_tolerance, instance.model.has_events, clocks, exchange)
 
 
 @dataclass(frozen=True)
@@ -89,7 +93,7 @@ def _path(instance: Instance) -> Path:
 
 def _prepare(payload: _Payload, files: Mapping[str, Path]) -> Session:
     instances = tuple(
-        fmu_instance(name, files[name], made.start, made.solver_tolerance, made.events, made.clocks)
+        fmu_instance(name, files[name], made.start, made.solver_tolerance, made.events, made.clocks, made.exchange)
         for name, made in payload.instances.items()
     )
     scenario = replace(payload.scenario, system=replace(payload.scenario.system, instances=instances))

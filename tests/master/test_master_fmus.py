@@ -196,7 +196,11 @@ def test_damaged_and_missing_archives(tmp_path: Path, fmus) -> None:
         (b"<a/>", "FMI 2.0 or 3.0"),
         (b'<fmiModelDescription fmiVersion="1.0"/>', "FMI 2.0 or 3.0"),
         (b'<fmiModelDescription fmiVersion="3.0-beta.1"/>', "FMI 2.0 or 3.0"),
-        (b'<fmiModelDescription fmiVersion="3.0"><ModelExchange/></fmiModelDescription>', "for model exchange alone"),
+        (
+            b'<fmiModelDescription fmiVersion="3.0"><ScheduledExecution/></fmiModelDescription>',
+            "but is for neither: it is for scheduled execution alone",
+        ),
+        (b'<fmiModelDescription fmiVersion="3.0"><ModelExchange/></fmiModelDescription>', "must follow FMI 3.0"),
         (b'<fmiModelDescription fmiVersion="3.0"><CoSimulation/></fmiModelDescription>', "must follow FMI 3.0"),
         (b'<fmiModelDescription fmiVersion="2.0"/>', "for co-simulation"),
         (b'<fmiModelDescription fmiVersion="2.0"><CoSimulation/></fmiModelDescription>', "must follow FMI 2.0"),

@@ -17,6 +17,7 @@ from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT,
 from orchestrator.diagnosis.fmu.coupled_fmus import split_name
 from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem
 from orchestrator.errors import FmuError, OrchestratorError
+from orchestrator.fmi.model_description import read_description
 from orchestrator.master.protocol import Value
 from orchestrator.master.signals import Samples
 from orchestrator.scenarios.isolated import Safety
@@ -35,6 +36,7 @@ from orchestrator.shared.results.any_fmu import DeliveredFound, PartFound
 from pyfmu_sources.attachment import SERIES
 
 PLANT = "plant"
+CO_SIMULATION = "CoSimulation"
 LEAD = 0.5  # share of a step by which effects extrapolate what is fed back, as in the fit
 BUILD = (
     "import sys; from pythonfmu import FmuBuilder; "
@@ -213,7 +215,8 @@ def _structure(problem: FmuProblem, parts: tuple[Part, ...], attachment: str) ->
             if owner == (name or PLANT):
                 full = f"{name}.{variable}" if name else variable
                 mine[problem.runner.system.model.variables[full].causality].append(variable)
-        _component(elements, name or PLANT, fmu.name, mine)
+        exchange = read_description(fmu, events=False).exchange is not None
+        _component(elements, name or PLANT, fmu.name, mine, "ModelExchange" if exchange else CO_SIMULATION)
     for part in (p for p in parts if p.where == OUTPUT):
         _component(elements, part.name, attachment, {"input": ["signal"], "output": ["result"]})
     connections = etree.SubElement(system, tag("ssd", "Connections"))
@@ -280,9 +283,11 @@ def _further_wires(problem: FmuProblem, part: Part) -> list[Joined]:
     return []
 
 
-def _component(parent: etree._Element, name: str, source: str, variables: Mapping[str, list[str]]) -> None:
+def _component(
+    parent: etree._Element, name: str, source: str, variables: Mapping[str, list[str]], interface: str = CO_SIMULATION
+) -> None:
     given = {"name": name, "type": "application/x-fmu-sharedlibrary", "source": f"resources/{source}"}
-    component = etree.SubElement(parent, tag("ssd", "Component"), given | {"implementation": "CoSimulation"})
+    component = etree.SubElement(parent, tag("ssd", "Component"), given | {"implementation": interface})
     connectors = etree.SubElement(component, tag("ssd", "Connectors"))
     for kind, names in variables.items():
         for variable in names:

@@ -25,6 +25,7 @@ class Structure:
         folder: of the unpacked archive.
         units: that the file declares.
         components: file of each component.
+        exchanged: names of the components that are to be run as model exchange.
         kinds: kind of each connector.
         connector_units: of those that state one.
         sizes: of the dimensions of those that are arrays; None where the file does not say.
@@ -38,6 +39,7 @@ class Structure:
     units: Mapping[str, Unit]
     problems: list[Problem] = field(default_factory=list)
     components: dict[str, Path] = field(default_factory=dict)
+    exchanged: set[str] = field(default_factory=set)
     kinds: dict[Node, str] = field(default_factory=dict)
     connector_units: dict[Node, Unit] = field(default_factory=dict)
     sizes: dict[Node, tuple[int | None, ...]] = field(default_factory=dict)

@@ -150,13 +150,15 @@ def _component(element: etree._Element, name: str, structure: Structure) -> None
         structure.problems.append(Problem(f"$.{name}.type", f"must be {FMU_TYPE}, but is {kind!r}"))
     elif element.get("source") is None:
         structure.problems.append(Problem(f"$.{name}.source", "must be a file of the archive, but there is none"))
-    elif (implementation := element.get("implementation", "any")) not in ("any", "CoSimulation"):
-        text = f"must be CoSimulation, but is {implementation}"
+    elif (implementation := element.get("implementation", "any")) not in ("any", "CoSimulation", "ModelExchange"):
+        text = f"must be CoSimulation or ModelExchange, but is {implementation}"
         structure.problems.append(Problem(f"$.{name}.implementation", text))
     elif file is None:
         structure.problems.append(Problem(f"$.{name}.source", f"must be a file of the archive, but is {source!r}"))
     else:
         structure.components[name] = file
+        if element.get("implementation") == "ModelExchange":
+            structure.exchanged.add(name)
     _bind(element, name, structure)
 
 
@@ -237,7 +239,7 @@ def _descriptions(structure: Structure, path: Path, events: bool) -> dict[str, F
     found = {}
     for name, file in structure.components.items():
         try:
-            found[name] = read_description(file, events)
+            found[name] = read_description(file, events, exchange=name in structure.exchanged)
         except FmuError as error:
             raise FmuError(f"{path}: {name}: {str(error).replace(str(file), file.name)}") from None
     return found
@@ -283,7 +285,8 @@ def _configured(
                 values |= {} if value is None else {parameter: value}
         try:
             file = structure.components[name]
-            found[name] = read_configured(file, values, events)[0] if values else description
+            exchange = name in structure.exchanged
+            found[name] = read_configured(file, values, events, exchange)[0] if values else description
         except FmuError as error:
             raise FmuError(f"{path}: {name}: {error}") from None
     return found

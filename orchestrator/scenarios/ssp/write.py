@@ -97,13 +97,14 @@ def _structure(scenario: Scenario, version: str) -> bytes:
 
 
 def _component(elements: etree._Element, system: System, instance: Instance, version: str) -> None:
+    assert isinstance(instance.create, FmuFactory)
     component = etree.SubElement(
         elements,
         tag("ssd", "Component"),
         name=instance.name,
         type="application/x-fmu-sharedlibrary",
         source=_source(instance),
-        implementation="CoSimulation",
+        implementation="ModelExchange" if instance.create.description.exchange else "CoSimulation",
     )
     connectors = etree.SubElement(component, tag("ssd", "Connectors"))
     # Only inputs that something feeds: some tools set the others to zero, over their start values.

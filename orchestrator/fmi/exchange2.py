@@ -1,0 +1,39 @@
+"""Instances of FMI 2.0 for model exchange."""
+
+import ctypes
+import math
+
+from orchestrator.fmi.model_exchange import ExchangeSlave, Instant
+from orchestrator.fmi.slave2 import Fmu2Instance
+
+
+class Exchange2Slave(ExchangeSlave, Fmu2Instance):
+    """See ``ExchangeSlave``."""
+
+    RATES = "GetDerivatives"
+
+    def _counts(self) -> tuple[int, int]:
+        exchange = self._description.exchange
+        assert exchange is not None
+        return exchange.states, exchange.indicators
+
+    def _complete(self) -> tuple[bool, bool]:
+        assert self._description.exchange is not None
+        if not self._description.exchange.completed:
+            return False, False
+        enters, ends = ctypes.c_int(0), ctypes.c_int(0)
+        keeps = ctypes.c_int(not self.model.can_save_state)
+        self._call("CompletedIntegratorStep", keeps, ctypes.byref(enters), ctypes.byref(ends))
+        return bool(enters.value), bool(ends.value)
+
+    def _update(self) -> Instant:
+        from fmpy.fmi2 import fmi2EventInfo
+
+        info = fmi2EventInfo()
+        self._call("NewDiscreteStates", ctypes.byref(info))
+        return Instant(
+            bool(info.newDiscreteStatesNeeded),
+            bool(info.terminateSimulation),
+            bool(info.nominalsOfContinuousStatesChanged),
+            info.nextEventTime if info.nextEventTimeDefined else math.inf,
+        )

@@ -1,0 +1,265 @@
+"""FMUs for model exchange as slaves: integrated here, their events located.
+
+State events are changes of sign of event indicators, which the integrator finds; time events are stop times; step
+events are asked for by the FMU after steps of the integrator. In between inputs are held, or follow what ``feed`` says.
+"""
+
+import ctypes
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from ctypes import c_double, c_void_p
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import SlaveError
+from orchestrator.fmi.addresses import native_calls
+from orchestrator.fmi.equations import Equations
+from orchestrator.fmi.events_alone import EventsAlone
+from orchestrator.fmi.integrator import IntegrationError, Integrator
+from orchestrator.fmi.messages import ERROR, OK
+from orchestrator.fmi.model_description import FmuDescription
+from orchestrator.fmi.slave import FmuSlave
+from orchestrator.master.protocol import EventSlave, EventUpdate, NativeCalls, Signals, StepOutcome, Transfer
+
+TOLERANCE = 1e-8
+"""Relative tolerance of the integrator, where none is asked for; of small states, of their nominal values."""
+
+_STEP = ctypes.CFUNCTYPE(ctypes.c_int, c_void_p, c_double, c_double, ctypes.c_int)
+
+
+class Instant(NamedTuple):
+    """What the FMU said at an instant in event mode."""
+
+    again: bool
+    ends: bool
+    rescaled: bool
+    next_event: float  # s; infinity for none
+
+
+class _State(NamedTuple):
+    """A saved state of the FMU, and what is known here of the time it was saved at."""
+
+    handle: Any
+    next_event: float
+    reached: float | None
+    signs: NDArray[np.float64]
+
+
+class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
+    """See ``EventSlave``."""
+
+    RATES: str  # the function that gives the derivatives of the states, without its prefix
+
+    def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
+        super().__init__(name, path, description)
+        self._equations = Equations(self._library, self._component, self.PREFIX, self.RATES, self._check)
+        self._integrator = Integrator(self._equations)
+        self._forget()
+        self._rescaled, self._nominals = True, np.empty(0)
+        self._failure: BaseException | None = None  # of a step that was done from machine code
+        self._native: Any = None
+        inputs = [v.name for v in self.model.variables.values() if v.causality == "input" and v.type != "String"]
+        self._discrete = [name for name in inputs if name not in description.inputs]
+        self._watch(inputs)
+
+    def _forget(self) -> None:
+        """Be as new."""
+        self._in_event_mode = True
+        self._goes_on = False  # the integrator may take up where it left off
+        self._next_event = math.inf
+
+    def _watch(self, names: Sequence[str]) -> None:
+        """Let the integrator begin anew where these have changed."""
+        self._watched, self._known = np.empty(len(names)), np.full(len(names), math.nan)
+        self._look = self.receives(names, self._watched) if names else lambda: None
+
+    # A run ---------------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Exit initialisation mode, into event mode."""
+        super().start()
+        self._forget()
+        self._rescaled = True
+        self._equations.resize(*self._counts())
+        self._integrator = Integrator(self._equations)
+
+    @abstractmethod
+    def _counts(self) -> tuple[int, int]:
+        """Return the numbers of states and of event indicators."""
+
+    def reset(self) -> None:
+        super().reset()
+        self._forget()
+
+    def try_step(self, time: float, step: float) -> None:
+        self.do_step(time, step)
+
+    def last_successful_time(self) -> float | None:
+        return self._reached
+
+    def shorten_steps(self) -> bool:
+        """Refuse: the integrator chooses its steps itself.
+
+        Returns:
+            False.
+        """
+        return False
+
+    def _due(self) -> float:
+        return self._next_event
+
+    def step(self, time: float, step: float) -> StepOutcome:
+        """Advance from ``time`` by at most ``step`` [s]; stop at the first event."""
+        end = time + step
+        integrator = self._ready(time)
+        near = 1e-13 * max(1.0, abs(end))
+        while end - integrator.time > near:
+            try:
+                event = integrator.step(end)
+            except IntegrationError as error:
+                self._worst = max(self._worst, ERROR)
+                raise SlaveError(f"{self.name}: t = {integrator.time:.9g} s must be passed, but {error}") from None
+            if event and integrator.time == time:
+                return StepOutcome(time, True)
+            self._place(integrator.time if end - integrator.time > near else end)
+            enters, ends_run = self._complete()
+            if event or enters or ends_run:
+                how = f"{self.PREFIX}CompletedIntegratorStep, terminateSimulation" if ends_run else ""
+                return StepOutcome(self._reached or 0.0, event or enters, how)
+        self._place(end)
+        return StepOutcome(end, False)
+
+    def _ready(self, time: float) -> Integrator:
+        """Return the integrator at ``time`` [s], begun anew where an event or an input asks for it."""
+        if self._worst >= ERROR:
+            self._alive("a step")
+        self._look()
+        if not np.array_equal(self._watched, self._known, equal_nan=True):
+            self._known[:], self._goes_on = self._watched, False
+        if not self._goes_on:
+            if self._rescaled:
+                self._nominals, self._rescaled = self._equations.read_nominals(), False
+            states = self._equations.read_states()
+            self._integrator.restart(time, states, self._tolerance or TOLERANCE, self._nominals)
+            self._goes_on = True
+        return self._integrator
+
+    def _place(self, time: float) -> None:
+        """Set time, states and inputs to where the integrator is."""
+        self._equations.place(time, self._integrator.states)
+        self._reached = time
+
+    @abstractmethod
+    def _complete(self) -> tuple[bool, bool]:
+        """Tell the FMU of a completed step; return whether it wants an event, and the end of the run."""
+
+    # Event mode ------------------------------------------------------------------------------------------------
+
+    def enter_event_mode(self) -> None:
+        """Take an event at the present time."""
+        self._call("EnterEventMode")
+        self._in_event_mode, self._goes_on = True, False
+
+    def tick(self, clocks: Sequence[str]) -> None:
+        """Refuse, for there are no clocks in model exchange here."""
+        raise SlaveError(f"{self.name}: must have the clocks {', '.join(clocks)}, but has none")
+
+    def update_discrete_states(self) -> EventUpdate:
+        """End an instant in event mode."""
+        found = self._update()
+        self._next_event, self._rescaled = found.next_event, self._rescaled or found.rescaled
+        coming = found.next_event if math.isfinite(found.next_event) else None
+        return EventUpdate(found.again, coming, found.ends)
+
+    @abstractmethod
+    def _update(self) -> Instant:
+        """End an instant."""
+
+    def leave_event_mode(self) -> None:
+        """Go on in time."""
+        self._call("EnterContinuousTimeMode")
+        self._in_event_mode = False
+        self._integrator.signs = self._equations.read_signs()
+
+    # Values ------------------------------------------------------------------------------------------------------
+
+    def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that sets ``names`` from ``buffer``; where it takes its events alone, discrete ones by one."""
+        places = [k for k, name in enumerate(names) if name in self._discrete]
+        if self.model.has_events or not places:
+            return super().sends(names, buffer)
+        others = [k for k in range(len(names)) if k not in places]
+        free, last = np.empty(len(others)), np.full(len(places), math.nan)
+        send_free = super().sends([names[k] for k in others], free)
+        send_discrete = super().sends([names[k] for k in places], last)
+
+        def send() -> None:
+            free[:] = buffer[others]
+            send_free()
+            if not np.array_equal(buffer[places], last, equal_nan=True):
+                if not self._in_event_mode:
+                    self.enter_event_mode()
+                last[:] = buffer[places]
+            if self._in_event_mode:
+                send_discrete()
+
+        return send
+
+    def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
+        """Say what continuous inputs are inside steps, from now on."""
+        for name in names:
+            if name not in self._description.inputs:
+                raise SlaveError(f"{self.name}: {name} must be a continuous input, but is not")
+        buffer = np.empty(len(names))
+        self._equations.feed(self._functions.batches(self._accesses(names), "Set", buffer), buffer, values)
+        self._goes_on = False
+
+    def output_rates(self, names: Sequence[str], order: int = 1) -> list[float]:
+        """Refuse, for derivatives of outputs are not known."""
+        raise SlaveError(f"{self.name}: derivatives of {', '.join(names)} must be known, but are not")
+
+    # Saved states --------------------------------------------------------------------------------------------------
+
+    def get_state(self) -> Any:
+        return _State(super().get_state(), self._next_event, self._reached, self._integrator.signs)
+
+    def set_state(self, state: Any) -> None:
+        super().set_state(state.handle)
+        self._next_event, self._reached, self._goes_on = state.next_event, state.reached, False
+        self._integrator.signs = state.signs
+
+    def free_state(self, state: Any) -> None:
+        super().free_state(state.handle)
+
+    # The compiled loops ------------------------------------------------------------------------------------------
+
+    def native_calls(self, inputs: Sequence[str], outputs: Sequence[str]) -> NativeCalls | None:
+        """Return addresses of the functions that set and read, and of one that calls ``do_step`` here."""
+        if self._worst >= ERROR or self.model.has_events or any(name in self._discrete for name in inputs):
+            return None
+        if any(self.model.variables[name].type == "String" for name in (*inputs, *outputs)):
+            return None
+        self._watch(inputs)
+
+        def step(_: int, time: float, step: float, no_return: int) -> int:
+            try:
+                self.do_step(time, step)
+            except BaseException as error:  # an exception must not reach the loop
+                self._failure = error
+                return ERROR
+            return OK
+
+        self._native = _STEP(step)
+        address = ctypes.cast(self._native, c_void_p).value or 0
+        accesses = self._accesses(inputs), self._accesses(outputs)
+        return native_calls(self._functions, *accesses, self._description.python, (address, "a step of the integrator"))
+
+    def failed(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+        super().failed(status, function, time, reached)
