@@ -8,9 +8,15 @@ from typing import Any
 from orchestrator.fmi.model_exchange import ExchangeSlave, Instant
 from orchestrator.fmi.slave3 import Fmu3Instance
 
-_NEEDED = ["InstantiateModelExchange", "SetTime", "EnterEventMode", "UpdateDiscreteStates", "EnterContinuousTimeMode"]
-_NEEDED += ["GetNumberOfContinuousStates", "GetNumberOfEventIndicators", "GetEventIndicators"]
-_NEEDED += ["SetContinuousStates", "GetContinuousStates", "GetNominalsOfContinuousStates"]
+_NECESSARY = [
+    "InstantiateModelExchange",
+    "SetTime",
+    "EnterEventMode",
+    "UpdateDiscreteStates",
+    "EnterContinuousTimeMode",
+]
+_NECESSARY += ["GetNumberOfContinuousStates", "GetNumberOfEventIndicators", "GetEventIndicators"]
+_NECESSARY += ["SetContinuousStates", "GetContinuousStates", "GetNominalsOfContinuousStates"]
 
 
 class Exchange3Slave(ExchangeSlave, Fmu3Instance):
@@ -18,10 +24,10 @@ class Exchange3Slave(ExchangeSlave, Fmu3Instance):
 
     RATES = "GetContinuousStateDerivatives"
 
-    def _needed(self) -> list[str]:
+    def _necessary_functions(self) -> list[str]:
         exchange = self._description.exchange
         completed = ["CompletedIntegratorStep"] if exchange is not None and exchange.completed else []
-        return [*super()._needed(), *_NEEDED, self.RATES, *completed]
+        return [*super()._necessary_functions(), *_NECESSARY, self.RATES, *completed]
 
     def _instance(self, library: Any, first: tuple[Any, ...], last: tuple[Any, ...]) -> int | None:
         create = library.fmi3InstantiateModelExchange

@@ -258,8 +258,8 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         accesses = self._accesses(inputs), self._accesses(outputs)
         return native_calls(self._functions, *accesses, self._description.python, (address, "a step of the integrator"))
 
-    def failed(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
+    def raise_for_status(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
         failure, self._failure = self._failure, None
         if failure is not None:
             raise failure
-        super().failed(status, function, time, reached)
+        super().raise_for_status(status, function, time, reached)

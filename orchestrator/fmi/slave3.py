@@ -124,8 +124,8 @@ class Fmu3Slave(Fmu3Instance):
         self._step.argtypes = [c_void_p, c_double, c_double, c_bool, *[c_void_p] * 4]
         self._step.restype = ctypes.c_int
 
-    def _needed(self) -> list[str]:
-        return ["InstantiateCoSimulation", "DoStep", *super()._needed()]
+    def _necessary_functions(self) -> list[str]:
+        return ["InstantiateCoSimulation", "DoStep", *super()._necessary_functions()]
 
     @property
     def _asks_for_events(self) -> bool:
