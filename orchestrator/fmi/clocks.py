@@ -7,7 +7,7 @@ from fractions import Fraction
 from lxml import etree
 
 from orchestrator.fmi.variables3 import Variables3
-from orchestrator.master.protocol import PeriodicClock
+from orchestrator.master.protocol import PeriodicClock, TriggeredClock
 
 SELF_SAMPLING = "backlash-cosim.samples-itself"
 """Type of the annotation of a clock whose FMU samples by itself where event mode is not used."""
@@ -38,24 +38,43 @@ class EventFeatures:
     self_sampling: bool = False
 
 
-def read_clocks(variables: Variables3) -> tuple[dict[str, PeriodicClock], EventFeatures, list[str]]:
+@dataclass(frozen=True)
+class Clocks:
+    """The clocks of an FMU.
+
+    Attributes:
+        periodic: input clocks that the master ticks, by name.
+        triggered: input clocks that tick with output clocks of other FMUs, by name.
+        outputs: value references of output clocks, by name.
+        features: what else event mode needs to know.
+        left_out: names of those that nobody ticks.
+    """
+
+    periodic: Mapping[str, PeriodicClock]
+    triggered: Mapping[str, TriggeredClock]
+    outputs: Mapping[str, int]
+    features: EventFeatures
+    left_out: Sequence[str]
+
+
+def read_clocks(variables: Variables3) -> Clocks:
     """Return the clocks of an FMU."""
     periodic: dict[str, PeriodicClock] = {}
+    triggered: dict[str, TriggeredClock] = {}
+    outputs: dict[str, int] = {}
     timed: dict[str, tuple[int, str]] = {}
-    told, left_out, triggered = [], [], set()
+    told, left_out = [], []
     for name, clock in variables.clocks.items():
         reference, kind = int(clock.attrib["valueReference"]), clock.attrib["intervalVariability"]
         causality = clock.get("causality", "local")
         if causality == "output":
-            triggered.add(reference)
+            outputs[name] = reference
         elif causality != "input":
             left_out.append(name)
         elif kind == "triggered":
-            text = "must have times of its own, but is to be triggered by another clock, which nothing here would do"
-            raise UnusableError(f"the input clock {name!r} {text}")
+            triggered[name] = TriggeredClock(_members(variables, reference), reference)
         elif kind in {"constant", "fixed", "tunable"} and (interval := clock_interval(clock)) is not None:
-            members = [v for v, clocks in variables.clocked.items() if reference in clocks]
-            periodic[name] = PeriodicClock(interval, _shift(clock), tuple(members), reference)
+            periodic[name] = PeriodicClock(interval, _shift(clock), _members(variables, reference), reference)
             told += [] if kind == "constant" else [name]
         elif kind in {"fixed", "tunable", "changing", "countdown"}:
             timed[name] = (reference, kind)
@@ -67,10 +86,14 @@ def read_clocks(variables: Variables3) -> tuple[dict[str, PeriodicClock], EventF
         dict(variables.clocked),
         timed,
         tuple(told),
-        frozenset(triggered),
+        frozenset(outputs.values()),
         bool(inputs) and all(_samples_itself(clock) for clock in inputs),
     )
-    return periodic, features, left_out
+    return Clocks(periodic, triggered, outputs, features, left_out)
+
+
+def _members(variables: Variables3, reference: int) -> tuple[str, ...]:
+    return tuple(name for name, clocks in variables.clocked.items() if reference in clocks)
 
 
 def _samples_itself(clock: etree._Element) -> bool:

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from orchestrator.errors import SlaveError
-from orchestrator.fmi.clocked import ClockedTransfers
 from orchestrator.fmi.events_alone import EventsAlone
+from orchestrator.fmi.instance_clocks import InstanceClocks, next_event
 from orchestrator.fmi.intermediate import IntermediateUpdates
 from orchestrator.fmi.messages import ERROR
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.shorter_steps import SMALLEST
 from orchestrator.fmi.slave3 import NEAR, TERMINATES, Fmu3Slave
-from orchestrator.fmi.timed_clocks import TimedClocks
 from orchestrator.master.protocol import (
     EventSlave,
     EventUpdate,
@@ -42,20 +41,15 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
     def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
         self._updates = IntermediateUpdates(name)
         super().__init__(name, path, description)
-        events = description.events
-        self._timed = TimedClocks(events.timed, self._call)
-        self._clocked = ClockedTransfers(events.clocked, self._is_active)
-        self._in_event_mode, self._initialising = False, True
+        self._clocks = InstanceClocks(description, self._call)
+        self._in_event_mode = False
         self._next_event = math.inf
-        self._active: set[int] = set()
         self._halves = False
         self._halved: tuple[float, int] = (math.nan, 0)  # s, count
 
     def _necessary_functions(self) -> list[str]:
-        needed = [*super()._necessary_functions(), "EnterEventMode", "EnterStepMode", "UpdateDiscreteStates"]
-        if self.model.clocks or self._description.events.timed:
-            needed.append("SetClock")
-        return needed
+        modes = ["EnterEventMode", "EnterStepMode", "UpdateDiscreteStates"]
+        return [*super()._necessary_functions(), *modes, *InstanceClocks.necessary_functions(self._description)]
 
     def _intermediate(self) -> tuple[Any, Any]:
         if not self.model.inputs_inside_steps:
@@ -67,26 +61,21 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
 
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
         super().begin(start, stop, tolerance)
-        for name in self._description.events.told:
-            clock = self.model.clocks[name]
-            for function, seconds in (("SetIntervalDecimal", clock.interval), ("SetShiftDecimal", clock.shift)):
-                if seconds:
-                    value = (c_double * 1)(float(seconds))
-                    self._call(function, (ctypes.c_uint * 1)(clock.reference), c_size_t(1), value)
+        self._clocks.begin()
 
     def start(self) -> None:
         """Exit initialisation mode, into event mode."""
-        self._timed.begin(self._reached or 0.0)
+        self._clocks.start(self._reached or 0.0)
         super().start()
-        self._in_event_mode, self._initialising = True, False
+        self._in_event_mode = True
         self._next_event = math.inf
-        self._tick_due()
+        self._clocks.enter_event_mode(self._reached or 0.0)
 
     def reset(self) -> None:
         super().reset()
-        self._in_event_mode, self._initialising = False, True
+        self._in_event_mode = False
         self._next_event = math.inf
-        self._active.clear()
+        self._clocks.reset()
 
     def step(self, time: float, step: float) -> StepOutcome:
         """Advance from ``time`` by at most ``step`` [s]; stop at the first event."""
@@ -143,7 +132,7 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
         super().do_step(time, step)
 
     def _due(self) -> float:
-        return min(self._next_event, self._timed.next_time())
+        return min(self._next_event, self._clocks.next_time())
 
     # Event mode ------------------------------------------------------------------------------------------------
 
@@ -151,54 +140,28 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
         """Take an event at the present time."""
         self._call("EnterEventMode")
         self._in_event_mode = True
-        self._tick_due()
+        self._clocks.enter_event_mode(self._reached or 0.0)
 
     def tick(self, clocks: Sequence[str]) -> None:
         """Activate input clocks for this instant, in event mode."""
-        self._activate([self.model.clocks[name].reference for name in clocks])
+        self._clocks.tick(clocks)
 
-    def _tick_due(self) -> None:
-        """Activate the clocks that the FMU times itself, where their time has come."""
-        self._activate(self._timed.take(self._reached or 0.0))
-
-    def _activate(self, references: Sequence[int]) -> None:
-        count = len(references)
-        if count:
-            active = (c_bool * count)(*[True] * count)
-            self._call("SetClock", (ctypes.c_uint * count)(*references), c_size_t(count), active)
-            self._active.update(references)
-
-    def _is_active(self, clocks: Sequence[int]) -> bool:
-        """Tell whether one of some clocks is active; before the run variables can always be reached."""
-        if self._initialising or not self._active.isdisjoint(clocks):
-            return True
-        outputs = [c for c in clocks if c in self._description.events.triggered] if self._in_event_mode else []
-        if not outputs:
-            return False
-        active = (c_bool * len(outputs))()
-        self._call("GetClock", (ctypes.c_uint * len(outputs))(*outputs), c_size_t(len(outputs)), active)
-        return any(active)
+    def active_clocks(self) -> frozenset[str]:
+        """Return the output clocks that are active in this instant."""
+        return self._clocks.active_outputs()
 
     def update_discrete_states(self) -> EventUpdate:
         """End an instant in event mode."""
-        flags, next_event = (c_bool * 5)(), c_double()  # again, end, nominals, values, next event
+        flags, next_time = (c_bool * 5)(), c_double()  # again, end, nominals, values, next event
         first = ctypes.addressof(flags)
-        self._call("UpdateDiscreteStates", *(ctypes.c_void_p(first + k) for k in range(5)), ctypes.byref(next_event))
-        ticked, now = sorted(self._active), self._reached or 0.0
-        self._active.clear()
-        self._next_event = next_event.value if flags[4] else math.inf
-        self._timed.ask(now, ticked)
-        self._tick_due()
-        coming = min(self._next_event, self._timed.next_time())
-        return EventUpdate(
-            again=flags[0] or bool(self._active),
-            next_event=coming if math.isfinite(coming) else None,
-            ends_run=flags[1],
-        )
+        self._call("UpdateDiscreteStates", *(ctypes.c_void_p(first + k) for k in range(5)), ctypes.byref(next_time))
+        self._next_event = next_time.value if flags[4] else math.inf
+        ticks = self._clocks.end_instant(self._reached or 0.0)
+        return EventUpdate(flags[0] or ticks, next_event(self._next_event, self._clocks), flags[1])
 
     def leave_event_mode(self) -> None:
         """Go on in time."""
-        self._active.clear()
+        self._clocks.leave_event_mode()
         self._call("EnterStepMode")
         self._in_event_mode = False
 
@@ -206,11 +169,11 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
 
     def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
         """Return a call that sets ``names`` from ``buffer``; those of clocks only while one of these is active."""
-        return self._clocked.sends(names, buffer, super().sends)
+        return self._clocks.transfers.sends(names, buffer, super().sends)
 
     def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
         """Return a call that reads ``names`` into ``buffer``; those of clocks keep their values between ticks."""
-        return self._clocked.receives(names, buffer, super().receives)
+        return self._clocks.transfers.receives(names, buffer, super().receives)
 
     def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
         """Say what continuous inputs are inside steps, from now on."""
@@ -242,12 +205,12 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
     # Saved states --------------------------------------------------------------------------------------------------
 
     def get_state(self) -> Any:
-        return _State(super().get_state(), self._next_event, self._timed.state(), self._reached)
+        return _State(super().get_state(), self._next_event, self._clocks.state(), self._reached)
 
     def set_state(self, state: Any) -> None:
         super().set_state(state.handle)
         self._next_event, self._reached = state.next_event, state.reached
-        self._timed.restore(state.ticks)
+        self._clocks.restore(state.ticks)
 
     def free_state(self, state: Any) -> None:
         super().free_state(state.handle)

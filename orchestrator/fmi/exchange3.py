@@ -2,11 +2,17 @@
 
 import ctypes
 import math
+from collections.abc import Sequence
 from ctypes import c_bool, c_double, c_size_t, c_void_p
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+from orchestrator.fmi.instance_clocks import InstanceClocks, next_event
+from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.model_exchange import ExchangeSlave, Instant
 from orchestrator.fmi.slave3 import Fmu3Instance
+from orchestrator.master.protocol import EventUpdate, Signals, Transfer
 
 _NECESSARY = [
     "InstantiateModelExchange",
@@ -24,10 +30,78 @@ class Exchange3Slave(ExchangeSlave, Fmu3Instance):
 
     RATES = "GetContinuousStateDerivatives"
 
+    def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
+        self._clocks = InstanceClocks(description, self._call)
+        super().__init__(name, path, description)
+
     def _necessary_functions(self) -> list[str]:
         exchange = self._description.exchange
         completed = ["CompletedIntegratorStep"] if exchange is not None and exchange.completed else []
-        return [*super()._necessary_functions(), *_NECESSARY, self.RATES, *completed]
+        clocks = InstanceClocks.necessary_functions(self._description)
+        return [*super()._necessary_functions(), *_NECESSARY, self.RATES, *completed, *clocks]
+
+    # A run, with clocks -------------------------------------------------------------------------------------------
+
+    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
+        super().begin(start, stop, tolerance)
+        self._clocks.begin()
+
+    def start(self) -> None:
+        """Exit initialisation mode, into event mode."""
+        self._clocks.start(self._reached or 0.0)
+        super().start()
+        self._clocks.enter_event_mode(self._reached or 0.0)
+
+    def reset(self) -> None:
+        super().reset()
+        self._clocks.reset()
+
+    def _due(self) -> float:
+        return min(super()._due(), self._clocks.next_time())
+
+    def enter_event_mode(self) -> None:
+        """Take an event at the present time."""
+        super().enter_event_mode()
+        self._clocks.enter_event_mode(self._reached or 0.0)
+
+    def tick(self, clocks: Sequence[str]) -> None:
+        """Activate input clocks for this instant, in event mode."""
+        self._clocks.tick(clocks)
+
+    def active_clocks(self) -> frozenset[str]:
+        """Return the output clocks that are active in this instant."""
+        return self._clocks.active_outputs()
+
+    def update_discrete_states(self) -> EventUpdate:
+        """End an instant in event mode."""
+        update = super().update_discrete_states()
+        ticks = self._clocks.end_instant(self._reached or 0.0)
+        return replace(update, again=update.again or ticks, next_event=next_event(self._next_event, self._clocks))
+
+    def leave_event_mode(self) -> None:
+        """Go on in time."""
+        self._clocks.leave_event_mode()
+        super().leave_event_mode()
+
+    def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that sets ``names`` from ``buffer``; those of clocks only while one of these is active."""
+        return self._clocks.transfers.sends(names, buffer, super().sends)
+
+    def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that reads ``names`` into ``buffer``; those of clocks keep their values between ticks."""
+        return self._clocks.transfers.receives(names, buffer, super().receives)
+
+    def get_state(self) -> Any:
+        return super().get_state(), self._clocks.state()
+
+    def set_state(self, state: Any) -> None:
+        super().set_state(state[0])
+        self._clocks.restore(state[1])
+
+    def free_state(self, state: Any) -> None:
+        super().free_state(state[0])
+
+    # Functions of the version ----------------------------------------------------------------------------------------
 
     def _instance(self, library: Any, first: tuple[Any, ...], last: tuple[Any, ...]) -> int | None:
         create = library.fmi3InstantiateModelExchange

@@ -20,6 +20,10 @@ CLOSE = 1e-14
 """Width to which the instant of an event is located, as a share of the time or of 1 s."""
 
 
+BLIND = 1e-9
+"""Time after an event in which an indicator that is zero there finds its side, as a share of the time or of 1 s."""
+
+
 class IntegrationError(Exception):
     """The method cannot go on, in its own words."""
 
@@ -33,8 +37,7 @@ class Integrator:
         time: where it is [s].
         states: there, shape (n,).
         signs: of the event indicators after the last event; who leaves event mode sets them. Where new inputs or
-            another state have changed one of them since, a step ends where it begins. One that was zero then may
-            become what it will: there is no event until it has been on a side.
+            another state have changed one of them since, a step ends where it begins.
     """
 
     def __init__(self, equations: Equations) -> None:
@@ -68,8 +71,13 @@ class Integrator:
         if self._begins and self._has_event(self.time, self.states):
             return True
         self._begins = False
+        length, seeks_side = self._length, bool(np.any(self.signs == 0.0))
+        if seeks_side:
+            stop = min(stop, self.time + BLIND * max(1.0, abs(self.time)))
         before, states, track = self.time, self.states, self._advance(stop)
         after = self.time
+        if seeks_side:
+            self._length = length
         if not self._has_event(after, self.states):
             self.signs = np.where(self.signs == 0.0, self._equations.read_signs(), self.signs)
             return False
@@ -87,8 +95,8 @@ class Integrator:
     def _has_event(self, time: float, states: NDArray[np.float64]) -> bool:
         """Tell whether an indicator has come to be above zero, or is so no more."""
         self._equations.place(time, states)
-        crossed = (self._equations.read_signs() > 0.0) != (self.signs > 0.0)
-        return bool(np.any(crossed & (self.signs != 0.0)))
+        above = self._equations.read_signs() > 0.0
+        return bool(np.any((above != (self.signs > 0.0)) & (self.signs != 0.0)))
 
     def _advance(self, stop: float) -> Callable[[], Any] | None:
         """Take a step; return what gives the states inside it, as a function of time."""

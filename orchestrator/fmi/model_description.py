@@ -75,11 +75,16 @@ def read_description(
     description = parse_description(content, str(path), python, configured, exchange)
     if events or not description.model.has_events:
         return description
-    clocks = [*description.model.clocks, *description.events.timed]
+    clocks = [*description.model.clocks, *description.model.triggered, *description.events.timed]
     if clocks and not description.events.self_sampling:
         raise FmuError(f"{path}: its clocks ({clock_names(clocks)}) tick in event mode, which is not used here")
     model = replace(
-        description.model, has_events=False, output_derivatives=0, inputs_inside_steps=frozenset(), clocks={}
+        description.model,
+        has_events=False,
+        output_derivatives=0,
+        inputs_inside_steps=frozenset(),
+        clocks={},
+        triggered={},
     )
     return replace(description, model=model, events=EventFeatures())
 
@@ -192,10 +197,7 @@ def _description3(
     exchange = None if interface.tag == "CoSimulation" else read_exchange3(root, interface)
     inputs = continuous_inputs({v.name: v for v in variables}) if exchange else frozenset[str]()
     has_events = exchange is not None or _flag(interface, "hasEventMode")
-    if exchange and found.clocks:
-        text = "which are ticked in co-simulation only, but it is for model exchange"
-        raise UnusableError(f"it has clocks ({clock_names(list(found.clocks))}), {text}")
-    clocks, events, left_out = read_clocks(found)
+    clocks = read_clocks(found)
     if found.clocks and not has_events:
         raise ValueError(f"it has clocks ({clock_names(list(found.clocks))}), but no event mode")
     model = ModelInterface(
@@ -207,8 +209,12 @@ def _description3(
         can_vary_step=exchange is not None or _flag(interface, "canHandleVariableCommunicationStepSize"),
         has_events=has_events,
         output_derivatives=int(interface.get("maxOutputDerivativeOrder", "0")) if has_events else 0,
-        inputs_inside_steps=events.inside if has_events and _flag(interface, "providesIntermediateUpdate") else inputs,
-        clocks=clocks,
+        inputs_inside_steps=clocks.features.inside
+        if has_events and _flag(interface, "providesIntermediateUpdate")
+        else inputs,
+        clocks=clocks.periodic,
+        triggered=clocks.triggered,
+        output_clocks=clocks.outputs,
     )
     return FmuDescription(
         model=model,
@@ -218,12 +224,12 @@ def _description3(
         python=python or "PythonFMU" in (root.get("generationTool") or ""),
         once=_flag(interface, "canBeInstantiatedOnlyOncePerProcess"),
         access=dict(zip(names, found.accesses, strict=True)),
-        events=events,
+        events=clocks.features,
         arrays=found.arrays,
         structural=frozenset(found.structural),
         configured=configured,
         resized=frozenset(found.resized),
-        left_out=_note_on_unusable(found.binaries, left_out),
+        left_out=_note_on_unusable(found.binaries, clocks.left_out),
         exchange=exchange,
         inputs=inputs,
     )

@@ -165,8 +165,12 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         self._in_event_mode, self._goes_on = True, False
 
     def tick(self, clocks: Sequence[str]) -> None:
-        """Refuse, for there are no clocks in model exchange here."""
+        """Refuse, for FMI 2.0 knows no clocks."""
         raise SlaveError(f"{self.name}: must have the clocks {', '.join(clocks)}, but has none")
+
+    def active_clocks(self) -> frozenset[str]:
+        """Return none."""
+        return frozenset()
 
     def update_discrete_states(self) -> EventUpdate:
         """End an instant in event mode."""

@@ -94,6 +94,10 @@ class _Host:
         update = self._slave.update_discrete_states()
         return [update.again, update.next_event, update.ends_run]
 
+    def active_clocks(self) -> list[str]:
+        assert isinstance(self._slave, (EventFmuSlave, ExchangeSlave))
+        return sorted(self._slave.active_clocks())
+
     def get_state(self) -> int:
         number = max(self._states, default=0) + 1
         self._states[number] = self._slave.get_state()
@@ -220,6 +224,9 @@ class EventRemoteSlave(RemoteSlave, EventSlave):
 
     def tick(self, clocks: Sequence[str]) -> None:
         self._ask("tick", list(clocks))
+
+    def active_clocks(self) -> frozenset[str]:
+        return frozenset(str(name) for name in self._ask("active_clocks"))
 
     def update_discrete_states(self) -> EventUpdate:
         match self._ask("update_discrete_states"):

@@ -13,7 +13,7 @@ from orchestrator.master.layout import Layout
 from orchestrator.master.problems import Problem
 from orchestrator.master.protocol import PeriodicClock
 from orchestrator.master.signals import Signal
-from orchestrator.master.system import System
+from orchestrator.master.system import System, split
 
 
 def clock_problems(system: System) -> list[Problem]:
@@ -29,6 +29,30 @@ def clock_problems(system: System) -> list[Problem]:
             elif clock.interval <= 0 or clock.shift < 0:
                 text = f"clock {name} must have a positive interval and no negative shift, but they are "
                 found.append(Problem(path, f"{text}{clock.interval} s and {clock.shift} s"))
+    return found + _trigger_problems(system)
+
+
+def _trigger_problems(system: System) -> list[Problem]:
+    models = {instance.name: instance.model for instance in system.instances}
+    outputs = {f"{name}.{clock}" for name, model in models.items() for clock in model.output_clocks}
+    inputs = {f"{name}.{clock}": model for name, model in models.items() for clock in model.triggered}
+    found = []
+    for k, connection in enumerate(system.clock_connections):
+        path = f"$.clock_connections[{k}]"
+        if connection.source not in outputs:
+            text = f"must be an output clock ({', '.join(sorted(outputs)) or 'there is none'}), but is "
+            found.append(Problem(f"{path}.from", f"{text}{connection.source}", mismatch=True))
+        if connection.target not in inputs:
+            text = f"must be a triggered input clock ({', '.join(sorted(inputs)) or 'there is none'}), but is "
+            found.append(Problem(f"{path}.to", f"{text}{connection.target}", mismatch=True))
+    targets = [connection.target for connection in system.clock_connections]
+    for address, model in inputs.items():
+        path, clock = f"$.instances.{split(address)[0]}", split(address)[1]
+        if not model.has_events:
+            found.append(Problem(path, f"clock {clock} must be ticked in event mode, but the slave has none"))
+        elif targets.count(address) != 1:
+            text = "must be connected to one output clock, with which it ticks, but is connected to"
+            found.append(Problem(path, f"clock {clock} {text} {targets.count(address) or 'none'}"))
     return found
 
 

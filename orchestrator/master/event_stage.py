@@ -64,7 +64,7 @@ class EventStage:
         if not self.has_events:
             return
         self.events = cast(EventSlave, self.slave)
-        clocked = {name for clock in model.clocks.values() for name in clock.variables}
+        clocked = model.clocked
         free = [name for name in block.inputs if name not in clocked]
         discrete = [name for name in free if is_discrete(model.variables[name])]
         places = {name: block.first_input + k for k, name in enumerate(block.inputs)}
@@ -76,7 +76,7 @@ class EventStage:
             slots = [block.first_output + block.outputs.index(name) for name in self.rated]
             self.rate_slots = np.array(slots, dtype=np.int64)
         self._send_discrete = bind_send(self.slave, block, discrete, values)
-        for name, clock in model.clocks.items():
+        for name, clock in model.input_clocks.items():
             inputs = [v for v in block.inputs if v in clock.variables]
             outputs = [v for v in block.outputs if v in clock.variables]
             self._clocks[name] = (

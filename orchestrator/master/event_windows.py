@@ -195,7 +195,8 @@ class EventWindows:
         error, halves = self._compare(track, first), [first]
         if not first.event and first.end == middle:
             halves.append(self.sweeper.sweep(middle, whole.end, first.rates, track))
-            error = max(error, self._compare(track, halves[1]), self._between(track, halves, record))
+            read = np.union1d(self._recorded(track, record), self.events.exchanged if whole.event else record[:0])
+            error = max(error, self._compare(track, halves[1]), self._between(track, halves, read))
         if error > 1.0:
             raise _RefusedError(error)
         last = halves[-1]
@@ -208,17 +209,25 @@ class EventWindows:
             return 0.0
         return self._difference(track.at(np.array([half.end]))[0], half.track.values[2])
 
-    def _between(self, track: Track, halves: Sequence[Swept], record: Slots) -> float:
-        """Return the error of recorded points between nodes as a multiple of the tolerance."""
+    def _recorded(self, track: Track, record: Slots) -> Slots:
+        """Return the recorded slots where a recorded point is within the window."""
         step = self.settings.step
-        if math.floor((track.end - self.start) / step) <= math.floor((track.start - self.start) / step):
+        inside = math.floor((track.end - self.start) / step) > math.floor((track.start - self.start) / step)
+        return record if inside else record[:0]
+
+    def _between(self, track: Track, halves: Sequence[Swept], read: Slots) -> float:
+        """Return the error of slots between nodes as a multiple of the tolerance.
+
+        Between nodes recorded points are read, and the inputs by which a slave has placed the event at the end.
+        """
+        if not len(read):
             return 0.0
-        rated, held = self.sweeper.rated[record], self.sweeper.held[record]
-        rough = JoinedTracks(tuple(half.track for half in halves)).roughness()[record]
+        rated, held = self.sweeper.rated[read], self.sweeper.held[read]
+        rough = JoinedTracks(tuple(half.track for half in halves)).roughness()[read]
         worst = 0.0
         for half in halves:
-            time, values = 0.5 * (half.track.start + half.track.end), half.track.values[1, record]
-            cubic = np.abs(track.at(np.array([time]))[0, record] - values) / CUBIC_GAIN
+            time, values = 0.5 * (half.track.start + half.track.end), half.track.values[1, read]
+            cubic = np.abs(track.at(np.array([time]))[0, read] - values) / CUBIC_GAIN
             error = np.where(rated, cubic, QUARTIC_SHARE * rough)
             scale = self.settings.tolerance * np.maximum(1.0, np.abs(values))
             worst = max(worst, float(np.max((error / scale)[~held], initial=0.0)))

@@ -7,7 +7,7 @@ hide from others what it put out in between. Then all leave.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,13 @@ from orchestrator.master.clocks import ClockSchedule
 from orchestrator.master.event_stage import EventStage, Gather, is_discrete, slack
 from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.iterated import backward_slots
+from orchestrator.master.protocol import EventSlave
 from orchestrator.master.result import EventStatistics, RunRemark
+from orchestrator.master.system import split
 from orchestrator.master.wiring import Wiring
 
 Array = NDArray[np.float64]
-Ticks = Mapping[str, Sequence[str]]
+Ticks = dict[str, list[str]]
 
 MOST_INSTANTS = 100
 """Instants at one time beyond which slaves are taken to ask for another one for ever."""
@@ -46,6 +48,7 @@ class EventIteration:
     Attributes:
         stages: all instances, in execution order.
         rated: signals whose derivatives are known; those of outputs that follow inputs at once would lack the inputs'.
+        exchanged: slots of the signals that slaves with events take from others.
         late_for: an instance that could not be taken back to events, for which they were late.
     """
 
@@ -53,6 +56,11 @@ class EventIteration:
         self.wiring = wiring
         self.stages = [EventStage(stage, wiring.values) for stage in wiring.stages]
         self._taking = [stage for stage in self.stages if stage.has_events]
+        by_name = {stage.name: stage for stage in self._taking}
+        self._triggers: dict[str, list[tuple[str, EventSlave, str]]] = {}
+        for connection in wiring.layout.system.clock_connections:
+            (source, output), (target, clock) = split(connection.source), split(connection.target)
+            self._triggers.setdefault(target, []).append((clock, by_name[source].events, output))
         self._forget(0.0)
         system, slots = wiring.layout.system, wiring.layout.slots
         discrete = {slots[a] for a in slots if (v := system.variable(a)) is not None and is_discrete(v)}
@@ -61,7 +69,7 @@ class EventIteration:
         self._outputs = np.array([k for s in self.stages for k in range(s.outputs.start, s.outputs.stop)], np.int64)
         self._discrete = np.array([k for k in self._outputs if k in discrete], dtype=np.int64)
         sources = {feed.source for stage in self._taking for feed in stage.block.feeds if feed.source >= 0}
-        self._sources = np.array(sorted(sources), dtype=np.int64)
+        self.exchanged = np.array(sorted(sources), dtype=np.int64)
 
         self.rated = np.zeros(len(slots), dtype=bool)
         for stage in self._taking:
@@ -196,31 +204,44 @@ class EventIteration:
         values = self.wiring.values
         for _ in range(MOST_INSTANTS):
             self._exchange(time, gather, ticks)
-            shown, ticks = values[self._sources], {}
+            shown, ticks = values[self.exchanged], {}
             asking = [stage.name for stage in self._taking if stage.update()]
             self._instants += 1
             for stage in self._taking:
                 stage.receive()
             self.raise_end(time)
-            if not asking and np.array_equal(values[self._sources], shown, equal_nan=True):
+            if not asking and np.array_equal(values[self.exchanged], shown, equal_nan=True):
                 break
         else:
             raise _chatter_error(time, asking)
         for stage in self._taking:
             stage.events.leave_event_mode()
 
+    def _trigger(self, stage: EventStage, ticks: Ticks) -> int:
+        """Tick the clocks of a slave whose triggers are active, and that do not tick yet; return how many there are."""
+        known = ticks.get(stage.name, [])
+        triggers = self._triggers.get(stage.name, [])
+        due = [clock for clock, source, name in triggers if clock not in known and name in source.active_clocks()]
+        if due:
+            stage.events.tick(due)
+            ticks[stage.name] = [*known, *due]
+            self._ticks += len(due)
+        return len(due)
+
     def _exchange(self, time: float, gather: Gather, ticks: Ticks) -> None:
         """Pass outputs on to inputs until no output changes any more."""
         values = self.wiring.values
 
-        def sweep() -> None:
+        def sweep() -> bool:
+            triggered = 0
             for stage in self._taking:
+                triggered += self._trigger(stage, ticks)
                 stage.exchange(gather, ticks.get(stage.name, ()))
+            return triggered > 0
 
-        for _ in range(len(self._taking) + 1):
+        for _ in range(2 * len(self._taking) + 1):
             before = values[self._outputs]
-            sweep()
-            if np.array_equal(values[self._outputs], before, equal_nan=True):
+            if not sweep() and np.array_equal(values[self._outputs], before, equal_nan=True):
                 return
 
         def image(point: Array) -> Array:

@@ -123,6 +123,19 @@ class PeriodicClock:
     reference: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class TriggeredClock:
+    """An input clock that ticks in every instant in which an output clock that is connected to it is active.
+
+    Attributes:
+        variables: names of the variables that belong to the clock: they are set and read while it is active.
+        reference: the slave's own handle.
+    """
+
+    variables: tuple[str, ...] = ()
+    reference: int = 0
+
+
 @dataclass(frozen=True)
 class ModelInterface:
     """The interface that all slaves made from one model share.
@@ -139,6 +152,8 @@ class ModelInterface:
         output_derivatives: order up to which ``EventSlave.output_rates`` knows derivatives of outputs; 0: none.
         inputs_inside_steps: names of the continuous inputs that ``EventSlave.feed`` takes.
         clocks: periodic input clocks by name, which the master ticks.
+        triggered: input clocks by name that tick with output clocks of other slaves.
+        output_clocks: the slave's own handles of its output clocks, by name.
     """
 
     name: str
@@ -151,6 +166,18 @@ class ModelInterface:
     output_derivatives: int = 0
     inputs_inside_steps: frozenset[str] = frozenset()
     clocks: Mapping[str, "PeriodicClock"] = field(default_factory=dict)
+    triggered: Mapping[str, TriggeredClock] = field(default_factory=dict)
+    output_clocks: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def input_clocks(self) -> Mapping[str, "PeriodicClock | TriggeredClock"]:
+        """The clocks that the master ticks, by name."""
+        return {**self.clocks, **self.triggered}
+
+    @property
+    def clocked(self) -> frozenset[str]:
+        """Names of the variables of the input clocks."""
+        return frozenset(name for clock in self.input_clocks.values() for name in clock.variables)
 
     def names_of(self, causality: str) -> tuple[str, ...]:
         """Return the names of the variables with this causality, in the order of declaration.
@@ -410,6 +437,9 @@ class EventSlave(Slave, Protocol):
         Args:
             clocks: names of the clocks that tick now.
         """
+
+    def active_clocks(self) -> frozenset[str]:
+        """Return the names of the output clocks that are active in this instant, in event mode."""
 
     def update_discrete_states(self) -> EventUpdate:
         """End an instant in event mode.

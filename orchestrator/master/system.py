@@ -64,6 +64,19 @@ class Connection:
 
 
 @dataclass(frozen=True, slots=True)
+class ClockConnection:
+    """An input clock that ticks in the instants in which an output clock is active.
+
+    Attributes:
+        source: ``instance.clock`` of an output clock.
+        target: ``instance.clock`` of a triggered input clock.
+    """
+
+    source: str
+    target: str
+
+
+@dataclass(frozen=True, slots=True)
 class SignalSource:
     """A signal that the master feeds into an input, added to what is connected to it.
 
@@ -97,12 +110,14 @@ class System:
         connections: from outputs to inputs.
         sources: signals fed into inputs.
         order: instance names; empty to derive the order from direct feedthrough.
+        clock_connections: from output clocks to triggered input clocks.
     """
 
     instances: tuple[Instance, ...]
     connections: tuple[Connection, ...] = ()
     sources: tuple[SignalSource, ...] = ()
     order: tuple[str, ...] = ()
+    clock_connections: tuple[ClockConnection, ...] = ()
 
     def instance(self, name: str) -> Instance | None:
         """Return the instance called ``name``, if there is one."""
@@ -329,5 +344,8 @@ class System:
         if instance is None:
             known = ", ".join(i.name for i in self.instances) or "none"
             return f"must start with an instance's name ({known}), but is {address!r}"
-        close = nearest(variable, list(instance.model.variables))
+        model = instance.model
+        if variable in model.output_clocks or variable in model.input_clocks:
+            return f"must name a variable of {name}, but {variable!r} is a clock: `clock_connections` join clocks"
+        close = nearest(variable, list(model.variables))
         return f"must name a variable of {name} ({instance.model.name}), but {variable!r} is none{close}"

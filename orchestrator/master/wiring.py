@@ -100,7 +100,7 @@ def bind_receive(slave: Slave, block: Block, names: Sequence[str], values: Signa
 def _stage(block: Block, slave: Slave, values: Signals, view: View) -> Stage:
     inputs = values[block.first_input : block.first_input + len(block.inputs)]
     outputs = values[block.first_output : block.first_output + len(block.outputs)]
-    clocked = {name for clock in slave.model.clocks.values() for name in clock.variables}
+    clocked = slave.model.clocked
     if clocked:
         free = [name for name in block.inputs if name not in clocked]
         send = bind_send(slave, block, free, values)

@@ -25,7 +25,7 @@ from orchestrator.master.algorithms import ALGORITHMS, Algorithm, step_count
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import Value, Variable
 from orchestrator.master.result import Recording
-from orchestrator.master.system import Connection, Instance, Quantity, SignalSource, System
+from orchestrator.master.system import ClockConnection, Connection, Instance, Quantity, SignalSource, System
 from orchestrator.master.values import coerce_value, one_line
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.isolated import Safety, run_safely
@@ -75,6 +75,11 @@ class _Connection(_Strict, frozen=True, kw_only=True):
     factor: float = 1.0
     offset: float = 0.0
     quantum: float = 0.0
+
+
+class _ClockConnection(_Strict, frozen=True, kw_only=True):
+    source: str = msgspec.field(name="from")
+    target: str = msgspec.field(name="to")
 
 
 class _Terminals(_Strict, frozen=True, kw_only=True):
@@ -149,6 +154,7 @@ class _Top(_Strict, frozen=True, kw_only=True):
     start: float = 0.0
     name: str = "scenario"
     connections: list[Any] = []
+    clock_connections: list[Any] = []
     terminals: list[Any] = []
     sources: list[Any] = []
 
@@ -176,7 +182,7 @@ def load_scenario(path: Path) -> Scenario:
             problems.append(Problem("$.stop", str(error)))
     raise_problems(problems, str(path))
     assert algorithm is not None
-    system = System(instances, connections, sources, order)
+    system = System(instances, connections, sources, order, reader.clock_connections(top.clock_connections))
     raise_problems(system.problems() + system.record_problems(tuple(top.record)), str(path))
     return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))
 
@@ -314,6 +320,13 @@ class _Reader:
             c: _Connection | None = _convert(table, _Connection, f"$.connections[{k}]", self.problems)
             if c is not None:
                 found.append(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit))
+        return tuple(found)
+
+    def clock_connections(self, tables: list[Any]) -> tuple[ClockConnection, ...]:
+        found = []
+        for k, table in enumerate(tables):
+            c: _ClockConnection | None = _convert(table, _ClockConnection, f"$.clock_connections[{k}]", self.problems)
+            found += [] if c is None else [ClockConnection(c.source, c.target)]
         return tuple(found)
 
     def sources(
