@@ -20,6 +20,10 @@ CLOSE = 1e-14
 """Width to which the instant of an event is located, as a share of the time or of 1 s."""
 
 
+BEYOND = 5e-13
+"""How far beyond the crossing an event is, as a share of the time or of 1 s. A master that steps all its slaves to the
+event once more has roundings in what it feeds: the crossing must not come after it then."""
+
 BLIND = 1e-9
 """Time after an event in which an indicator that is zero there finds its side, as a share of the time or of 1 s."""
 
@@ -88,6 +92,7 @@ class Integrator:
                 after = middle
             else:
                 before = middle
+        after += BEYOND * max(1.0, abs(after))
         if after < self.time:
             self.time, self.states = after, path(after)
         return True

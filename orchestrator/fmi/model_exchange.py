@@ -102,11 +102,7 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         return self._reached
 
     def shorten_steps(self) -> bool:
-        """Refuse: the integrator chooses its steps itself.
-
-        Returns:
-            False.
-        """
+        """Refuse: the integrator chooses its steps itself."""
         return False
 
     def _due(self) -> float:

@@ -102,8 +102,7 @@ class Sweeper:
                         restore()
                         self._pass(track, only=stage)
                         return Swept(track, begin, True, rates)
-                    # Half a rounding beyond the event: once more swept, it must not come just after the window.
-                    track = self._shorten_track(found.track, min(reached + 0.5 * slack(reached), track.end))
+                    track = self._shorten_track(found.track, reached)
                     continue
                 change = self._difference(track.values[1:], found.track.values[1:])
                 track = found.track

@@ -8,7 +8,7 @@ import pytest
 from orchestrator.errors import FmuError
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.model_description import FmuDescription, parse_description, read_description
-from orchestrator.master.protocol import PeriodicClock
+from orchestrator.master.protocol import PeriodicClock, TriggeredClock
 from tests.support.ball3 import model_description
 
 FLAGS = 'hasEventMode="true" providesIntermediateUpdate="true" canGetAndSetFMUState="true"'
@@ -49,6 +49,7 @@ def test_the_ball_of_the_tests_is_read_with_all_that_it_has() -> None:
     }
     assert ball.events.inside == {"u"}
     assert ball.events.triggered == {101}
+    assert dict(ball.model.output_clocks) == {"hit": 101}
     assert "Binary blob" in ball.left_out
     assert "blob" not in variables
 
@@ -110,13 +111,21 @@ def test_clocks_whose_times_the_fmu_says_are_not_the_masters(kind: str) -> None:
     assert dict(found.events.timed) == {"c": (1, kind)}
 
 
+def test_clocks_that_others_trigger_are_not_the_masters() -> None:
+    found = parsed(
+        '<Clock name="c" valueReference="1" causality="input" intervalVariability="triggered"/>'
+        '<Float64 name="x" valueReference="2" causality="input" variability="discrete" start="0" clocks="1"/>'
+    )
+    assert dict(found.model.triggered) == {"c": TriggeredClock(("x",), 1)}
+    assert not found.model.clocks
+
+
 CLOCK = '<Clock name="c" valueReference="1" causality="input" intervalVariability="{}"/>'
 
 
 @pytest.mark.parametrize(
     ("variables", "flags", "expected"),
     [
-        (CLOCK.format("triggered"), FLAGS, "the input clock 'c' must have times of its own, but is to be triggered"),
         (CLOCK.format("constant"), FLAGS, "its clock 'c' has the intervalVariability 'constant', but no interval"),
         (CLOCK.format("countdown"), "", r"it has clocks \(c\), but no event mode"),
         (CLOCK.format('constant" intervalDecimal="0'), FLAGS, "its clock 'c' has an interval of 0 s"),

@@ -157,20 +157,6 @@ def test_where_derivatives_are_refused_the_integrator_gives_up_with_its_own_word
     slave.close()
 
 
-def test_clocks_are_refused_by_name(tmp_path: Path) -> None:
-    clock = (
-        '<Clock name="tick" valueReference="50" causality="input" intervalVariability="constant" intervalDecimal="1"/>'
-    )
-    path = build_exchange_fmu(tmp_path, 3)
-    folder = tmp_path / "clocked"
-    folder.mkdir()
-    with zipfile.ZipFile(path) as archive:
-        text = archive.read("modelDescription.xml").decode()
-    (folder / "modelDescription.xml").write_text(text.replace("</ModelVariables>", f"{clock}</ModelVariables>"))
-    with pytest.raises(FmuError, match=r"has clocks \(tick\), which are ticked in co-simulation only"):
-        make_slave("a", folder)
-
-
 # Under the master -----------------------------------------------------------------------------------------------------
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.building.native_build import ensure_native
 from orchestrator.errors import ScenarioError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi
@@ -13,6 +14,7 @@ from orchestrator.master.result import Recording
 from orchestrator.master.session import Session
 from orchestrator.master.system import ClockConnection, Connection, System
 from orchestrator.scenarios.scenario import load_scenario, simulate
+from orchestrator.scenarios.ssp.write import write_ssp
 from tests.support.c_fmu import have_compiler
 from tests.support.clocked_fmus import build_clocked_fmus
 
@@ -126,6 +128,21 @@ def test_a_scenario_joins_clocks(fmus: dict[str, Path], tmp_path: Path) -> None:
     path = fmus["Plant"].parent / "joined.toml"
     path.write_text(TEXT + JOINED)
     np.testing.assert_array_equal(simulate(load_scenario(path)).values[1:], exact(1.0)[0][1:])
+
+
+def test_ssp_says_nothing_of_clocks_that_are_joined_or_have_other_times(fmus: dict[str, Path], tmp_path: Path) -> None:
+    path = fmus["Plant"].parent / "ssp.toml"
+    path.write_text(TEXT + JOINED)
+    with pytest.raises(ScenarioError, match="clock_connections: must be left out to be written as SSP"):
+        write_ssp(tmp_path / "a.ssp", load_scenario(path), "2.0")
+    ensure_native(["LqrController"], tmp_path, here=True, fmi=3)
+    path = tmp_path / "times.toml"
+    text = 'stop = 0.1\nrecord = ["a.u"]\n[master]\nstep = 0.01\n[instances.a]\nfmu = "LqrController.fmu"\n'
+    path.write_text(text + "[instances.a.clocks.sample]\ninterval = 0.005\n")
+    with pytest.raises(ScenarioError, match=r"instances.a.clocks.sample: must be left out to be written as SSP"):
+        write_ssp(tmp_path / "a.ssp", load_scenario(path), "2.0")
+    path.write_text(text)
+    write_ssp(tmp_path / "a.ssp", load_scenario(path), "2.0")
 
 
 @pytest.mark.parametrize(

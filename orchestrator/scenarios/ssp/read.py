@@ -229,7 +229,7 @@ def _connection(element: etree._Element, path: str, place: str, structure: Struc
 def _no_end(type_: str | None, kind: str | None) -> str:
     """Return why a connector cannot be joined; empty where it can."""
     if type_ == "Clock":
-        return "a Clock: the master ticks clocks by their own intervals"
+        return "a Clock: join clocks by `clock_connections` of a scenario"
     if type_ == "Binary":
         return "Binary, which no connection here carries"
     return "of the kind unspecified" if kind == "unspecified" else ""

@@ -8,6 +8,7 @@ from lxml import etree
 from orchestrator.building.archive import write_archive
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.fmi.instances import FmuFactory
+from orchestrator.fmi.model_description import read_description
 from orchestrator.master.protocol import Unit, Value
 from orchestrator.master.signals import Constant
 from orchestrator.master.system import Connection, Instance, System, split
@@ -34,6 +35,7 @@ def write_ssp(path: Path, scenario: Scenario, version: str = "1.0") -> None:
         version: of SSP, "1.0" or "2.0".
     """
     scenario.system.check()
+    _check_clocks(scenario.system)
     members = {STRUCTURE: _structure(scenario, version)}
     for instance in scenario.system.instances:
         if not isinstance(instance.create, FmuFactory):
@@ -46,6 +48,20 @@ def write_ssp(path: Path, scenario: Scenario, version: str = "1.0") -> None:
         write_archive(path, members)
     except Exception as error:
         raise OutputError(f"cannot write {path}: {error}") from None
+
+
+def _check_clocks(system: System) -> None:
+    """Refuse what SSP cannot say of clocks: which one triggers which, and times that are not the FMU's own."""
+    if system.clock_connections:
+        raise ScenarioError("$.clock_connections: must be left out to be written as SSP, but there are some")
+    for instance in system.instances:
+        if not isinstance(instance.create, FmuFactory) or not instance.model.clocks:
+            continue
+        stated = read_description(instance.create.path).model.clocks
+        for name, clock in instance.model.clocks.items():
+            if (clock.interval, clock.shift) != (stated[name].interval, stated[name].shift):
+                text = "must be left out to be written as SSP, but is given, and the FMU has other times"
+                raise ScenarioError(f"$.instances.{instance.name}.clocks.{name}: {text}")
 
 
 def _source(instance: Instance) -> str:
