@@ -174,6 +174,7 @@ def load_scenario(path: Path) -> Scenario:
         *reader.connections(top.connections),
         *terminal_connections(_joints(top, problems), instances, problems),
     )
+    clock_connections = reader.clock_connections(top.clock_connections)
     sources = reader.sources(top.sources, instances, algorithm.step if algorithm else math.nan, top.start)
     if algorithm is not None:
         try:
@@ -182,7 +183,7 @@ def load_scenario(path: Path) -> Scenario:
             problems.append(Problem("$.stop", str(error)))
     raise_problems(problems, str(path))
     assert algorithm is not None
-    system = System(instances, connections, sources, order, reader.clock_connections(top.clock_connections))
+    system = System(instances, connections, sources, order, clock_connections)
     raise_problems(system.problems() + system.record_problems(tuple(top.record)), str(path))
     return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))
 

@@ -198,7 +198,7 @@ def test_an_element_is_joined_by_its_indices(sized: Path, tmp_path: Path) -> Non
         (('value="4 5 6"', 'value="4 5"'), "must have 3 values, but has 2"),
         (('sizeConnector="size"', 'size="2"'), "must have the sizes of the FMU's variable, 3, but has 2"),
         (('startConnector="in"', 'startConnector="in" startIndices="9"'), "must be joined to an array of its size"),
-        (('startConnector="y"', 'startConnector="tick"'), r"a.tick is a Clock: the master ticks clocks by their own"),
+        (('startConnector="y"', 'startConnector="tick"'), r"a.tick is a Clock: join clocks by `clock_connections`"),
         (('kind="output"><ssc:Float64/><ssc:Dimension/></ssd:Connector>\n <ssd:Connector name="n"',
           'kind="unspecified"><ssc:Float64/></ssd:Connector>\n <ssd:Connector name="n"'), "of the kind unspecified"),
         (('<ssc:Float64/><ssc:Dimension sizeConnector="size"/>', "<ssc:Binary/>"), "is Binary, which no conn"),
