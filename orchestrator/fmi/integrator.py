@@ -59,7 +59,7 @@ class Integrator:
         Args:
             time: [s].
             states: at this time, shape (n,).
-            relative: tolerance.
+            relative: tolerance, of each state.
             nominals: of the states, by which the tolerance is multiplied where they are small; shape (n,).
         """
         self.time, self.states = time, states

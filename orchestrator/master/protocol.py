@@ -439,7 +439,11 @@ class EventSlave(Slave, Protocol):
         """
 
     def active_clocks(self) -> frozenset[str]:
-        """Return the names of the output clocks that are active in this instant, in event mode."""
+        """Return the output clocks that are active in this instant, in event mode.
+
+        Returns:
+            Names of clocks, some of ``ModelInterface.output_clocks``.
+        """
 
     def update_discrete_states(self) -> EventUpdate:
         """End an instant in event mode.

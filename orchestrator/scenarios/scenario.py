@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
@@ -28,6 +28,23 @@ from orchestrator.master.result import Recording
 from orchestrator.master.system import ClockConnection, Connection, Instance, Quantity, SignalSource, System
 from orchestrator.master.values import coerce_value, one_line
 from orchestrator.scenarios.definition import Scenario
+from orchestrator.scenarios.file_format import (
+    AnySource,
+    ClockConnectionTable,
+    ClockTable,
+    ConnectionTable,
+    ConstantTable,
+    FileTable,
+    InstanceTable,
+    MasterTable,
+    NoiseTable,
+    QuantityTable,
+    ScenarioTable,
+    SineTable,
+    SquareTable,
+    StepTable,
+    TerminalsTable,
+)
 from orchestrator.scenarios.isolated import Safety, run_safely
 from orchestrator.scenarios.joining import terminal_connections
 from orchestrator.scenarios.tables import read_table
@@ -43,127 +60,11 @@ def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
         raise FmuError(f"{scenario.origin}: {error}" if scenario.origin else str(error)) from None
 
 
-# What a file may hold ---------------------------------------------------------------------------------------------
-
-
-class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
-    """Base: unknown keys are refused."""
-
-
-class _Quantity(_Strict, frozen=True, kw_only=True):
-    value: float
-    unit: str
-
-
-class _Clock(_Strict, frozen=True, kw_only=True):
-    interval: float | str | None = None
-    shift: float | str | None = None
-
-
-class _Instance(_Strict, frozen=True, kw_only=True):
-    fmu: str
-    parameters: dict[str, Any] = {}
-    clocks: dict[str, _Clock] = {}
-    interface: Literal["co_simulation", "model_exchange"] = "co_simulation"
-    solver_tolerance: float | None = None
-
-
-class _Connection(_Strict, frozen=True, kw_only=True):
-    source: str = msgspec.field(name="from")
-    target: str = msgspec.field(name="to")
-    unit: str | None = None
-    factor: float = 1.0
-    offset: float = 0.0
-    quantum: float = 0.0
-
-
-class _ClockConnection(_Strict, frozen=True, kw_only=True):
-    source: str = msgspec.field(name="from")
-    target: str = msgspec.field(name="to")
-
-
-class _Terminals(_Strict, frozen=True, kw_only=True):
-    join: tuple[str, str]
-
-
-class _Source(_Strict, tag_field="kind", frozen=True, kw_only=True):
-    target: str = msgspec.field(name="to")
-    unit: str | None = None
-    at: str | None = None
-
-
-class _Constant(_Source, tag="constant", frozen=True, kw_only=True):
-    value: float | bool | str
-
-
-class _Step(_Source, tag="step", frozen=True, kw_only=True):
-    after: float | bool
-    time: float = 0.0
-    before: float | bool = 0.0
-
-
-class _Sine(_Source, tag="sine", frozen=True, kw_only=True):
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
-    offset: float = 0.0
-
-
-class _Square(_Source, tag="square", frozen=True, kw_only=True):
-    amplitude: float
-    period: float
-    offset: float = 0.0
-    delay: float = 0.0
-
-
-class _Noise(_Source, tag="noise", frozen=True, kw_only=True):
-    deviation: float
-    seed: int
-    period: float | None = None
-
-
-class _Table(_Source, tag="table", frozen=True, kw_only=True):
-    file: str
-    column: str
-    time: str = "time"
-    hold: bool | None = None
-    header: int | None = None
-
-
-_AnySource = _Constant | _Step | _Sine | _Square | _Noise | _Table
-
-
-class _Master(_Strict, frozen=True, kw_only=True):
-    step: float
-    algorithm: str = "gauss_seidel"
-    order: list[str] = []
-    events: bool = True
-    compiled: bool | None = None
-    tolerance: float | None = None
-    iterations: int | None = None
-    first: float | None = None
-    smallest: float | None = None
-    largest: float | None = None
-
-
-class _Top(_Strict, frozen=True, kw_only=True):
-    stop: float
-    master: Any
-    instances: dict[str, Any]
-    record: list[str]
-    start: float = 0.0
-    name: str = "scenario"
-    connections: list[Any] = []
-    clock_connections: list[Any] = []
-    terminals: list[Any] = []
-    sources: list[Any] = []
-
-
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be."""
     content = _content(path)
     problems: list[Problem] = []
-    top = _convert(content, _Top, "$", problems)
+    top = _convert(content, ScenarioTable, "$", problems)
     if top is None:
         raise_problems(problems, str(path))
         raise AssertionError("a failed conversion leaves a problem")
@@ -188,11 +89,11 @@ def load_scenario(path: Path) -> Scenario:
     return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))
 
 
-def _joints(top: _Top, problems: list[Problem]) -> list[tuple[str, str, str]]:
+def _joints(top: ScenarioTable, problems: list[Problem]) -> list[tuple[str, str, str]]:
     """Return where each pair of terminals is asked for, and the two."""
     found = []
     for k, table in enumerate(top.terminals):
-        pair: _Terminals | None = _convert(table, _Terminals, f"$.terminals[{k}]", problems)
+        pair: TerminalsTable | None = _convert(table, TerminalsTable, f"$.terminals[{k}]", problems)
         if pair is not None:
             found.append((f"$.terminals[{k}].join", *pair.join))
     return found
@@ -228,8 +129,8 @@ class _Reader:
         self.path, self.problems = path, problems
         self._events = True  # event mode is used where an FMU has it
 
-    def master(self, top: _Top) -> tuple[Algorithm | None, tuple[str, ...]]:
-        master: _Master | None = _convert(top.master, _Master, "$.master", self.problems)
+    def master(self, top: ScenarioTable) -> tuple[Algorithm | None, tuple[str, ...]]:
+        master: MasterTable | None = _convert(top.master, MasterTable, "$.master", self.problems)
         if master is None:
             return None, ()
         self._events = master.events
@@ -256,7 +157,7 @@ class _Reader:
         found = []
         for name, table in tables.items():
             path = f"$.instances.{name}"
-            instance: _Instance | None = _convert(table, _Instance, path, self.problems)
+            instance: InstanceTable | None = _convert(table, InstanceTable, path, self.problems)
             if instance is None:
                 continue
             start = {}
@@ -276,7 +177,7 @@ class _Reader:
                 raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
         return tuple(found)
 
-    def _clock(self, clock: _Clock, path: str) -> ClockTimes:
+    def _clock(self, clock: ClockTable, path: str) -> ClockTimes:
         return ClockTimes(
             self._seconds(clock.interval, f"{path}.interval", 1), self._seconds(clock.shift, f"{path}.shift", 0)
         )
@@ -297,7 +198,7 @@ class _Reader:
 
     def _parameter(self, value: Any, path: str) -> Value | Quantity | None:
         if isinstance(value, dict):
-            quantity: _Quantity | None = _convert(value, _Quantity, path, self.problems)
+            quantity: QuantityTable | None = _convert(value, QuantityTable, path, self.problems)
             return None if quantity is None else Quantity(quantity.value, quantity.unit)
         if isinstance(value, (bool, int, float, str)):
             return value
@@ -318,7 +219,7 @@ class _Reader:
     def connections(self, tables: list[Any]) -> tuple[Connection, ...]:
         found = []
         for k, table in enumerate(tables):
-            c: _Connection | None = _convert(table, _Connection, f"$.connections[{k}]", self.problems)
+            c: ConnectionTable | None = _convert(table, ConnectionTable, f"$.connections[{k}]", self.problems)
             if c is not None:
                 found.append(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit))
         return tuple(found)
@@ -326,7 +227,9 @@ class _Reader:
     def clock_connections(self, tables: list[Any]) -> tuple[ClockConnection, ...]:
         found = []
         for k, table in enumerate(tables):
-            c: _ClockConnection | None = _convert(table, _ClockConnection, f"$.clock_connections[{k}]", self.problems)
+            c: ClockConnectionTable | None = _convert(
+                table, ClockConnectionTable, f"$.clock_connections[{k}]", self.problems
+            )
             found += [] if c is None else [ClockConnection(c.source, c.target)]
         return tuple(found)
 
@@ -337,7 +240,7 @@ class _Reader:
         system = System(instances)
         for k, table in enumerate(tables):
             path = f"$.sources[{k}]"
-            source = _convert(table, _AnySource, path, self.problems)
+            source = _convert(table, AnySource, path, self.problems)
             if source is None:
                 continue
             variable = system.variable(source.target)
@@ -349,7 +252,7 @@ class _Reader:
             self._check_bound(source, "period", path, lambda x: 0.0 < x < math.inf, "finite and positive")
             if len(self.problems) == before:
                 unit: str | None = source.unit
-                if isinstance(source, _Table):
+                if isinstance(source, FileTable):
                     signal, unit = self._table(source, path, variable)
                 else:
                     signal = self._signal(source, step, start, path, variable)
@@ -363,18 +266,18 @@ class _Reader:
             self.problems.append(Problem(f"{path}.{name}", f"must be {expected}, but is {value!r}"))
 
     def _signal(
-        self, source: _AnySource, step: float, start: float, path: str, variable: Variable | None
+        self, source: AnySource, step: float, start: float, path: str, variable: Variable | None
     ) -> signals.Signal | None:
         match source:
-            case _Constant():
+            case ConstantTable():
                 return self._constant(source.value, path, variable)
-            case _Step():
+            case StepTable():
                 return signals.Step(source.time, float(source.after), float(source.before))
-            case _Sine():
+            case SineTable():
                 return signals.Sine(source.amplitude, source.frequency, source.phase, source.offset)
-            case _Square():
+            case SquareTable():
                 return signals.Square(source.amplitude, source.period, source.offset, source.delay)
-            case _Noise():
+            case NoiseTable():
                 period = step if source.period is None else source.period
                 return signals.Noise(source.deviation, source.seed, period, start)
         return None
@@ -395,7 +298,9 @@ class _Reader:
         assert isinstance(number, int)
         return signals.Constant(float(number))
 
-    def _table(self, source: _Table, path: str, variable: Variable | None) -> tuple[signals.Signal | None, str | None]:
+    def _table(
+        self, source: FileTable, path: str, variable: Variable | None
+    ) -> tuple[signals.Signal | None, str | None]:
         """Return a table, and its unit: the source's, else the file's.
 
         Into an input that is not Real it is held where the file does not say.
