@@ -1,5 +1,8 @@
 """The pages that people read: short sentences, short pages, links that lead somewhere."""
 
+import contextlib
+import functools
+import importlib
 import re
 from pathlib import Path
 
@@ -79,6 +82,31 @@ def test_links_lead_somewhere():
         for target in re.findall(r"\]\(([^)#]+)", text_of(page)):
             if "://" not in target:
                 assert (ROOT / page).parent.joinpath(target).exists(), f"{page}: {target}"
+
+
+def missing_names(text):
+    """Names such as ``oc.simulate`` and ``orchestrator.engine`` in code spans that lead to nothing."""
+    found = re.findall(r"`((?:oc|orchestrator)(?:\.\w+)+)", text)
+    return [name for name in found if not _leads_somewhere("orchestrator" + name[name.index(".") :])]
+
+
+def _leads_somewhere(name):
+    for parts in range(name.count(".") + 1, 0, -1):
+        first, *more = name.rsplit(".", name.count(".") + 1 - parts)
+        with contextlib.suppress(ImportError):
+            thing = importlib.import_module(first)
+            return functools.reduce(lambda x, part: getattr(x, part, None), more, thing) is not None
+    return False
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page != CHANGES])
+def test_names_in_code_lead_somewhere(page):
+    assert not missing_names(text_of(page))
+
+
+def test_names_that_lead_nowhere_are_found():
+    text = "`oc.simulate(FILE)`, `oc.simulated`, `orchestrator.engine`, `orchestrator.scenarios.scenario.run_scenario`"
+    assert missing_names(text) == ["oc.simulated", "orchestrator.scenarios.scenario.run_scenario"]
 
 
 def test_the_glossary_has_each_term_once_and_stays_short():
