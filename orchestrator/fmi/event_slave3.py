@@ -126,8 +126,8 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
 
     def do_step(self, time: float, step: float) -> None:
         """Advance from ``time`` to ``time + step`` [s]; events on the way are taken, by this slave alone."""
-        if self.model.clocks:
-            names = ", ".join(self.model.clocks)
+        if self.model.input_clocks:
+            names = ", ".join(self.model.input_clocks)
             raise SlaveError(f"{self.name}: its clocks ({names}) must be ticked, but this run knows no events")
         super().do_step(time, step)
 
