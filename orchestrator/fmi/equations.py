@@ -39,6 +39,7 @@ class Equations:
         self._values: Callable[[float], Sequence[float]] | None = None
         self._batches: list[VariableBatch] = []
         self._buffer = np.empty(0)
+        self._finite = True
         self.resize(0, 0)
 
     def _bind(self, function: str, *kinds: Any) -> Any:
@@ -83,7 +84,12 @@ class Equations:
         if status == DISCARD:
             return np.full(self.states, np.nan)  # the integrator tries a shorter step
         self._judge_status(status, self._get_rates)
+        self._finite = bool(np.isfinite(self._vector).all())
         return self._vector.copy()
+
+    def cause(self) -> str:
+        """Return what keeps an integrator from going on, for a message; empty where nothing is known."""
+        return "" if self._finite else " (the FMU's derivatives are not finite there)"
 
     def read_signs(self) -> NDArray[np.float64]:
         """Return the signs of the event indicators where the FMU is: -1, 0 or 1, shape (m,)."""

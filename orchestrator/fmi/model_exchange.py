@@ -28,6 +28,9 @@ from orchestrator.master.protocol import EventSlave, EventUpdate, NativeCalls, S
 TOLERANCE = 1e-8
 """Relative tolerance of the integrator, where none is asked for; of small states, of their nominal values."""
 
+MOST_STATES = 1_000_000
+"""Continuous states, or event indicators, beyond which an FMU is taken to be broken."""
+
 _STEP = ctypes.CFUNCTYPE(ctypes.c_int, c_void_p, c_double, c_double, ctypes.c_int)
 
 
@@ -84,7 +87,11 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         super().start()
         self._forget()
         self._rescaled = True
-        self._equations.resize(*self._counts())
+        counts = self._counts()
+        if max(counts) > MOST_STATES:
+            text = f"must have at most {MOST_STATES:,} continuous states and event indicators, but says that it has"
+            raise SlaveError(f"{self.name}: {text} {counts[0]:,} and {counts[1]:,}")
+        self._equations.resize(*counts)
         self._integrator = Integrator(self._equations)
 
     @abstractmethod
@@ -118,7 +125,9 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
                 event = integrator.step(end)
             except IntegrationError as error:
                 self._worst = max(self._worst, ERROR)
-                raise SlaveError(f"{self.name}: t = {integrator.time:.9g} s must be passed, but {error}") from None
+                raise SlaveError(
+                    f"{self.name}: t = {integrator.time:.9g} s must be passed, but {error}{self._equations.cause()}"
+                ) from None
             if event and integrator.time == time:
                 return StepOutcome(time, True)
             self._place(integrator.time if end - integrator.time > near else end)

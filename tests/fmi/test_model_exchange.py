@@ -205,6 +205,18 @@ def test_the_end_of_the_run_may_be_asked_for_after_a_step_of_the_integrator(tmp_
     assert f"fmi{version}CompletedIntegratorStep, terminateSimulation" in str(result.run.remarks[0])
 
 
+@pytest.mark.parametrize("counts", [("STATES=1ull<<60", "INDICATORS=1"), ("STATES=2", "INDICATORS=1ull<<61")])
+def test_numbers_of_states_beyond_reason_are_refused(tmp_path: Path, counts: tuple[str, str]) -> None:
+    with pytest.raises(SlaveError, match="a: must have at most 1,000,000 continuous states and event indicators, but"):
+        simulate(scenario(tmp_path, 3, *counts))
+
+
+@VERSIONS
+def test_derivatives_that_are_not_finite_end_the_run(tmp_path: Path, version: int) -> None:
+    with pytest.raises(SlaveError, match=r"a: t = 0\.2 s must be passed.*\(the FMU's derivatives are not finite there"):
+        simulate(scenario(tmp_path, version, "NOT_FINITE_FROM=0.2"))
+
+
 @VERSIONS
 def test_an_ssp_file_holds_it(tmp_path: Path, version: int) -> None:
     path = scenario(tmp_path, version)

@@ -130,6 +130,16 @@ def test_a_scenario_joins_clocks(fmus: dict[str, Path], tmp_path: Path) -> None:
     np.testing.assert_array_equal(simulate(load_scenario(path)).values[1:], exact(1.0)[0][1:])
 
 
+def test_clocks_trigger_across_processes(tmp_path: Path) -> None:
+    """Each FMU in a process of its own, where inputs are held over steps."""
+    build_clocked_fmus(tmp_path, more='canBeInstantiatedOnlyOncePerProcess="true"')
+    path = tmp_path / "joined.toml"
+    text = TEXT.replace('algorithm = "adaptive"\ntolerance = 1e-9\n', "").replace("step = 0.1", "step = 1e-3")
+    path.write_text(text + JOINED)
+    found = simulate(load_scenario(path)).values
+    np.testing.assert_array_equal(found[1:, ::100], exact(1.0)[0][1:])
+
+
 def test_ssp_says_nothing_of_clocks_that_are_joined_or_have_other_times(fmus: dict[str, Path], tmp_path: Path) -> None:
     path = fmus["Plant"].parent / "ssp.toml"
     path.write_text(TEXT + JOINED)

@@ -30,9 +30,9 @@ STRUCTURE = {
 }
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="NAME" instantiationToken="{clocked}">
-  <ModelExchange modelIdentifier="NAME" canGetAndSetFMUState="true"/>
+  <ModelExchange modelIdentifier="NAME" canGetAndSetFMUState="true" MORE/>
   <CoSimulation modelIdentifier="NAME" canGetAndSetFMUState="true" canHandleVariableCommunicationStepSize="true"
-    hasEventMode="true" providesIntermediateUpdate="true"/>
+    hasEventMode="true" providesIntermediateUpdate="true" MORE/>
   <ModelVariables>VARIABLES
     <Float64 name="time" valueReference="9" causality="independent"/>
   </ModelVariables>
@@ -41,8 +41,14 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def build_clocked_fmus(folder: Path, *macros: str) -> dict[str, Path]:
-    """Compile the FMUs into ``folder`` and return their paths by name; ``macros`` are those of the supervisor."""
+def build_clocked_fmus(folder: Path, *macros: str, more: str = "") -> dict[str, Path]:
+    """Compile the FMUs into ``folder`` and return their paths by name.
+
+    Args:
+        folder: where to.
+        macros: of the supervisor in ``clocked_fmus.c``.
+        more: attributes of the interfaces.
+    """
     found = {}
     for name in NAMES:
         library = folder / f"{name}{fmpy.sharedLibraryExtension}"
@@ -54,6 +60,6 @@ def build_clocked_fmus(folder: Path, *macros: str) -> dict[str, Path]:
         text = DESCRIPTION.replace("STRUCTURE", STRUCTURE[name]).replace("VARIABLES", VARIABLES[name])
         found[name] = folder / f"{name}.fmu"
         with zipfile.ZipFile(found[name], "w") as archive:
-            archive.writestr("modelDescription.xml", text.replace("NAME", name))
+            archive.writestr("modelDescription.xml", text.replace("NAME", name).replace("MORE", more))
             archive.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
     return found

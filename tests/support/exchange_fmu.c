@@ -166,6 +166,9 @@ EXPORT Status fmi3GetContinuousStateDerivatives(Instance c, double x[], size_t n
 #endif
     x[0] = s->x[1];
     x[1] = s->u - 9.81;
+#ifdef NOT_FINITE_FROM
+    if (s->time > NOT_FINITE_FROM) x[1] = NAN;
+#endif
     return OK;
 }
 
@@ -177,8 +180,12 @@ EXPORT Status F(GetEventIndicators)(Instance c, double z[], size_t n)
 }
 
 #if FMI == 3
-EXPORT Status fmi3GetNumberOfContinuousStates(Instance c, size_t *n) { *n = 2; return OK; }
-EXPORT Status fmi3GetNumberOfEventIndicators(Instance c, size_t *n) { *n = 1; return OK; }
+#ifndef STATES
+#define STATES 2
+#define INDICATORS 1
+#endif
+EXPORT Status fmi3GetNumberOfContinuousStates(Instance c, size_t *n) { *n = STATES; return OK; }
+EXPORT Status fmi3GetNumberOfEventIndicators(Instance c, size_t *n) { *n = INDICATORS; return OK; }
 #endif
 
 EXPORT Status F(CompletedIntegratorStep)(Instance c, Bool keeps, Bool *enters, Bool *ends)
