@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.api.scenario_sweep import sweep_scenario
 from orchestrator.api.simulate import simulate
 from orchestrator.errors import FmuError
 from orchestrator.fmi.instances import fmu_instance
@@ -36,6 +37,17 @@ def test_arrays_have_the_size_that_is_given_in_every_run_of_a_session(sized: Pat
         again = session.run()
     assert first.values[:, -1] == pytest.approx([10.0, 90.0, 3.0])
     assert first.values.tobytes() == again.values.tobytes()
+
+
+def test_a_sweep_keeps_the_size(sized: Path) -> None:
+    path = sized.parent / "sweep.toml"
+    path.write_text(
+        'stop = 1.0\nrecord = ["a.y[3]"]\n[master]\nstep = 0.1\n[instances.a]\nfmu = "Sized.fmu"\n'
+        '[instances.a.parameters]\nsize = 3\n"p[1]" = 1.0\n"p[2]" = 1.0\n"p[3]" = 1.0\n'
+        '[[sources]]\nto = "a.u[3]"\nkind = "constant"\nvalue = 2.0\n'
+    )
+    result = sweep_scenario(path, {"a.p[3]": "range:2:4:2"}, workers=1)
+    assert [row.outcome.values[0] for row in result.rows()] == pytest.approx([4.0, 8.0])
 
 
 @pytest.mark.parametrize("trust", [True, False])
