@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from orchestrator.errors import SlaveError
 from orchestrator.fmi.events_alone import EventsAlone
-from orchestrator.fmi.instance_clocks import InstanceClocks, next_event
+from orchestrator.fmi.instance_clocks import ClockedSlave, InstanceClocks, next_event
 from orchestrator.fmi.intermediate import IntermediateUpdates
 from orchestrator.fmi.messages import ERROR
 from orchestrator.fmi.model_description import FmuDescription
@@ -18,10 +18,8 @@ from orchestrator.fmi.slave3 import NEAR, TERMINATES, Fmu3Slave
 from orchestrator.master.protocol import (
     EventSlave,
     EventUpdate,
-    Signals,
     StepDiscardedError,
     StepOutcome,
-    Transfer,
 )
 from orchestrator.master.result import RunRemark
 
@@ -35,7 +33,7 @@ class _State(NamedTuple):
     reached: float | None
 
 
-class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
+class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
     """See ``FmuSlave`` and ``EventSlave``. Early return is always allowed: without it an FMU passes over its events."""
 
     def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
@@ -142,14 +140,6 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
         self._in_event_mode = True
         self._clocks.enter_event_mode(self._reached or 0.0)
 
-    def tick(self, clocks: Sequence[str]) -> None:
-        """Activate input clocks for this instant, in event mode."""
-        self._clocks.tick(clocks)
-
-    def active_clocks(self) -> frozenset[str]:
-        """Return the output clocks that are active in this instant."""
-        return self._clocks.active_outputs()
-
     def update_discrete_states(self) -> EventUpdate:
         """End an instant in event mode."""
         flags, next_time = (c_bool * 5)(), c_double()  # again, end, nominals, values, next event
@@ -166,14 +156,6 @@ class EventFmuSlave(EventsAlone, Fmu3Slave, EventSlave):
         self._in_event_mode = False
 
     # Values ------------------------------------------------------------------------------------------------------
-
-    def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        """Return a call that sets ``names`` from ``buffer``; those of clocks only while one of these is active."""
-        return self._clocks.transfers.sends(names, buffer, super().sends)
-
-    def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        """Return a call that reads ``names`` into ``buffer``; those of clocks keep their values between ticks."""
-        return self._clocks.transfers.receives(names, buffer, super().receives)
 
     def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
         """Say what continuous inputs are inside steps, from now on."""

@@ -2,17 +2,16 @@
 
 import ctypes
 import math
-from collections.abc import Sequence
 from ctypes import c_bool, c_double, c_size_t, c_void_p
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.fmi.instance_clocks import InstanceClocks, next_event
+from orchestrator.fmi.instance_clocks import ClockedSlave, InstanceClocks, next_event
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.model_exchange import ExchangeSlave, Instant
 from orchestrator.fmi.slave3 import Fmu3Instance
-from orchestrator.master.protocol import EventUpdate, Signals, Transfer
+from orchestrator.master.protocol import EventUpdate
 
 _NECESSARY = [
     "InstantiateModelExchange",
@@ -25,7 +24,7 @@ _NECESSARY += ["GetNumberOfContinuousStates", "GetNumberOfEventIndicators", "Get
 _NECESSARY += ["SetContinuousStates", "GetContinuousStates", "GetNominalsOfContinuousStates"]
 
 
-class Exchange3Slave(ExchangeSlave, Fmu3Instance):
+class Exchange3Slave(ClockedSlave, ExchangeSlave, Fmu3Instance):
     """See ``ExchangeSlave``."""
 
     RATES = "GetContinuousStateDerivatives"
@@ -64,14 +63,6 @@ class Exchange3Slave(ExchangeSlave, Fmu3Instance):
         super().enter_event_mode()
         self._clocks.enter_event_mode(self._reached or 0.0)
 
-    def tick(self, clocks: Sequence[str]) -> None:
-        """Activate input clocks for this instant, in event mode."""
-        self._clocks.tick(clocks)
-
-    def active_clocks(self) -> frozenset[str]:
-        """Return the output clocks that are active in this instant."""
-        return self._clocks.active_outputs()
-
     def update_discrete_states(self) -> EventUpdate:
         """End an instant in event mode."""
         update = super().update_discrete_states()
@@ -82,14 +73,6 @@ class Exchange3Slave(ExchangeSlave, Fmu3Instance):
         """Go on in time."""
         self._clocks.leave_event_mode()
         super().leave_event_mode()
-
-    def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        """Return a call that sets ``names`` from ``buffer``; those of clocks only while one of these is active."""
-        return self._clocks.transfers.sends(names, buffer, super().sends)
-
-    def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        """Return a call that reads ``names`` into ``buffer``; those of clocks keep their values between ticks."""
-        return self._clocks.transfers.receives(names, buffer, super().receives)
 
     def get_state(self) -> Any:
         return super().get_state(), self._clocks.state()

@@ -7,7 +7,9 @@ from ctypes import c_bool, c_double, c_size_t
 
 from orchestrator.fmi.clocked import ClockedTransfers
 from orchestrator.fmi.model_description import FmuDescription
+from orchestrator.fmi.slave import FmuSlave
 from orchestrator.fmi.timed_clocks import Call, TimedClocks
+from orchestrator.master.protocol import Signals, Transfer
 
 
 class InstanceClocks:
@@ -112,6 +114,28 @@ class InstanceClocks:
         active = (c_bool * count)()
         self._call("GetClock", (ctypes.c_uint * count)(*outputs), c_size_t(count), active)
         return [clock for clock, ticks in zip(outputs, active, strict=True) if ticks]
+
+
+class ClockedSlave(FmuSlave):
+    """An instance whose clocks are ticked, and whose variables of clocks are set and read at ticks."""
+
+    _clocks: InstanceClocks
+
+    def tick(self, clocks: Sequence[str]) -> None:
+        """Activate input clocks for this instant, in event mode."""
+        self._clocks.tick(clocks)
+
+    def active_clocks(self) -> frozenset[str]:
+        """Return the output clocks that are active in this instant."""
+        return self._clocks.active_outputs()
+
+    def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that sets ``names`` from ``buffer``; those of clocks only while one of these is active."""
+        return self._clocks.transfers.sends(names, buffer, super().sends)
+
+    def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that reads ``names`` into ``buffer``; those of clocks keep their values between ticks."""
+        return self._clocks.transfers.receives(names, buffer, super().receives)
 
 
 def next_event(time: float, clocks: InstanceClocks) -> float | None:
