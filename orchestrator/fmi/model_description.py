@@ -146,7 +146,10 @@ def parse_description(
     found = [root.find("ModelExchange")] if exchange else [root.find("CoSimulation"), root.find("ModelExchange")]
     interface = next((element for element in found if element is not None), None)
     if interface is None and exchange:
-        raise FmuError(f"{origin}: must be an FMU for model exchange, as is asked for, but is for co-simulation alone")
+        others = (
+            ", ".join(tag for tag in ("CoSimulation", "ScheduledExecution") if root.find(tag) is not None) or "none"
+        )
+        raise FmuError(f"{origin}: must be an FMU for model exchange, as is asked for, but is for {others}")
     if interface is None:
         alone = ": it is for scheduled execution alone" if root.find("ScheduledExecution") is not None else ""
         raise FmuError(f"{origin}: must be an FMU for co-simulation or model exchange, but is for neither{alone}")

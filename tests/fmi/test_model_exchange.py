@@ -291,7 +291,7 @@ def test_an_fmu_for_both_is_model_exchange_where_that_is_asked_for(tmp_path: Pat
     with zipfile.ZipFile(tmp_path / "both.ssp") as archive:
         assert archive.read("SystemStructure.ssd").count(b'implementation="ModelExchange"') == 1
     path.write_text(text.replace("Drivetrain.fmu", "KalmanEstimator.fmu"))
-    with pytest.raises(FmuError, match="must be an FMU for model exchange, as is asked for, but is for co-simulation"):
+    with pytest.raises(FmuError, match="must be an FMU for model exchange, as is asked for, but is for CoSimulation"):
         simulate(path)
 
 
