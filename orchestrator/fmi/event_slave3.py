@@ -3,7 +3,7 @@
 import ctypes
 import math
 from collections.abc import Callable, Sequence
-from ctypes import c_bool, c_double, c_size_t
+from ctypes import c_double, c_size_t
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -57,23 +57,16 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
 
     # A run ---------------------------------------------------------------------------------------------------
 
-    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        super().begin(start, stop, tolerance)
-        self._clocks.begin()
-
     def start(self) -> None:
         """Exit initialisation mode, into event mode."""
-        self._clocks.start(self._reached or 0.0)
         super().start()
         self._in_event_mode = True
         self._next_event = math.inf
-        self._clocks.enter_event_mode(self._reached or 0.0)
 
     def reset(self) -> None:
         super().reset()
         self._in_event_mode = False
         self._next_event = math.inf
-        self._clocks.reset()
 
     def step(self, time: float, step: float) -> StepOutcome:
         """Advance from ``time`` by at most ``step`` [s]; stop at the first event."""
@@ -142,12 +135,9 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
 
     def update_discrete_states(self) -> EventUpdate:
         """End an instant in event mode."""
-        flags, next_time = (c_bool * 5)(), c_double()  # again, end, nominals, values, next event
-        first = ctypes.addressof(flags)
-        self._call("UpdateDiscreteStates", *(ctypes.c_void_p(first + k) for k in range(5)), ctypes.byref(next_time))
-        self._next_event = next_time.value if flags[4] else math.inf
+        again, ends_run, _, self._next_event = self._end_instant()
         ticks = self._clocks.end_instant(self._reached or 0.0)
-        return EventUpdate(flags[0] or ticks, next_event(self._next_event, self._clocks), flags[1])
+        return EventUpdate(again or ticks, next_event(self._next_event, self._clocks), ends_run)
 
     def leave_event_mode(self) -> None:
         """Go on in time."""

@@ -11,20 +11,12 @@ class Exchange2Slave(ExchangeSlave, Fmu2Instance):
     """See ``ExchangeSlave``."""
 
     RATES = "GetDerivatives"
+    FLAG = ctypes.c_int
 
     def _counts(self) -> tuple[int, int]:
         exchange = self._description.exchange
         assert exchange is not None
         return exchange.states, exchange.indicators
-
-    def _complete(self) -> tuple[bool, bool]:
-        assert self._description.exchange is not None
-        if not self._description.exchange.completed:
-            return False, False
-        enters, ends = ctypes.c_int(0), ctypes.c_int(0)
-        keeps = ctypes.c_int(not self.model.can_save_state)
-        self._call("CompletedIntegratorStep", keeps, ctypes.byref(enters), ctypes.byref(ends))
-        return bool(enters.value), bool(ends.value)
 
     def _update(self) -> Instant:
         from fmpy.fmi2 import fmi2EventInfo

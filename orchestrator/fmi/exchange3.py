@@ -1,8 +1,7 @@
 """Instances of FMI 3.0 for model exchange."""
 
 import ctypes
-import math
-from ctypes import c_bool, c_double, c_size_t, c_void_p
+from ctypes import c_bool, c_size_t, c_void_p
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +27,7 @@ class Exchange3Slave(ClockedSlave, ExchangeSlave, Fmu3Instance):
     """See ``ExchangeSlave``."""
 
     RATES = "GetContinuousStateDerivatives"
+    FLAG = c_bool
 
     def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
         self._clocks = InstanceClocks(description, self._call)
@@ -40,20 +40,6 @@ class Exchange3Slave(ClockedSlave, ExchangeSlave, Fmu3Instance):
         return [*super()._necessary_functions(), *_NECESSARY, self.RATES, *completed, *clocks]
 
     # A run, with clocks -------------------------------------------------------------------------------------------
-
-    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        super().begin(start, stop, tolerance)
-        self._clocks.begin()
-
-    def start(self) -> None:
-        """Exit initialisation mode, into event mode."""
-        self._clocks.start(self._reached or 0.0)
-        super().start()
-        self._clocks.enter_event_mode(self._reached or 0.0)
-
-    def reset(self) -> None:
-        super().reset()
-        self._clocks.reset()
 
     def _due(self) -> float:
         return min(super()._due(), self._clocks.next_time())
@@ -98,17 +84,5 @@ class Exchange3Slave(ClockedSlave, ExchangeSlave, Fmu3Instance):
         self._call("GetNumberOfEventIndicators", ctypes.byref(indicators))
         return states.value, indicators.value
 
-    def _complete(self) -> tuple[bool, bool]:
-        assert self._description.exchange is not None
-        if not self._description.exchange.completed:
-            return False, False
-        enters, ends = c_bool(False), c_bool(False)
-        keeps = c_bool(not self.model.can_save_state)
-        self._call("CompletedIntegratorStep", keeps, ctypes.byref(enters), ctypes.byref(ends))
-        return enters.value, ends.value
-
     def _update(self) -> Instant:
-        flags, next_event = (c_bool * 5)(), c_double()  # again, end, nominals, values, next event
-        first = ctypes.addressof(flags)
-        self._call("UpdateDiscreteStates", *(c_void_p(first + k) for k in range(5)), ctypes.byref(next_event))
-        return Instant(flags[0], flags[1], flags[2], next_event.value if flags[4] else math.inf)
+        return Instant(*self._end_instant())

@@ -7,7 +7,7 @@ from ctypes import c_bool, c_double, c_size_t
 
 from orchestrator.fmi.clocked import ClockedTransfers
 from orchestrator.fmi.model_description import FmuDescription
-from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.slave3 import Fmu3Instance
 from orchestrator.fmi.timed_clocks import Call, TimedClocks
 from orchestrator.master.protocol import Signals, Transfer
 
@@ -116,10 +116,24 @@ class InstanceClocks:
         return [clock for clock, ticks in zip(outputs, active, strict=True) if ticks]
 
 
-class ClockedSlave(FmuSlave):
+class ClockedSlave(Fmu3Instance):
     """An instance whose clocks are ticked, and whose variables of clocks are set and read at ticks."""
 
     _clocks: InstanceClocks
+
+    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
+        super().begin(start, stop, tolerance)
+        self._clocks.begin()
+
+    def start(self) -> None:
+        """Exit initialisation mode, into event mode."""
+        self._clocks.start(self._reached or 0.0)
+        super().start()
+        self._clocks.enter_event_mode(self._reached or 0.0)
+
+    def reset(self) -> None:
+        super().reset()
+        self._clocks.reset()
 
     def tick(self, clocks: Sequence[str]) -> None:
         """Activate input clocks for this instant, in event mode."""

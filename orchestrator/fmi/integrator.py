@@ -83,7 +83,8 @@ class Integrator:
         if seeks_side:
             self._length = length
         if not self._has_event(after, self.states):
-            self.signs = np.where(self.signs == 0.0, self._equations.read_signs(), self.signs)
+            if seeks_side:
+                self.signs = np.where(self.signs == 0.0, self._equations.read_signs(), self.signs)
             return False
         path = track() if track else lambda _: states
         while after - before > CLOSE * max(1.0, abs(after)):
@@ -99,6 +100,8 @@ class Integrator:
 
     def _has_event(self, time: float, states: NDArray[np.float64]) -> bool:
         """Tell whether an indicator has come to be above zero, or is so no more."""
+        if not len(self.signs):
+            return False
         self._equations.place(time, states)
         above = self._equations.read_signs() > 0.0
         return bool(np.any((above != (self.signs > 0.0)) & (self.signs != 0.0)))

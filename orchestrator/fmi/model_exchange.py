@@ -56,6 +56,7 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
     """See ``EventSlave``."""
 
     RATES: str  # the function that gives the derivatives of the states, without its prefix
+    FLAG: Any  # type of a truth value in C
 
     def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
         super().__init__(name, path, description)
@@ -135,7 +136,8 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
             if event or enters or ends_run:
                 how = f"{self.PREFIX}CompletedIntegratorStep, terminateSimulation" if ends_run else ""
                 return StepOutcome(self._reached or 0.0, event or enters, how)
-        self._place(end)
+        if self._reached != end:  # too short a step for the integrator
+            self._place(end)
         return StepOutcome(end, False)
 
     def _ready(self, time: float) -> Integrator:
@@ -158,9 +160,14 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         self._equations.place(time, self._integrator.states)
         self._reached = time
 
-    @abstractmethod
     def _complete(self) -> tuple[bool, bool]:
         """Tell the FMU of a completed step; return whether it wants an event, and the end of the run."""
+        assert self._description.exchange is not None
+        if not self._description.exchange.completed:
+            return False, False
+        enters, ends, keeps = (self.FLAG(value) for value in (False, False, not self.model.can_save_state))
+        self._call("CompletedIntegratorStep", keeps, ctypes.byref(enters), ctypes.byref(ends))
+        return bool(enters.value), bool(ends.value)
 
     # Event mode ------------------------------------------------------------------------------------------------
 
