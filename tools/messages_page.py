@@ -1,6 +1,6 @@
-"""Write ``docs/messages.md``: the messages that a user can meet, as the source has them.
+"""The page of messages: those that a user can meet, as the source has them. The site is built with it.
 
-python -m tools.messages_page
+python -m tools.messages_page prints it.
 """
 
 import ast
@@ -10,13 +10,12 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "messages.md"
 SOURCES = sorted(path for room in ("orchestrator", "pyfmu_sources") for path in (ROOT / room).rglob("*.py"))
 HEAD = """# Messages
 
 The messages that commands and the library give, by what they are. `…` stands for names and values of the moment. The
 second column names the part of the library. The rules behind findings are in [rules](rules.md), those that lower a
-grade in [settings](settings.md#rules). This page is written from the source by `python -m tools.messages_page`.
+grade in [settings](settings.md#rules). This page is made from the source when the site is built.
 
 """
 # Bases of the classes whose texts reach the user, and what their section is called.
@@ -168,4 +167,4 @@ def _escaped(text: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    print(page())

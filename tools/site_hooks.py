@@ -1,4 +1,4 @@
-"""Hooks of MkDocs: pages that lie beside ``docs/`` join the site, and formulae become MathML."""
+"""Hooks of MkDocs: pages beside ``docs/`` and the page of messages join the site, and formulae become MathML."""
 
 import html
 import re
@@ -7,6 +7,8 @@ from typing import Any
 
 from latex2mathml.converter import convert
 from mkdocs.structure.files import File
+
+from tools import messages_page
 
 ROOT = Path(__file__).resolve().parents[1]
 # Pages of the repository outside of docs/, and their names on the site.
@@ -24,9 +26,10 @@ FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>',
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the pages outside of ``docs/``."""
+    """Add the pages outside of ``docs/``, and the page of messages."""
     for source, name in PAGES.items():
         files.append(File.generated(config, name, abs_src_path=str(ROOT / source)))
+    files.append(File.generated(config, "messages.md", content=messages_page.page()))
     return files
 
 
