@@ -37,6 +37,11 @@ def test_names_are_no_riddles():
     assert not [name for path, tree in files_of([ROOT / "orchestrator"]) for name in riddles(path, tree)]
 
 
+def test_no_product_name_looks_like_a_test():
+    known = [(path, name) for path, tree in files_of(PACKAGES) for _, name in names(path, tree)]
+    assert not [f"{path.relative_to(ROOT)}: {name}" for path, name in known if name.startswith("test_")]
+
+
 def test_riddles_are_found():
     tree = ast.parse("def kept(found):\n    pass\n\nclass Subject:\n    def _own(self):\n        pass\n")
     found = {text.split()[1] for text in riddles(Path("finer.py"), tree)}

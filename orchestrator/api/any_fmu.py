@@ -16,7 +16,7 @@ from orchestrator.diagnosis.fmu.mapping import Map, read_map
 from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor, read_fmu_record
 from orchestrator.diagnosis.fmu.report import FmuDiagnosis, misfit_on_record, stage_runs
 from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
-from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, steps_found, test_found
+from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, misfit_found, steps_found
 from orchestrator.diagnosis.report.summary import summarise_fmu
 from orchestrator.diagnosis.result import TestMisfit
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -76,8 +76,8 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
             trust=d.trust.to_result(),
             effects=tuple(effect_found(effect) for effect in d.effects),
             parameters=parameter_results(d),
-            test=tuple(test_found(test, report) for test in d.test),
-            validation=None if self.validation is None else test_found(self.validation, report),
+            test=tuple(misfit_found(test, report) for test in d.test),
+            validation=None if self.validation is None else misfit_found(self.validation, report),
             remaining=FmuRemainingFound(dict(d.left), tuple(dependence_found(one) for one in d.remaining)),
             notes=d.notes,
             settings=as_tables(d.settings),

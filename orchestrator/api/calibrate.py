@@ -12,7 +12,7 @@ from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.fmu.diagnose import FmuCalibration, calibrate_fmu
 from orchestrator.diagnosis.fmu.mapping import read_map
 from orchestrator.diagnosis.fmu.system import read_system
-from orchestrator.diagnosis.report.json_results import test_found
+from orchestrator.diagnosis.report.json_results import misfit_found
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.isolation.walls import support
@@ -84,7 +84,7 @@ class CalibrationResult(Result):
             trust=self.trust.to_result(),
             parameters=parameters,
             not_told_apart=c.confounded,
-            test=tuple(test_found(test, d.settings.report) for test in d.test),
+            test=tuple(misfit_found(test, d.settings.report) for test in d.test),
             notes=c.notes,
             settings=as_tables(d.settings),
             seconds=self.seconds,

@@ -13,7 +13,7 @@ from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.records import as_record
 from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.data.records import check_record
-from orchestrator.diagnosis.report.test_report import misfit_on_record
+from orchestrator.diagnosis.report.misfit_on_test_data import misfit_on_record
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.records.model_file import Model, read_model

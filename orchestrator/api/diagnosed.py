@@ -21,7 +21,7 @@ from orchestrator.diagnosis.report.corrected import (
     fmu_name,
     format_corrected_model,
 )
-from orchestrator.diagnosis.report.json_results import diagnosis_found, test_found
+from orchestrator.diagnosis.report.json_results import diagnosis_found, misfit_found
 from orchestrator.diagnosis.report.law_export import LawRun, build_with_law, run_with_law
 from orchestrator.diagnosis.report.summary import summarise
 from orchestrator.diagnosis.result import Diagnosis, TestMisfit
@@ -152,7 +152,9 @@ class DiagnosisResult(AnyDiagnosisResult):
             learned_law=law_result(found.learned_law, self.law_run, self.test[0].signals[0].unit),
             model=str(place / self.fmu_name),
             cosimulation=DifferenceFound(self.runs.difference, "rad"),
-            validation=None if self.validation is None else test_found(self.validation, self.diagnosis.settings.report),
+            validation=None
+            if self.validation is None
+            else misfit_found(self.validation, self.diagnosis.settings.report),
             live=live_corrected_model(self.diagnosis, self.runs),
             seconds=self.seconds,
         )

@@ -25,7 +25,7 @@ from orchestrator.diagnosis.report.estimates import (
 )
 from orchestrator.diagnosis.report.hidden_gap import HiddenGap, find_hidden_gap, gap_effects, gap_parameters
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
-from orchestrator.diagnosis.report.test_report import misfit_on_test_data, misses_of, torque_comparison
+from orchestrator.diagnosis.report.misfit_on_test_data import misfit_on_test_data, misses_of, torque_comparison
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
 from orchestrator.diagnosis.selection.evidence import (
     effect_evidence,

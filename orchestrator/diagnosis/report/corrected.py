@@ -11,7 +11,7 @@ from orchestrator.building.build import build_variant, ensure_built
 from orchestrator.checking.check import check_fmu
 from orchestrator.diagnosis.model.drive import shift_signal
 from orchestrator.diagnosis.report.free_run import free_runs, run_parts
-from orchestrator.diagnosis.report.open_test_data import test_signals
+from orchestrator.diagnosis.report.open_test_data import signals_of_test_data
 from orchestrator.diagnosis.report.simulation import RunSignals
 from orchestrator.diagnosis.result import Diagnosis, ValueEstimate
 from orchestrator.errors import SimulationError
@@ -96,7 +96,7 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
         Times, measured angles and those of both models.
     """
     w, plant, settings = diagnosis.workings, diagnosis.model.plant, diagnosis.settings.report
-    _, signals, first = test_signals(w.test_data, w.balances[0])[0]
+    _, signals, first = signals_of_test_data(w.test_data, w.balances[0])[0]
     step, count = signals.step, signals.channels
     nominal = ensure_built([plant.name])[plant.name]
     parts = run_parts(first, signals.size, settings)

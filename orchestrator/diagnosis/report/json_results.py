@@ -38,7 +38,7 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
             name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
             for name, one in diagnosis.parameters.items()
         },
-        test=tuple(test_found(test, diagnosis.settings.report) for test in diagnosis.test),
+        test=tuple(misfit_found(test, diagnosis.settings.report) for test in diagnosis.test),
         remaining=RemainingFound(dict(diagnosis.left), tuple(dependence_found(one) for one in diagnosis.remaining)),
         learned_law=None if law is None else _law(law),
         analysis=_analysis(diagnosis),
@@ -62,7 +62,7 @@ def steps_found(search: SearchResult) -> tuple[StepFound, ...]:
     )
 
 
-def test_found(test: TestMisfit, report: ReportSettings) -> TestFound:
+def misfit_found(test: TestMisfit, report: ReportSettings) -> TestFound:
     """Return how the models do on test data of one record."""
     misfit = {
         one.signal: SignalMisfitFound(

@@ -11,7 +11,7 @@ from orchestrator.building.build import build_variant
 from orchestrator.building.sources import catalogue, takes_law
 from orchestrator.diagnosis.report.corrected import check_corrected, fmu_name, requests_for_fmu, start_values
 from orchestrator.diagnosis.report.free_run import free_runs, run_parts
-from orchestrator.diagnosis.report.open_test_data import test_signals
+from orchestrator.diagnosis.report.open_test_data import signals_of_test_data
 from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.diagnosis.selection.outcome import Dependence
 from orchestrator.fmi.instances import fmu_instance
@@ -106,7 +106,7 @@ def run_with_law(diagnosis: Diagnosis, law: Dependence, fmu: Path) -> LawRun:
         What the runs miss, and how they were started.
     """
     plant, settings = diagnosis.model.plant, diagnosis.settings.report
-    _, signals, first = test_signals(diagnosis.workings.test_data, diagnosis.workings.balances[0])[0]
+    _, signals, first = signals_of_test_data(diagnosis.workings.test_data, diagnosis.workings.balances[0])[0]
     wide, p = with_law(plant), _values_with_law(diagnosis, law)
     encoders, step = plant.encoders[: signals.channels], signals.step
     parts = run_parts(first, signals.size, settings)

@@ -11,7 +11,7 @@ def open_test_data(data: TestData[R]) -> list[tuple[R, int]]:
     return list(zip(data._records, data._first_rows, strict=True))
 
 
-def test_signals(data: TestData[Record], balance: TorqueBalance) -> list[tuple[Record, RunSignals, int]]:
+def signals_of_test_data(data: TestData[Record], balance: TorqueBalance) -> list[tuple[Record, RunSignals, int]]:
     """Return the records that hold test data, their signals for free runs, and the first row of the test part."""
     return [(record, signals_for_runs(record, balance), first) for record, first in open_test_data(data)]
 

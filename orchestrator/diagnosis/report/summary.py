@@ -79,7 +79,7 @@ def summarise_fmu(diagnosis: DiagnosisOutcome) -> Iterator[str]:
     for effect in diagnosis.effects:
         yield sizes_line(effect)
         yield f"    {sureness(effect)}"
-        yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{test_words(effect)}."
+        yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{words_on_test_data(effect)}."
     left = " and ".join(f"{remainder_percent(share)} of {name}" for name, share in diagnosis.left.items())
     strongest = [f"at {one.site} {one.words}" for one in diagnosis.remaining[:2]]
     follows = "; ".join(strongest) if strongest else "it follows no signal"
@@ -151,7 +151,7 @@ def _effect(effect: GradedEffect, diagnosis: Diagnosis) -> Iterator[str]:
         yield f"    {play}"
     yield f"    {sureness(effect)}"
     if math.isfinite(effect.evidence.share):
-        yield f"    It explains {percent(effect.evidence.share)} of the missing torque{test_words(effect)}."
+        yield f"    It explains {percent(effect.evidence.share)} of the missing torque{words_on_test_data(effect)}."
     if effect.name in MOTION:
         yield f"    In the motion: {MOTION[effect.name]}"
 
@@ -170,7 +170,7 @@ def value_words(estimate: ValueEstimate) -> str:
     return f"{estimate.value:.5g}{unit} (95 %: {low:.5g} to {high:.5g})"
 
 
-def test_words(effect: GradedEffect) -> str:
+def words_on_test_data(effect: GradedEffect) -> str:
     """Return what test data say of an effect, as the end of a sentence; nothing where it was not tested."""
     share, torque = effect.evidence.motion_share, effect.evidence.test_torque
     if not math.isfinite(share):

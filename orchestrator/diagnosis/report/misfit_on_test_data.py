@@ -12,7 +12,7 @@ from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.plant_effects import in_metres
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.free_run import free_runs, run_parts
-from orchestrator.diagnosis.report.open_test_data import open_test_data, signals_for_runs, test_signals
+from orchestrator.diagnosis.report.open_test_data import open_test_data, signals_for_runs, signals_of_test_data
 from orchestrator.diagnosis.report.simulation import RunSignals
 from orchestrator.diagnosis.result import Diagnosis, SignalMisfit, TestMisfit, Workings
 from orchestrator.diagnosis.settings import DiagnosisSettings, ReportSettings
@@ -86,7 +86,7 @@ def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> 
     Returns:
         A model's values -> the sum of squares over the encoders, in units of their noise.
     """
-    parts = test_signals(workings.test_data, workings.balances[0])
+    parts = signals_of_test_data(workings.test_data, workings.balances[0])
 
     def misses_at(point: ModelPoint) -> float:
         p = workings.balances[0].physical_values(workings.search.problem.record_points(point)[0])
