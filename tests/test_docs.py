@@ -14,7 +14,7 @@ GENERATED = {"docs/settings.md", "docs/rules.md", "fmus/README.md"}
 CHANGES = "CHANGELOG.md"
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
-    for pattern in ("*.md", "docs/**/*.md", "fmus/**/*.md", "tools/**/*.md")
+    for pattern in ("*.md", "docs/**/*.md", "findings/*.md", "fmus/**/*.md", "tools/**/*.md")
     for path in ROOT.glob(pattern)
 )
 MOST_LINES = 250
