@@ -11,6 +11,7 @@ import operator
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -18,9 +19,10 @@ from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.addresses import native_calls
 from orchestrator.fmi.batches import Functions, VariableBatch, in_c, shares
-from orchestrator.fmi.extraction import content_hash
+from orchestrator.fmi.extraction import content_hash, extract_fmu
 from orchestrator.fmi.messages import DISCARD, ERROR, FATAL, OK, PENDING, STATUS, WARNING, Inbox
 from orchestrator.fmi.model_description import FmuDescription, read_description
+from orchestrator.fmi.python_modules import PythonModules
 from orchestrator.fmi.shorter_steps import ShorterSteps
 from orchestrator.master.protocol import (
     ModelInterface,
@@ -64,8 +66,10 @@ class FmuSlave(Slave):
         self._once = ""
         self._sets: dict[tuple[str, ...], tuple[list[VariableBatch], list[Value]]] = {}
         self._reserve()
+        self._modules = PythonModules(extract_fmu(path) / "resources") if self._description.python else None
         try:
-            self._library, self._component = self._instantiate()
+            with nullcontext() if self._modules is None else self._modules.place():
+                self._library, self._component = self._instantiate()
         except BaseException:
             self._release()
             raise
@@ -322,6 +326,8 @@ class FmuSlave(Slave):
         self._release()
         if self._worst < FATAL:
             self._free()
+            if self._modules is not None:
+                self._modules.release()
 
     def __del__(self) -> None:
         if not getattr(self, "_closed", True) and hasattr(self, "_functions"):
