@@ -4,12 +4,12 @@ import re
 import shutil
 import stat
 import zipfile
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
+from pathlib import Path, PurePosixPath
 from typing import Protocol
 
-from orchestrator.checking.findings import Finding, has_errors
-from orchestrator.shared.isolation.archives import ArchiveLimits
+from orchestrator.checking.findings import Finding
+from orchestrator.shared.isolation.archives import ArchiveLimits, is_folder, is_repeated, list_members, plain_path
 from orchestrator.shared.isolation.limits import MEBIBYTE
 
 _RESERVED = re.compile(r"^(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?$", re.IGNORECASE)
@@ -39,23 +39,24 @@ class FmuFiles(Protocol):
 
 
 class ZipFiles(FmuFiles):
-    """The files of a packed FMU."""
+    """The files of a packed FMU, by their paths with forward slashes and without dots."""
 
-    def __init__(self, path: Path) -> None:
-        self.archive = zipfile.ZipFile(path)
+    def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
+        self.archive = archive
+        self.files = {name: info for name, info in list_members(archive, path).items() if info is not None}
 
     def names(self) -> list[str]:
-        return [i.filename for i in self.archive.infolist() if not i.is_dir()]
+        return list(self.files)
 
     def read(self, name: str, limit: int) -> bytes:
-        with self.archive.open(name) as stream:
+        with self.archive.open(self.files[name]) as stream:
             return stream.read(limit + 1)
 
     def extract(self, target: Path) -> None:
-        for name in self.names():
+        for name, info in self.files.items():
             destination = target / name
             destination.parent.mkdir(parents=True, exist_ok=True)
-            with self.archive.open(name) as source, destination.open("wb") as sink:
+            with self.archive.open(info) as source, destination.open("wb") as sink:
                 shutil.copyfileobj(source, sink)
 
     def close(self) -> None:
@@ -91,21 +92,31 @@ def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[F
     if path.is_dir():
         return FolderFiles(path), list(_folder_findings(path, limits))
     try:
-        files = ZipFiles(path)
+        archive = zipfile.ZipFile(path)
     except Exception as error:  # zipfile raises all sorts on bytes that it did not foresee
         return None, [Finding("archive.not-a-zip", path.name, f"an FMU must be a ZIP archive, but: {error}")]
+    files: FmuFiles | None = None
     try:
-        findings = list(_entry_findings(files.archive, limits))
-        if not has_errors(findings):
-            findings += _content_findings(files.archive)
+        findings = list(_entry_findings(archive, limits))
+        if not _is_unfit(findings):
+            findings += _content_findings(archive)
+        if not _is_unfit(findings):
+            findings += _clash_findings(archive)
+        if not _is_unfit(findings):
+            files = ZipFiles(path, archive)
     except Exception as error:
         findings = [Finding("archive.corrupt", path.name, f"the archive cannot be read: {error!r}")]
-    if not has_errors(findings) and "modelDescription.xml" not in files.names():
+    if files is not None and "modelDescription.xml" not in files.names():
         findings.append(_no_description(path.name, files.names()))
-    if has_errors(findings):
-        files.close()
+    if _is_unfit(findings):
+        archive.close()
         return None, findings
     return files, findings
+
+
+def _is_unfit(findings: list[Finding]) -> bool:
+    """Whether an error keeps the archive from being read; a backslash is an error, but its meaning is plain."""
+    return any(f.severity == "error" and f.rule != "archive.backslash" for f in findings)
 
 
 def _no_description(name: str, names: list[str]) -> Finding:
@@ -131,26 +142,29 @@ def _entry_findings(archive: zipfile.ZipFile, limits: ArchiveLimits) -> Iterator
             "archive.too-large", "", f"the files must have at most {limits.total} bytes unpacked, but have {total}"
         )
     for entry in entries:
-        yield from _name_findings(entry.orig_filename)
+        yield from _name_findings(entry)
         yield from _kind_findings(entry, limits)
-    yield from _clash_findings([i.filename for i in entries])
     yield from _overlap_findings(entries)
 
 
-def _name_findings(name: str) -> Iterator[Finding]:
-    parts = re.split(r"[/\\]", name.rstrip("/"))
+def _name_findings(entry: zipfile.ZipInfo) -> Iterator[Finding]:
+    name = entry.orig_filename
+    parts = re.split(r"[/\\]", name.rstrip("/\\"))
     if ".." in parts:
         yield Finding("archive.traversal", name, "an entry must stay inside the FMU, but its path has `..`")
     elif name.startswith(("/", "\\")) or re.match(r"^[A-Za-z]:", name):
         yield Finding("archive.absolute", name, "an entry must have a relative path, but this one is absolute")
-    elif not set(parts) - {"", "."}:
+    elif not set(parts) - {"", "."} and not (name and is_folder(entry)):
         yield Finding("archive.corrupt", name, "an entry must have a name, but this one has none")
+    elif "\0" in name:
+        text = "a name must not have a zero byte, but has one"
+        yield Finding("archive.corrupt", name.encode("unicode_escape").decode(), text)
+    elif "\\" in name:
+        yield Finding("archive.backslash", name, "folders must be separated by `/`, but here by a backslash")
     elif set(parts) & {"", "."}:
         text = "folders of a path must have names, but one here is empty or a dot"
         yield Finding("archive.odd-name", name, text)
-    elif "\\" in name:
-        yield Finding("archive.backslash", name, "folders must be separated by `/`, but here by a backslash")
-    elif "\0" in name or any(ord(c) < 32 for c in name):
+    elif any(ord(c) < 32 for c in name):
         yield Finding(
             "archive.odd-name", name.encode("unicode_escape").decode(), "a file name must not have control characters"
         )
@@ -185,22 +199,31 @@ def _kind_findings(entry: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[Fi
         )
 
 
-def _clash_findings(names: list[str]) -> Iterator[Finding]:
+def _clash_findings(archive: zipfile.ZipFile) -> Iterator[Finding]:
+    """Paths that occur again; the same content twice is harmless, and so is a folder."""
+    seen: dict[str, zipfile.ZipInfo | None] = {}
+    for entry in archive.infolist():
+        name, member = str(plain_path(entry)), None if is_folder(entry) else entry
+        if name not in seen:
+            seen[name] = member
+        elif not is_repeated(archive, seen[name], member):
+            what = "with another content" if seen[name] and member else "as a file and as a folder"
+            yield Finding("archive.duplicate", name, f"a path must occur once in the archive, but occurs again, {what}")
+        elif member is not None:
+            yield Finding("archive.repeated", name, "a path should occur once, but occurs again with the same content")
+    folders = {str(folder) for name in seen for folder in PurePosixPath(name).parents}
+    for name in (name for name in seen if seen[name] is not None and name in folders):
+        yield Finding("archive.duplicate", name, "a path must be a file or a folder, but is both")
+    yield from _case_findings(name for name in seen if seen[name] is not None)
+
+
+def _case_findings(names: Iterable[str]) -> Iterator[Finding]:
     seen: dict[str, str] = {}
-    folders = {"/".join(n.split("/")[:i]) for n in names for i in range(1, n.count("/") + 1)}
     for name in names:
-        folded = name.casefold()
-        if seen.get(folded) == name:
-            yield Finding("archive.duplicate", name, "a path must occur once in the archive, but occurs again")
-        elif folded in seen:
-            yield Finding(
-                "archive.case-clash",
-                name,
-                f"paths must differ by more than case, but this one clashes with {seen[folded]}",
-            )
-        elif name in folders:
-            yield Finding("archive.duplicate", name, "a path must be a file or a folder, but is both")
-        seen[folded] = name
+        first = seen.setdefault(name.casefold(), name)
+        if first != name:
+            text = f"paths must differ by more than case, but this one clashes with {first}"
+            yield Finding("archive.case-clash", name, text)
 
 
 def _overlap_findings(entries: list[zipfile.ZipInfo]) -> Iterator[Finding]:
@@ -239,6 +262,6 @@ def _folder_findings(path: Path, limits: ArchiveLimits) -> Iterator[Finding]:
         elif entry.is_file():
             names.append(name)
             total += entry.stat().st_size
-    yield from _clash_findings(names)
+    yield from _case_findings(names)
     if total > limits.total:
         yield Finding("archive.too-large", "", f"the files must have at most {limits.total} bytes, but have {total}")

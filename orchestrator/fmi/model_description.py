@@ -1,7 +1,6 @@
 """What the master needs of a model description of FMI 2.0 or 3.0; ``check`` looks at all the rest."""
 
 import re
-import zipfile
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +14,7 @@ from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, UnusableError, clock_names, read_clocks
 from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange2, read_exchange3
 from orchestrator.master.protocol import ModelInterface, Unit, Value, Variable
+from orchestrator.shared.isolation.archives import open_archive
 
 MAXIMUM_XML = 64 * 2**20
 """Bytes of XML beyond which a model description is refused: ten times the largest seen in the wild."""
@@ -91,22 +91,14 @@ def read_description(
 
 def _read_archive(path: Path) -> tuple[bytes, bool]:
     """Return the model description's content, and whether the FMU runs Python."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            info = archive.getinfo("modelDescription.xml")
-            if info.file_size > MAXIMUM_XML:
-                raise FmuError(f"{path}: modelDescription.xml must be at most {MAXIMUM_XML >> 20} MB, but is larger")
-            content = archive.read(info)
-            names = archive.namelist()
-    except FileNotFoundError:
-        raise FmuError(f"`fmu` must exist, but {path} does not") from None
-    except KeyError:
-        raise FmuError(f"`fmu` must hold a modelDescription.xml, but {path} does not") from None
-    except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, ValueError, EOFError) as error:
-        raise FmuError(f"`fmu` must be a readable zip archive, but {path} is not: {error}") from None
-    except Exception as error:  # zlib.error and what else a damaged archive makes zipfile raise
-        raise FmuError(f"`fmu` must be an intact zip archive, but {path} is not: {error}") from None
-    return content, _runs_python(names)
+    with open_archive(path) as (archive, members):
+        info = members.get("modelDescription.xml")
+        if info is None:
+            inner = next((f"; it has {name}" for name in members if name.endswith("/modelDescription.xml")), "")
+            raise FmuError(f"`fmu` must hold a modelDescription.xml at its top, but {path} does not{inner}")
+        if info.file_size > MAXIMUM_XML:
+            raise FmuError(f"{path}: modelDescription.xml must be at most {MAXIMUM_XML >> 20} MB, but is larger")
+        return archive.read(info), _runs_python(members)
 
 
 def _runs_python(names: Iterable[str]) -> bool:

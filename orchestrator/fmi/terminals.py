@@ -1,6 +1,5 @@
 """Terminals of FMUs of FMI 3.0, from terminalsAndIcons.xml: groups of variables that are connected together."""
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from orchestrator.errors import FmuError
 from orchestrator.master import units
 from orchestrator.master.protocol import ModelInterface, Variable
 from orchestrator.master.values import nearest, types_fit
+from orchestrator.shared.isolation.archives import open_archive
 
 FILE = "terminalsAndIcons/terminalsAndIcons.xml"
 MAXIMUM_XML = 16 * 2**20
@@ -55,15 +55,13 @@ class Terminal:
 
 def read_terminals(path: Path) -> dict[str, Terminal]:
     """Return the terminals of the FMU at ``path`` by name, none where it has none."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            if FILE not in archive.namelist():
-                return {}
-            if archive.getinfo(FILE).file_size > MAXIMUM_XML:
-                raise FmuError(f"{path}: {FILE} must be at most {MAXIMUM_XML >> 20} MB, but is larger")
-            content = archive.read(FILE)
-    except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, ValueError, EOFError) as error:
-        raise FmuError(f"`fmu` must be a readable zip archive, but {path} is not: {error}") from None
+    with open_archive(path) as (archive, members):
+        info = members.get(FILE)
+        if info is None:
+            return {}
+        if info.file_size > MAXIMUM_XML:
+            raise FmuError(f"{path}: {FILE} must be at most {MAXIMUM_XML >> 20} MB, but is larger")
+        content = archive.read(info)
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
         root = etree.fromstring(content, parser)

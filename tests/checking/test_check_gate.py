@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from orchestrator.checking.check import check_fmu
+from orchestrator.errors import FmuError
+from orchestrator.fmi.model_description import read_description
+from tests.support.broken_archives import pack
 from tests.support.broken_fmus import QUICK
 from tests.support.c_fmu import LIBRARY, fmu_files, have_compiler, write_fmu
 
@@ -108,3 +111,51 @@ def test_messages_have_their_arguments(tmp_path: Path) -> None:
     report = check_fmu(write_fmu(tmp_path / "logs.fmu", fmu_files("logs_arguments")), QUICK)
     (finding,) = (f for f in report.findings if f.rule == "run.status")
     assert "(a 7 -3 0x1f 99999999999 tank 2.50 x 1e-09 50% 8)" in finding.message
+
+
+ODD_NAMES = {
+    "the archive's own folder": ([("./", b"")], {"archive.odd-name"}),
+    "folders of Windows": ([("resources\\", b"")], {"archive.backslash"}),
+    "folders twice": ([("resources/", b""), ("resources/", b"")], set()),
+    "a file twice": ([("resources/readme.txt", b"nothing is needed here\n")], {"archive.repeated"}),
+    "a file twice, with a dot": (
+        [("./resources/readme.txt", b"nothing is needed here\n")],
+        {"archive.repeated", "archive.odd-name"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ODD_NAMES)
+def test_odd_entries_of_an_archive_keep_nothing_from_running(name: str, tmp_path: Path) -> None:
+    more, rules = ODD_NAMES[name]
+    report = check_fmu(pack(tmp_path / "odd.fmu", [*more, *fmu_files().items()]), QUICK)
+    assert {f.rule for f in report.findings} == rules
+    assert report.executed
+
+
+@pytest.mark.parametrize(
+    ("change", "rule"),
+    [
+        (lambda name: f"./{name}", "archive.odd-name"),
+        (lambda name: name.replace("/", "\\"), "archive.backslash"),
+        (lambda name: name.replace("/", "//"), "archive.odd-name"),
+    ],
+    ids=["dots", "backslashes", "empty folders"],
+)
+def test_odd_paths_are_one_finding_and_keep_nothing_from_running(change, rule: str, tmp_path: Path) -> None:
+    path = pack(tmp_path / "odd.fmu", [(change(name), data) for name, data in fmu_files().items()])
+    report = check_fmu(path, QUICK)
+    assert [f.rule for f in report.findings] == [rule]
+    assert report.executed
+    assert set(report.executions[0].stages.values()) == {""}
+    assert read_description(path) == read_description(write_fmu(tmp_path / "plain.fmu", fmu_files()))
+
+
+@pytest.mark.parametrize("name", [XML, f"./{XML}", LIBRARY.replace("/", "\\")])
+def test_two_contents_of_one_path_are_refused(name: str, tmp_path: Path) -> None:
+    path = pack(tmp_path / "two.fmu", [*fmu_files().items(), (name, b"<other/>")])
+    report = check_fmu(path, QUICK)
+    assert "archive.duplicate" in {f.rule for f in report.findings}
+    assert not report.executed
+    with pytest.raises(FmuError, match="has two contents"):
+        read_description(path)

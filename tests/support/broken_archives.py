@@ -5,7 +5,7 @@ import stat
 import struct
 import warnings
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from tests.support.c_fmu import fmu_files, write_fmu
@@ -21,6 +21,15 @@ def _with_entry(
             archive.writestr(name, data, method)
 
     return make
+
+
+def pack(path: Path, entries: Iterable[tuple[str | zipfile.ZipInfo, bytes]]) -> Path:
+    """Write an archive whose names may occur again."""
+    with zipfile.ZipFile(path, "w") as archive, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name, data in entries:
+            archive.writestr(name, data)
+    return path
 
 
 def _symlink() -> zipfile.ZipInfo:
@@ -108,6 +117,8 @@ ARCHIVES: list[tuple[str, str, Callable[[Path], None]]] = [
     ("device name", "archive.odd-name", _with_entry("resources/aux.txt")),
     ("symbolic link", "archive.symlink", _with_entry(_symlink(), b"/etc/passwd", zipfile.ZIP_STORED)),
     ("duplicate", "archive.duplicate", _with_entry("modelDescription.xml", b"<other/>")),
+    ("file twice", "archive.repeated", _with_entry("resources/readme.txt", b"nothing is needed here\n")),
+    ("own folder", "archive.odd-name", _with_entry("./", b"")),
     ("file and folder", "archive.duplicate", _with_entry("resources/readme.txt/inner.txt")),
     ("case clash", "archive.case-clash", _with_entry("resources/ReadMe.txt")),
     ("encrypted", "archive.encrypted", _encrypted),

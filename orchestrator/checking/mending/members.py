@@ -1,6 +1,5 @@
 """The files of an FMU in memory, with the faults of its archive mended."""
 
-import posixpath
 import zipfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -8,10 +7,11 @@ from pathlib import Path
 from orchestrator.checking.archive import FmuFiles, open_fmu
 from orchestrator.checking.findings import Finding
 from orchestrator.errors import FmuError
-from orchestrator.shared.isolation.archives import ArchiveLimits
+from orchestrator.shared.isolation.archives import ArchiveLimits, is_folder, plain_path
 
 MENDED = frozenset(
-    f"archive.{name}" for name in ("backslash", "odd-name", "duplicate", "compression", "no-model-description")
+    f"archive.{name}"
+    for name in ("backslash", "odd-name", "duplicate", "repeated", "compression", "no-model-description")
 )
 """Rules of the archive whose faults are mended by writing it anew."""
 DESCRIPTION = "modelDescription.xml"
@@ -30,41 +30,41 @@ def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], l
         if finding.severity == "error" and finding.rule not in MENDED:
             raise UnmendableError(f"{path.name} must be mended, but this cannot be: {_place(finding)}{finding.message}")
     repairs: list[str] = []
+    repeated: list[str] = []
     members: dict[str, bytes] = {}
-    for name, data in _entries(path, limits):
-        plain = _plain_name(name)
+    for name, plain, data in _entries(path, limits, repairs):
         if plain != name:
             repairs.append(f"renamed {name} to {plain}")
+        if plain in members:
+            repeated.append(plain)
         if members.setdefault(plain, data) != data:
             raise UnmendableError(f"{path.name} must be mended, but has two different files {plain}")
-    names = [finding.path for finding in findings if finding.rule == "archive.duplicate"]
-    if names:
-        repairs.append(f"removed repeated entries: {_list_names(names)}")
+    if repeated:
+        repairs.append(f"removed repeated entries: {_list_names(repeated)}")
     packed = [finding.path for finding in findings if finding.rule == "archive.compression"]
     if packed:
         repairs.append(f"packed with deflate: {_list_names(packed)}")
     return _lift(path, members, repairs), repairs
 
 
-def _entries(path: Path, limits: ArchiveLimits) -> Iterator[tuple[str, bytes]]:
+def _entries(path: Path, limits: ArchiveLimits, repairs: list[str]) -> Iterator[tuple[str, str, bytes]]:
+    """Name, plain path and content of each file; odd names of folders, which are left out, go to ``repairs``."""
     if path.is_dir():
         files: FmuFiles | None = open_fmu(path, limits)[0]
         assert files is not None
-        yield from ((name, files.read(name, limits.total)) for name in files.names())
+        yield from ((name, name, files.read(name, limits.total)) for name in files.names())
         return
     with zipfile.ZipFile(path) as archive:
         for entry in archive.infolist():
-            if not entry.is_dir() and not entry.filename.endswith("\\"):
-                try:
-                    yield entry.filename, archive.read(entry)
-                except Exception as error:  # zlib.error, BadZipFile, EOFError, NotImplementedError ...
-                    raise UnmendableError(
-                        f"{path.name} must be mended, but {entry.filename} cannot be read: {error}"
-                    ) from None
-
-
-def _plain_name(name: str) -> str:
-    return posixpath.normpath(name.replace("\\", "/"))
+            name, plain = entry.orig_filename, plain_path(entry) or ""
+            if is_folder(entry):
+                if name.rstrip("/") != plain:
+                    repairs.append(f"left out the folder {name}")
+                continue
+            try:
+                yield name, plain, archive.read(entry)
+            except Exception as error:  # zlib.error, BadZipFile, EOFError, NotImplementedError ...
+                raise UnmendableError(f"{path.name} must be mended, but {name} cannot be read: {error}") from None
 
 
 def _lift(path: Path, members: dict[str, bytes], repairs: list[str]) -> dict[str, bytes]:

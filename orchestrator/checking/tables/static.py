@@ -14,7 +14,8 @@ archive.backslash | E | 2.3 | 2.5.1 | folders are separated by `/` | write the a
 archive.odd-name | W | * | * | file names work on every platform | rename the file
 archive.long-name | E | * | * | names are short enough to be unpacked | shorten the names
 archive.symlink | E | * | * | there are only files and folders | store the file that the link means
-archive.duplicate | E | * | * | every path occurs once | write the archive anew; tools differ in which copy they take
+archive.duplicate | E | * | * | every path is that of one file or folder | write the archive anew; tools differ in which copy they take
+archive.repeated | W | * | * | no file is stored twice | write the archive anew, each file once
 archive.case-clash | W | * | * | paths differ by more than upper and lower case | rename one; Windows and macOS keep only one of them
 archive.encrypted | E | 2.3 | 2.5.1 | no entry is encrypted | store the entry without a password
 archive.compression | E | 2.3 | 2.5.1 | entries are stored or deflated | pack with deflate

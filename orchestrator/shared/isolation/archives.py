@@ -1,9 +1,12 @@
 """Archives of others: one set of limits for every command, and unpacking whole or not at all."""
 
 import os
+import re
 import shutil
 import stat
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -11,6 +14,12 @@ from orchestrator.errors import FmuError, OutputError
 from orchestrator.shared.isolation.limits import MEBIBYTE
 
 CHUNK = MEBIBYTE
+_DOS_FOLDER = 0x10  # bit of the attributes
+_DRIVE = re.compile(r"[A-Za-z]:")
+_FOLDER = re.compile(r"(^|[/\\])\.?$")
+
+Members = dict[str, zipfile.ZipInfo | None]
+"""Members of an archive by path; a folder is None."""
 
 
 @dataclass(frozen=True)
@@ -29,24 +38,87 @@ class ArchiveLimits:
 
 def unpack(path: Path, target: Path, limits: ArchiveLimits | None = None) -> None:
     """Unpack a zip archive into ``target``, whole or not at all. Links and paths that lead out of it are refused."""
-    limits = limits or ArchiveLimits()
     part = target.with_name(target.name + ".part")
     try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.infolist()
-            require_fit(members, path, limits)
-            for member in members:
-                _unpack_member(archive, member, part, path)
+        with open_archive(path, limits) as (archive, members):
             _make(part)
-        os.replace(part, target)
+            for name, member in members.items():
+                if member is None:
+                    _make(part / name)
+                else:
+                    _unpack_member(archive, member, part, name, path)
+            os.replace(part, target)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def open_archive(path: Path, limits: ArchiveLimits | None = None) -> Iterator[tuple[zipfile.ZipFile, Members]]:
+    """Yield a zip archive of others and its members; whatever cannot be read of it is an ``FmuError``."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            require_fit(archive.infolist(), path, limits or ArchiveLimits())
+            yield archive, list_members(archive, path)
     except FileNotFoundError:
         raise FmuError(f"`fmu` must exist, but {path} does not") from None
     except (FmuError, OutputError):
         raise
     except Exception as error:  # zipfile raises what zlib, struct and the file system do
         raise FmuError(f"`fmu` must be an intact zip archive, but {path} is not: {error}") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+
+
+def list_members(archive: zipfile.ZipFile, path: Path) -> Members:
+    """Return the members by their paths, with forward slashes and without dots; a folder is None.
+
+    A path may occur again with the same content. A path with two contents, or of a file and a folder, is refused:
+    tools differ in which one they take.
+    """
+    members: Members = {}
+    for info in archive.infolist():
+        name = plain_path(info)
+        if name is None:
+            raise FmuError(f"{path}: members must lie within the archive, but {info.orig_filename!r} does not")
+        member = None if is_folder(info) else info
+        if not is_repeated(archive, members.setdefault(name, member), member):
+            raise FmuError(f"{path}: a path must be that of one file, but {name!r} has two contents: write it anew")
+    for name in members:
+        inside = next((str(p) for p in PurePosixPath(name).parents if members.get(str(p)) is not None), None)
+        if inside is not None:
+            raise FmuError(f"{path}: a path must be a file or a folder, but {inside!r} is both: write it anew")
+    return members
+
+
+def plain_path(info: zipfile.ZipInfo) -> str | None:
+    """Return a member's path with forward slashes and without dots; None where it leads out or names nothing.
+
+    The archive's own folder, which some tools list, is ``.``.
+    """
+    name = info.orig_filename.replace("\\", "/")  # `filename` ends at a zero byte
+    path = PurePosixPath(name)
+    linked = stat.S_ISLNK(info.external_attr >> 16)
+    nothing = not name or (not path.parts and not is_folder(info))
+    if linked or nothing or path.is_absolute() or ".." in path.parts or _DRIVE.match(name) or "\0" in name:
+        return None
+    return str(path)
+
+
+def is_folder(info: zipfile.ZipInfo) -> bool:
+    """Whether a member is a folder, by its name or its attributes."""
+    marked = stat.S_ISDIR(info.external_attr >> 16) or bool(info.external_attr & _DOS_FOLDER)
+    return bool(_FOLDER.search(info.orig_filename)) or (marked and info.file_size == 0)
+
+
+def is_repeated(archive: zipfile.ZipFile, first: zipfile.ZipInfo | None, again: zipfile.ZipInfo | None) -> bool:
+    """Whether two members of one path are two folders, or files of the same content."""
+    if first is again:
+        return True
+    if first is None or again is None or (first.file_size, first.CRC) != (again.file_size, again.CRC):
+        return False
+    with archive.open(first) as one, archive.open(again) as other:
+        while chunk := one.read(CHUNK):
+            if chunk != other.read(CHUNK):
+                return False
+    return True
 
 
 def require_fit(members: list[zipfile.ZipInfo], path: Path, limits: ArchiveLimits) -> None:
@@ -63,15 +135,8 @@ def require_fit(members: list[zipfile.ZipInfo], path: Path, limits: ArchiveLimit
             raise FmuError(f"{path}: {member.filename!r} {text}")
 
 
-def _unpack_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path, path: Path) -> None:
-    name = PurePosixPath(member.filename.replace("\\", "/"))
-    linked = stat.S_ISLNK(member.external_attr >> 16)
-    if linked or name.is_absolute() or ".." in name.parts or ":" in member.filename or not name.parts:
-        raise FmuError(f"{path}: members must lie within the archive, but {member.filename!r} does not")
-    target = folder.joinpath(*name.parts)
-    if member.is_dir():
-        _make(target)
-        return
+def _unpack_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path, name: str, path: Path) -> None:
+    target = folder / name
     _make(target.parent)
     left = member.file_size
     with archive.open(member) as source:

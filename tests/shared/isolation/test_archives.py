@@ -11,6 +11,7 @@ from orchestrator.cli import main
 from orchestrator.errors import FmuError, OutputError
 from orchestrator.shared.isolation import archives
 from orchestrator.shared.isolation.archives import ArchiveLimits, require_fit, unpack
+from tests.support.broken_archives import pack
 from tests.support.c_fmu import LIBRARY, model_description
 
 ENTRIES = {"modelDescription.xml": b"<x/>", "resources/a/b.txt": b"text", "empty/": b""}
@@ -124,7 +125,7 @@ def test_a_file_larger_than_declared_is_refused(tmp_path: Path) -> None:
     with Liar(path) as archive:
         (member,) = archive.infolist()
         with pytest.raises(FmuError, match="declared size, but is larger"):
-            archives._unpack_member(archive, member, folder, path)
+            archives._unpack_member(archive, member, folder, "a", path)
 
 
 def test_damage_is_one_line_and_leaves_nothing(tmp_path: Path) -> None:
@@ -200,3 +201,69 @@ def test_every_command_refuses_the_same_archives(
         assert not Path(out).exists()
     assert main(["check", str(fmu), "--out", out]) == 1
     assert "archive." in capsys.readouterr().out
+
+
+def folder_without_a_slash() -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo("resources")
+    info.external_attr = 0x10
+    return info
+
+
+PLAIN = {"modelDescription.xml": b"<x/>", "resources/a/b.txt": b"text"}
+ODD = {
+    "own folder": [("./", b"")],
+    "own folder without a slash": [(".", b"")],
+    "own folder of Windows": [(".\\", b"")],
+    "folders that are listed twice": [("resources/", b""), ("resources/", b""), ("resources/a/", b"")],
+    "folders with backslashes": [("resources\\", b""), ("resources\\a\\", b"")],
+    "folder by its attribute": [(folder_without_a_slash(), b"")],
+    "file twice": [("modelDescription.xml", b"<x/>")],
+    "file twice, with a dot": [("./modelDescription.xml", b"<x/>"), ("resources//a/./b.txt", b"text")],
+    "file twice, with a backslash": [("resources\\a\\b.txt", b"text")],
+}
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize("odd", ODD)
+@pytest.mark.parametrize("first", [True, False])
+def test_odd_names_that_are_harmless_are_read(tmp_path: Path, odd: str, first: bool) -> None:
+    entries = [*ODD[odd], *PLAIN.items()] if first else [*PLAIN.items(), *ODD[odd]]
+    unpack(pack(tmp_path / "a.zip", entries), tmp_path / "out")
+    assert tree(tmp_path / "out") == PLAIN
+
+
+@pytest.mark.parametrize("change", [("/", "\\"), ("", "./"), ("/", "//"), ("/", "/./")])
+def test_all_files_come_out_whatever_their_paths_look_like(tmp_path: Path, change: tuple[str, str]) -> None:
+    old, new = change
+    entries = [(name.replace(old, new) if old else new + name, content) for name, content in PLAIN.items()]
+    unpack(pack(tmp_path / "a.zip", entries), tmp_path / "out")
+    assert tree(tmp_path / "out") == PLAIN
+
+
+@pytest.mark.parametrize(
+    ("more", "text"),
+    [
+        ([("modelDescription.xml", b"<y/>")], "'modelDescription.xml' has two contents"),
+        ([("./modelDescription.xml", b"<y/>")], "'modelDescription.xml' has two contents"),
+        ([("resources\\a\\b.txt", b"tex")], "'resources/a/b.txt' has two contents"),
+        ([("resources", b"")], "'resources' is both"),
+        ([("resources/a/b.txt/", b"")], "'resources/a/b.txt' has two contents"),
+        ([("resources/a/b.txt/c", b"")], "'resources/a/b.txt' is both"),
+        ([("/", b"")], "must lie within the archive, but '/' does not"),
+    ],
+)
+def test_what_tools_would_take_differently_is_refused(tmp_path: Path, more, text: str) -> None:
+    with pytest.raises(FmuError, match=text):
+        unpack(pack(tmp_path / "a.zip", [*PLAIN.items(), *more]), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_same_checksum_is_not_the_same_content(tmp_path: Path) -> None:
+    path = pack(tmp_path / "a.zip", [("a", b"plumless"), ("./a", b"buckeroo")])  # both have the CRC 0x4ddb0c25
+    with zipfile.ZipFile(path) as archive:
+        assert len({info.CRC for info in archive.infolist()}) == 1
+    with pytest.raises(FmuError, match="'a' has two contents"):
+        unpack(path, tmp_path / "out")
