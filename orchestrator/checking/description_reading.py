@@ -78,7 +78,8 @@ def _variable(
     variability = element.get("variability", _variability(kind, causality, dialect))
     declared_initial = element.get("initial")
     default = None if kind == "Clock" else dialect.initial.get((causality, variability), (None,))[0]
-    clocks = element.get("clocks")
+    newer = element if dialect is FMI3 else etree.Element(element.tag)  # FMI 2.0 has none of this: the schema says so
+    clocks = newer.get("clocks")
     return DescribedVariable(
         element=element,
         place=place,
@@ -94,11 +95,11 @@ def _variable(
         own=own,
         starts=_starts(element, own, dialect),
         dimensions=tuple(
-            Dimension(integer(e.get("start")), integer(e.get("valueReference"))) for e in element.findall("Dimension")
+            Dimension(integer(e.get("start")), integer(e.get("valueReference"))) for e in newer.findall("Dimension")
         ),
         clocks=None if clocks is None else _integers(clocks),
-        previous=integer(element.get("previous")),
-        aliases=tuple(element.findall("Alias")),
+        previous=integer(newer.get("previous")),
+        aliases=tuple(newer.findall("Alias")),
     )
 
 

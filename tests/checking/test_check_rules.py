@@ -15,6 +15,7 @@ from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Finding, FmuFindings, order_findings
 from orchestrator.checking.formats.junit import as_junit
 from orchestrator.checking.formats.text import as_lines
+from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.layered import _read_csv
 from orchestrator.checking.policy import Policy
 from orchestrator.checking.rules import RULES
@@ -23,7 +24,7 @@ from orchestrator.checking.rules_structure import check_structure
 from orchestrator.checking.rules_variables import check_variables
 from orchestrator.checking.units import dimension_of
 from orchestrator.checking.verdict import judge
-from tests.support.c_fmu import have_compiler, model_description
+from tests.support.c_fmu import fmu_files, have_compiler, model_description, write_fmu
 from tools.rules_page import PAGE, page
 
 
@@ -195,3 +196,30 @@ def test_an_outcome_per_rule_says_what_was_run(tmp_path: Path) -> None:
     not_run = {o.rule for o in static.outcomes if o.outcome == "not run"}
     assert not_run == {o.rule for o in static.outcomes if RULES[o.rule].stage not in static.stages}
     assert {o.reason for o in static.outcomes if o.outcome == "not run"} == {"nothing is executed, as was asked"}
+
+
+NEWER = 'previous="0" clocks="0" intermediateUpdate="true" intervalVariability="constant" maxSize="1" priority="1"'
+WITHIN = '<Alias name="other"/><Dimension start="-1"/>'
+
+
+def test_what_is_of_fmi_3_in_a_description_of_2_is_told_by_the_schema_alone() -> None:
+    text = model_description()
+    plain = rules_of(text)
+    text = text.replace("<ScalarVariable ", f"<ScalarVariable {NEWER} ").replace(
+        "</ScalarVariable>", f"{WITHIN}</ScalarVariable>"
+    )
+    text = text.replace("<CoSimulation ", '<CoSimulation hasEventMode="false" needsExecutionTool="false" ')
+    text = text.replace("</ModelStructure>", '<ClockedState valueReference="0"/><EventIndicator/></ModelStructure>')
+    assert text.count("previous") > 5
+    root = etree.fromstring(text.encode())
+    assert rules_of(text) == plain
+    assert {f.rule for f in check_grammar(root, "2.0")} == {"schema.invalid"}
+
+
+@pytest.mark.skipif(not have_compiler(), reason="the FMU is built with a C compiler")
+def test_no_rule_speaks_of_a_version_that_it_is_not_for(tmp_path: Path) -> None:
+    text = model_description().replace("<ScalarVariable ", f"<ScalarVariable {NEWER} ")
+    path = write_fmu(tmp_path / "a.fmu", fmu_files() | {"modelDescription.xml": text.encode()})
+    findings = check_fmu(path, CheckOptions(static=True)).findings
+    assert [f.rule for f in findings if "2.0" not in RULES[f.rule].versions] == []
+    assert len(findings) <= 6  # one for each attribute: they are not in the schema
