@@ -1,33 +1,27 @@
 """Canonical zip archives: the same members always give the same bytes."""
 
-import os
-import tempfile
+import io
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from orchestrator.errors import FmuError
+from orchestrator.shared.output import write_whole
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def write_archive(path: Path, members: Mapping[str, bytes]) -> None:
     """Write ``members`` (name in the archive to content) sorted, with fixed dates and permissions, all or nothing."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name in sorted(members):
+            archive.writestr(_entry(name), members[name], zipfile.ZIP_DEFLATED, 9)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=".part", dir=path.parent)
+        write_whole(path, content.getvalue())
     except OSError as error:
         raise FmuError(f"cannot write {path}: {error.strerror}") from None
-    try:
-        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
-            for name in sorted(members):
-                archive.writestr(_entry(name), members[name], zipfile.ZIP_DEFLATED, 9)
-        os.chmod(part, 0o644)
-        os.replace(part, path)
-    except OSError as error:
-        raise FmuError(f"cannot write {path}: {error.strerror}") from None
-    finally:
-        Path(part).unlink(missing_ok=True)
 
 
 def _entry(name: str) -> zipfile.ZipInfo:

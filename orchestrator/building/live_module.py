@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from orchestrator.building.compilers import FLAGS, WEB_FLAGS, Compiler, compile_web_module, find_compiler
@@ -14,6 +15,7 @@ from orchestrator.building.translation.functions import translate
 from orchestrator.building.translation.program import Program
 from orchestrator.errors import FmuError
 from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.output import write_whole
 from pyfmu_sources import riccati
 
 MASTER = "live.c"
@@ -75,17 +77,9 @@ def live_module(names: Sequence[str], regulator: bool = False) -> bytes | None:
     except OSError:
         pass
     module = compile_web_module(compiler, _sources(names, regulator))
-    _keep(path, module)
+    with suppress(OSError):  # a full disk: it is made again next time
+        write_whole(path, module)
     return module
-
-
-def _keep(path: Path, module: bytes) -> None:
-    partial = path.with_suffix(".partial")
-    try:
-        partial.write_bytes(module)
-        partial.replace(path)
-    except OSError:  # a full disk: it is made again next time
-        partial.unlink(missing_ok=True)
 
 
 def _fingerprint(names: Sequence[str], regulator: bool, compiler: Compiler) -> str:

@@ -5,7 +5,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
@@ -26,6 +26,7 @@ from orchestrator.commands._trust import add_trust, positive
 from orchestrator.errors import FmuError, InputError, OutputError
 from orchestrator.shared.isolation.archives import ArchiveLimits
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
+from orchestrator.shared.output import write_whole
 from orchestrator.shared.results import as_plain
 
 _REPORTS: dict[str, tuple[str, Callable[[Sequence[Verdict]], str]]] = {
@@ -171,20 +172,19 @@ def _targets(args: argparse.Namespace) -> Iterator[tuple[str, Path]]:
 
 def _require_place(path: Path, option: str) -> None:
     """Refuse a file that cannot be written before the work starts, not after it."""
-    if path.is_dir() or not os.access(path.parent, os.W_OK):
-        reason = "a folder" if path.is_dir() else "in no folder that can be written"
+    special = path.exists() and not path.is_file()  # a pipe or a device would be replaced, not written to
+    if special or not os.access(path.parent, os.W_OK):
+        reason = (
+            "in no folder that can be written" if not special else "a folder" if path.is_dir() else "a pipe or a device"
+        )
         raise OutputError(f"`{option}` must be a file that can be written, but {path} is {reason}")
 
 
 def _write(path: Path, text: str, option: str) -> None:
     """Write a file whole or not at all."""
-    partial = path.with_name(f".{path.name}.partial")
     try:
-        partial.write_text(text, encoding="utf-8", errors="replace")
-        os.replace(partial, path)
+        write_whole(path, text.encode("utf-8", "replace"))
     except OSError as error:
-        with suppress(OSError):
-            partial.unlink()
         raise OutputError(
             f"`{option}` must be a file that can be written, but {path} is not: {error.strerror}"
         ) from None

@@ -30,7 +30,7 @@ from orchestrator.paired.native_loop import NativeLoop
 from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.cores import usable_cores
-from orchestrator.shared.output import write_text
+from orchestrator.shared.output import write_whole
 from orchestrator.shared.version import __version__
 
 Array = NDArray[np.float64]
@@ -159,7 +159,7 @@ def load_or_calibrate(
         progress(f"calibrating the {experiment.name} experiment at encoder noise {experiment.encoder_noise:g} rad")
     calibration = calibrate(experiment, settings)
     with contextlib.suppress(OSError):  # a full cache costs time, no result
-        write_text(path, calibration_text(calibration))
+        write_whole(path, calibration_text(calibration))
     return calibration
 
 

@@ -23,7 +23,7 @@ import pyfmu_sources
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.cores import cache_once
 from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
-from orchestrator.shared.output import write_text
+from orchestrator.shared.output import write_whole
 
 INLINED = ("rates", "elastic_torque", "motor_torque", "load_torque")
 """Functions whose call costs more than their body: every stage of every step makes it."""
@@ -88,7 +88,7 @@ def _copy_source(name: str) -> Path:
     except OSError:
         intact = False
     if not intact:
-        write_text(target, source.decode())
+        write_whole(target, source)
     return target
 
 

@@ -8,6 +8,7 @@ from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
 from orchestrator.reporting.pages import calibrate, check, diagnose, estimate, generic, inspect, simulate, sweep, thesis
 from orchestrator.reporting.source import ResultDocument, load
+from orchestrator.shared.output import write_whole
 from orchestrator.shared.source_tree import import_masters
 
 PAGE = "report.html"
@@ -62,11 +63,8 @@ def write_report(directory: Path, command: str | None = None) -> Path:
     """Write ``report.html`` into a result directory, whole or not at all, and return its path."""
     page = render(report_from_directory(directory, command))
     path = directory / PAGE
-    partial = directory / f".{PAGE}.partial"
     try:
-        partial.write_text(page, encoding="utf-8", errors="replace")  # names in hostile archives
-        partial.replace(path)
+        write_whole(path, page.encode("utf-8", "replace"))  # names in hostile archives
     except OSError as error:
-        partial.unlink(missing_ok=True)
         raise OutputError(f"cannot write {path}: {error.strerror}") from None
     return path

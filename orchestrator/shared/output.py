@@ -5,6 +5,7 @@ import errno
 import json
 import math
 import os
+import secrets
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -13,12 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import OutputError
-from orchestrator.shared.operating_system import alive
+from orchestrator.shared.operating_system import PLAIN_FILE, alive
 from orchestrator.shared.results import as_plain
 from orchestrator.shared.version import __version__
 
 STAGING = ".partial-"
 _PROBE = 1 << 16
+_LONGEST_PREFIX = 32  # letters: the name beside a file must fit where the file's own does
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by writes, which name no file
 
 
@@ -60,15 +62,20 @@ def _full(folder: Path) -> bool:
     return False
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write ``text``, in UTF-8, to ``path`` so that no reader ever sees a part of it."""
-    handle, part = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file, text in UTF-8, so that no reader ever sees a part of it, and through no link that lies there.
+
+    What is written first lies beside it under a name that nobody can know before.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    part = path.with_name(f".{path.name[:_LONGEST_PREFIX]}-{secrets.token_hex(8)}")
+    handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | PLAIN_FILE, 0o666)  # what others may is the umask's
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
         os.replace(part, path)
     except BaseException:
-        Path(part).unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
         raise
 
 

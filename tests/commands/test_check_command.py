@@ -1,6 +1,7 @@
 """The command ``check``: exit codes, files, what is executed and what is not."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -46,6 +47,28 @@ def test_an_error_gives_exit_code_1_and_all_formats_agree(tmp_path: Path, capsys
     assert json.loads(files["--json"].read_text(encoding="utf-8")) == results(tmp_path)
     suites = etree.parse(str(files["--junit"])).getroot()
     assert [s.get("failures") for s in suites] == ["1", "0"]
+
+
+def test_reports_are_written_through_no_link_and_over_no_device(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = build_c_fmu(tmp_path)
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+    for option in ("--json", "--junit", "--sarif", "--code-quality", "--write-baseline"):
+        target = tmp_path / f"f{option}"
+        target.with_name(f".{target.name}.partial").symlink_to(victim)
+        assert check(tmp_path, fmu, "--static", option, target) in (0, 1)
+        assert target.stat().st_size > 2
+    assert victim.read_text() == "precious"
+    os.mkfifo(tmp_path / "pipe")
+    for special, what in ((tmp_path / "pipe", "a pipe or a device"), (tmp_path, "a folder")):
+        capsys.readouterr()
+        assert check(tmp_path, fmu, "--static", "--json", special) == 2
+        assert (
+            capsys.readouterr().err == f"error: `--json` must be a file that can be written, but {special} is {what}\n"
+        )
+    assert (tmp_path / "pipe").is_fifo()
 
 
 def test_warnings_alone_give_exit_code_0(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator import __version__
 from orchestrator.errors import OutputError
-from orchestrator.shared.output import stage_output, write_result, write_text
+from orchestrator.shared.output import stage_output, write_result, write_whole
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -82,7 +82,7 @@ def test_text_is_replaced_at_once_and_never_seen_in_part(tmp_path, monkeypatch):
         replace(source, target)
 
     monkeypatch.setattr(os, "replace", watched)
-    write_text(path, "new" * 10_000)
+    write_whole(path, "new" * 10_000)
     assert replaced == [(path, "old", "new" * 10_000, tmp_path)]
     assert path.read_text() == "new" * 10_000
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
@@ -92,16 +92,45 @@ def test_text_that_cannot_be_written_leaves_the_old_one_and_nothing_else(tmp_pat
     path = tmp_path / "a.txt"
     path.write_text("old")
     with pytest.raises(UnicodeEncodeError):
-        write_text(path, "x\ud800")
+        write_whole(path, "x\ud800")
 
     def broken(source, target):
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr(os, "replace", broken)
     with pytest.raises(OSError, match="Input/output"):
-        write_text(path, "new")
+        write_whole(path, "new")
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_neither_links_nor_long_names_lead_elsewhere(tmp_path, monkeypatch):
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+    # Also where somebody could know what is taken by chance.
+    monkeypatch.setattr("orchestrator.shared.output.secrets.token_hex", lambda count: "0" * 2 * count)
+    for name in (".a.txt.partial", ".a.txt-0000000000000000", ".a.txt.part"):
+        (tmp_path / name).symlink_to(victim)
+    with pytest.raises(FileExistsError):
+        write_whole(tmp_path / "a.txt", "new")
+    (tmp_path / "b.txt").symlink_to(victim)
+    write_whole(tmp_path / "b.txt", "new")
+    assert (tmp_path / "b.txt").read_text() == "new"
+    assert not (tmp_path / "b.txt").is_symlink()
+    assert victim.read_text() == "precious"
+    for long in ("x" * 250, "\u00e9" * 125):
+        write_whole(tmp_path / long, b"new")
+        assert (tmp_path / long).read_bytes() == b"new"
+
+
+@pytest.mark.parametrize("mask", [0o022, 0o027, 0o077])
+def test_a_file_may_be_read_by_whom_the_umask_says(tmp_path, mask):
+    before = os.umask(mask)
+    try:
+        write_whole(tmp_path / "a", "x")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a").stat().st_mode & 0o777 == 0o666 & ~mask
 
 
 def test_results_are_published_with_their_folders_and_replace_old_ones(tmp_path):
