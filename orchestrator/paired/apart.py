@@ -1,7 +1,6 @@
 """One paired run in a child process, so that its time can be limited. The FMUs are ours: nothing is kept from them."""
 
 import math
-import pickle
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -34,16 +33,15 @@ def run_pair_within(
     try:
         with Jail("orchestrator.paired.apart:open_run", argument, limits=limits, walls=False) as jail:
             jail.start(time_limit)
-            found = pickle.loads(jail.call(None, most=_BOUNDLESS))
+            found: PairRun = jail.call(None, most=_BOUNDLESS, answer=PairRun)
     except ChildError as error:
         if error.reason == "time":
             text = f"the run must take at most {time_limit:g} s (`time_limit`), but takes longer"
             raise SimulationError(text, "time_limit") from None
         raise SimulationError(f"the run must come to its end, but {error}") from None
-    assert isinstance(found, PairRun)
     return found
 
 
-def open_run(argument: tuple[Any, ...]) -> Callable[[Any], bytes]:
+def open_run(argument: tuple[Any, ...]) -> Callable[[Any], PairRun]:
     """Return a handler that does the run."""
-    return lambda _: pickle.dumps(run_pair(*argument))
+    return lambda _: run_pair(*argument)

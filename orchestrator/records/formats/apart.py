@@ -11,7 +11,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -66,10 +65,10 @@ class _Apart(RecordSource):
 
     def _ask(self, places: list[int] | None, kind: Any) -> Any:
         try:
-            return msgspec.convert(self._jail.call(places, most=2 * MAXIMUM_BYTES), kind)
+            return self._jail.call(places, most=2 * MAXIMUM_BYTES, answer=kind)
         except RecordError as error:
             raise RecordError(str(error).replace(str(self._file), str(self._shown))) from None
-        except (ChildError, msgspec.ValidationError) as error:
+        except ChildError as error:
             raise self._failure(str(error)) from None
 
     def _receive(self, kind: str, values: Any) -> NDArray[Any]:

@@ -5,8 +5,9 @@
 
 In the child, ``opened(argument)`` is called once, after the walls are up, and returns the handler; every ``call`` then
 runs ``handler(request)``. Arguments and requests are pickled (they go from the trusted to the untrusted side);
-answers are plain data and arrays of float64, int64 and bool (see ``wire``). An ``OrchestratorError`` of the handler is
-raised again by ``call``, and the child lives on; any other exception becomes a ``SimulationError``.
+answers are plain data and arrays of float64, int64 and bool (see ``wire``), of the type that is asked for. An
+``OrchestratorError`` of the handler is raised again by ``call``, and the child lives on; any other exception becomes a
+``SimulationError``.
 
 What holds for the child, from before the first foreign byte is loaded:
  - it has a session and process group of its own, no terminal, an environment without secrets, and dies with the
@@ -93,6 +94,7 @@ class Jail:
         self._given = sum(usage(folder, _MOST_GIVEN)[0] for folder in write)
         self._strays = Strays(adopt and not (walls and support().seccomp))
         self._process: subprocess.Popen[bytes] | None = None
+        self._interruption: BaseException | None = None
         self._root = Scratch("jail")
         self._usage_time = 0.0
         try:
@@ -134,14 +136,19 @@ class Jail:
                 self.walls = Walls(*found)
             self.started = True
 
-    def call(self, request: Any, time: float | None = None, most: int = MOST_BYTES) -> Any:
+    def call(self, request: Any, time: float | None = None, most: int = MOST_BYTES, answer: Any = Any) -> Any:
         """Return the handler's answer to ``request``.
 
         Args:
             time: seconds until the child is killed (default: the limit's).
+            answer: its type, of msgspec's types and arrays (default: any); an answer of another ends the child.
         """
         self.start()
-        return self._exchange(pickle.dumps(request), self.limits.time if time is None else time, most)
+        found = self._exchange(pickle.dumps(request), self.limits.time if time is None else time, most)
+        try:
+            return wire.convert(found, answer)
+        except wire.WireError as error:
+            raise self._forgery_error(str(error)) from None
 
     @property
     def pid(self) -> int:
@@ -189,6 +196,8 @@ class Jail:
     # ------------------------------------------------------------------------------------------------------------
 
     def _exchange(self, body: bytes, limit: float, most: int) -> Any:
+        if self._interruption is not None:  # what cleans up after it must not put another error in its place
+            raise self._interruption
         if self._process is None or self._process.returncode is not None:
             raise ChildError("the process has ended before", "exit")
         if wire.is_pending(self._link):
@@ -221,7 +230,10 @@ class Jail:
             raise self._end_error() from None
         except wire.WireError as error:
             raise self._forgery_error(str(error)) from None
-        except BaseException:
+        except ChildError:
+            raise
+        except BaseException as error:
+            self._interruption = error
             self._kill()
             raise
 

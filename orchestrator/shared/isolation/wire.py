@@ -13,7 +13,7 @@ import struct
 import sys
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, get_args
 
 import msgspec
 
@@ -48,6 +48,21 @@ def decode(data: bytes) -> Any:
         return msgspec.msgpack.decode(data, ext_hook=_unpack)
     except (msgspec.DecodeError, ValueError, RecursionError, OverflowError, struct.error) as error:
         raise WireError(f"a message must be plain data, but is not: {error}") from None
+
+
+def convert(value: Any, kind: Any) -> Any:
+    """Return decoded data as a type: one of msgspec's, in which ``NDArray[T]`` is an array of such numbers."""
+    try:
+        return msgspec.convert(value, kind, dec_hook=_as_array)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise WireError(f"its answer must be of another type: {error}") from None
+
+
+def _as_array(kind: Any, value: Any) -> Any:
+    (number,) = get_args(get_args(kind)[1])  # of ``ndarray[shape, dtype[number]]``
+    if hasattr(value, "dtype") and value.dtype == number:
+        return value
+    raise ValueError(f"Expected `array of {number.__name__}`, got `{type(value).__name__}`")
 
 
 def _pack(value: Any) -> Any:

@@ -1,17 +1,22 @@
 """The jail: a channel that nothing runs from, limits, walls of the kernel, and nothing left."""
 
 import os
+import pickle
+import re
 import select
 import socket
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from orchestrator.errors import ChildError, ScenarioError, SimulationError
+from orchestrator.shared.isolation import jail as jail_module
 from orchestrator.shared.isolation.jail import Jail, Limits
 from orchestrator.shared.isolation.scratch import PREFIX, Scratch
 from orchestrator.shared.isolation.walls import support
@@ -37,6 +42,56 @@ def test_answers_come_back_with_their_types() -> None:
     with Jail(ENTRY, {"a": 1}, limits=QUICK) as jail:
         assert jail.call(["echo", [1, 2.5, None, "é", b"\0", True]]) == [{"a": 1}, [1, 2.5, None, "é", b"\0", True]]
         assert np.array_equal(jail.call(["array", 6]), [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
+
+
+@dataclass(frozen=True)
+class Row:
+    name: str
+    values: NDArray[np.float64]
+    count: int | None = None
+
+
+def test_an_answer_is_of_the_type_that_is_asked_for_or_ends_the_child() -> None:
+    good = {"name": "a", "values": np.arange(2.0)}
+    with Jail(ENTRY, limits=QUICK) as jail:
+        (_, row) = jail.call(["echo", good], answer=tuple[None, Row])
+        assert (row.name, row.values.tolist(), row.count) == ("a", [0.0, 1.0], None)
+    wrong = [{"name": 1}, {"values": [0.0, 1.0]}, {"values": np.arange(2)}, {"values": np.arange(2.0) > 0.0}]
+    for change in [*wrong, {"values": None}, {"count": 0.5}]:
+        with Jail(ENTRY, limits=QUICK) as jail:
+            with pytest.raises(ChildError, match="its answer must be of another type") as raised:
+                jail.call(["echo", good | change], answer=tuple[None, Row])
+            assert raised.value.reason == "protocol"
+            assert not Path(f"/proc/{jail.pid}").exists()
+
+
+def test_pickles_of_a_child_are_bytes_and_nothing_else() -> None:
+    with Jail(ENTRY, limits=QUICK) as jail, pytest.raises(ChildError, match="of another type"):
+        jail.call(["echo", pickle.dumps(Row("a", np.arange(2.0)))], answer=tuple[None, Row])
+    folder = Path(jail_module.__file__).parents[2]
+    found = {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*.py")
+        if re.search(r"pickle\.loads?\(|Unpickler|multiprocessing|shelve|marshal\.loads?|allow_pickle=True",
+                     path.read_text(encoding="utf-8"))
+    }  # fmt: skip
+    # What the parent sent, and what the user's own cache holds; see docs/security.md.
+    own = {"shared/isolation/inmate.py", "engine/lane.py", "engine/worker.py", "engine/cluster.py"}
+    assert found == own | {"shared/numba_cache.py"}
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError()])
+def test_what_cleans_up_after_an_interruption_does_not_hide_it(error: BaseException) -> None:
+    def interrupt() -> None:
+        raise error
+
+    with Jail(ENTRY, limits=QUICK) as jail:
+        jail.start()
+        jail._tick = interrupt  # type: ignore[method-assign]
+        for request in (["sleep", 60.0], ["echo", 1]):  # the second as an instance is freed, whatever happened
+            with pytest.raises(type(error)):
+                jail.call(request)
+        assert not Path(f"/proc/{jail.pid}").exists()
 
 
 def test_errors_come_back_as_they_are_and_the_child_lives() -> None:
