@@ -5,9 +5,12 @@ import importlib
 import os
 import sys
 
+from orchestrator.shared.stopping import end_on_signals, stop_in_words, stop_on_signals
+
 
 def run(module: str = "orchestrator.cli") -> None:
     """Run a command line and end the process with its exit code."""
+    stop_on_signals()
     for name, number in (("stdout", 1), ("stderr", 2)):
         if getattr(sys, name) is None:  # closed by the caller: what is written then goes nowhere
             null = os.open(os.devnull, os.O_WRONLY)
@@ -19,14 +22,15 @@ def run(module: str = "orchestrator.cli") -> None:
         code = importlib.import_module(module).main()
         sys.stdout.flush()
     except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        code = 130
+        word, code = stop_in_words()
+        sys.stderr.write(f"{word}\n")
     except BrokenPipeError:
         code = 1
     except (OSError, ImportError, MemoryError) as error:
         text = " ".join(str(error).split())[:300] or "out of memory"
         sys.stderr.write(f"error: {text}\n")
         code = 1
+    end_on_signals()
     try:
         sys.stdout.flush()
     except OSError:

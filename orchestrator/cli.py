@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 done, 1 a check or a run found problems, 2 bad input.
 
     Returns:
-        The exit code; 130 after Ctrl-C.
+        The exit code; see ``exit_code`` for those after signals.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a home that cannot be written is no news to the user

@@ -9,13 +9,14 @@ from typing import Any, TextIO, cast
 from orchestrator.commands._lines import fold
 from orchestrator.commands._parser import one_line, word_error
 from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.shared.stopping import stop_in_words
 
 
 def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
     """Run a program's work and return its exit code: that of the work, 2 for bad input, 1 for other errors.
 
     Returns:
-        The exit code; 130 after Ctrl-C.
+        The exit code; 130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of any script, whatever the terminal's encoding
@@ -29,8 +30,9 @@ def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
         return 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
         text = word_error(interruption, flags)
-        _say(f"interrupted: {text}" if text else "interrupted")
-        return 130
+        word, code = stop_in_words()
+        _say(f"{word}: {text}" if text else word)
+        return code
     except BrokenPipeError:
         raise  # whoever read the output has gone: the program ends without a word
     except (OSError, MemoryError) as error:  # no descriptors, no memory, a full disk behind standard output

@@ -35,6 +35,7 @@ from orchestrator.master.protocol import (
     Value,
 )
 from orchestrator.master.result import RunRemark
+from orchestrator.shared.stopping import stop_was_asked
 
 SETS_KEPT = 16
 """Lists of names whose call is kept: runs that differ in values alone set the same names."""
@@ -125,7 +126,7 @@ class FmuSlave(Slave):
                 self._inbox.warn(f"{what}{moment}")
             return
         self._worst = max(self._worst, status if status < PENDING else FATAL)
-        if "KeyboardInterrupt" in self._last_message():  # Ctrl-C reached the Python inside the FMU
+        if stop_was_asked() or "KeyboardInterrupt" in self._last_message():  # it reached the Python inside the FMU
             raise KeyboardInterrupt
         label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
         text = f"{self.name}: {what}{moment} returned {label}{self._last_message()}"
