@@ -73,7 +73,7 @@ _prepare = lru_cache(maxsize=256)(drivetrain.prepare)
 
 
 def _variable(parameter: Parameter) -> FmuVariable:
-    name, unit, default, minimum, maximum, description = parameter
+    name, unit, default, minimum, maximum, description, _ = parameter
     if name == "backlash_model":
         return FmuVariable(
             name,

@@ -67,6 +67,10 @@ def test_a_slave_of_forty_lines_is_native_in_one_command(project: Path) -> None:
         ("    z = y\n    z = (y, u)\n    return y", "must keep its type"),
         ("    import os\n    return float(len(os.sep))", "is outside the subset"),
         ("    return filtered(y, u, time_constant, step)", "must not call itself"),
+        (
+            "    for n in MANY:\n        if n > u:\n            break\n    return y\n\n\nMANY = (1, 2)",
+            "no way out of it",
+        ),
         ("    if y > u:\n        return y", "must end with `return` on every path"),
     ],
 )

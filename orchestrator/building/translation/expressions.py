@@ -268,6 +268,9 @@ def _tuple(scope: Scope, node: ast.Tuple, wanted: Kind | None) -> Code:
 def _subscript(scope: Scope, node: ast.Subscript, wanted: Kind | None) -> Code:
     if isinstance(node.slice, ast.Slice):
         scope.refuse(node, "slices are outside the subset")
+    whole, place = constant_value(scope, node.value), interval(scope, node.slice)
+    if isinstance(whole, tuple) and place is not None and place[0] == place[1] and 0 <= place[0] < len(whole):
+        return constant(scope, whole[place[0]], node)
     base = scope.expression(node.value)
     kind = base.kind
     if isinstance(kind, Tuple) and not kind.uniform:

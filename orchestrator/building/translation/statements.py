@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ast
+import copy
 from collections.abc import Callable
 from typing import Any
 
 from orchestrator.building.translation.assignments import translate_annotated, translate_assignment, translate_augmented
 from orchestrator.building.translation.building_tuples import with_loop
 from orchestrator.building.translation.calls import message
-from orchestrator.building.translation.constants import interval
+from orchestrator.building.translation.constants import constant_value, interval
 from orchestrator.building.translation.kinds import NOTHING, WHOLE, Items, Tuple, describe
 from orchestrator.building.translation.scope import PRIMARY, SUM, Code, Scope, item_of, member
 
@@ -188,6 +189,9 @@ def _stop(scope: Scope, node: ast.For, end: ast.expr) -> str:
 
 def _over_items(scope: Scope, node: ast.For) -> list[str]:
     """``for item in list`` and ``for n, item in enumerate(list)``."""
+    numbers = constant_value(scope, node.iter)
+    if isinstance(numbers, tuple) and all(type(number) is int for number in numbers):
+        return _unroll(scope, node, numbers)
     counted = isinstance(node.iter, ast.Call) and ast.unparse(node.iter.func) == "enumerate"
     source = scope.expression(node.iter.args[0] if counted and isinstance(node.iter, ast.Call) else node.iter)
     target: ast.expr = node.target
@@ -219,6 +223,31 @@ def _over_items(scope: Scope, node: ast.For) -> list[str]:
     for name in names:
         _leave(scope, name)
     return [f"for (int64_t {index} = 0; {index} < {length}{stopped}; {index}++) {{", *_indent(body), "}"]
+
+
+def _unroll(scope: Scope, node: ast.For, numbers: tuple[int, ...]) -> list[str]:
+    """``for n in NUMBERS``, whole numbers that the module holds: the body once for each."""
+    name = node.target.id if isinstance(node.target, ast.Name) else ""
+    inner = [item for line in node.body for item in ast.walk(line)]
+    stored = {item.id for item in inner if isinstance(item, ast.Name) and isinstance(item.ctx, ast.Store)}
+    if not name or name in stored or any(isinstance(item, ast.Break | ast.Continue) for item in inner):
+        scope.refuse(node, "a loop over constants must have one variable that only the loop sets, and no way out of it")
+    lines: list[str] = []
+    for number in numbers:
+        for line in node.body:
+            lines += block(scope, [_Fixed(name, number).visit(copy.deepcopy(line))])
+    return lines
+
+
+class _Fixed(ast.NodeTransformer):
+    """A statement with a number in the place of a name."""
+
+    def __init__(self, name: str, number: int) -> None:
+        self._name, self._number = name, number
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """Return the number for the name."""
+        return ast.copy_location(ast.Constant(self._number), node) if node.id == self._name else node
 
 
 def _item_lines(scope: Scope, node: ast.For, target: ast.expr, value: Code) -> list[str]:
