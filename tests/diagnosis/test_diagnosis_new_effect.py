@@ -25,8 +25,8 @@ print(found.verdict, effect.name, off < 0.005, len(found.graded(Grade.LIKELY)))
 """
 
 
-def apply(edit: str, root: Path) -> None:
-    """Make one edit of the page: a line that says where, then what to insert."""
+def apply(edit: str, root: Path) -> Path:
+    """Make one edit of the page, a line that says where, then what to insert; return the file."""
     head, _, text = edit.partition("\n")
     match = re.fullmatch(r'# (\S+): (at the end|after "(.*)")', head)
     assert match, head
@@ -35,6 +35,7 @@ def apply(edit: str, root: Path) -> None:
     at = len(lines) if match[2] == "at the end" else 1 + next(n for n, line in enumerate(lines) if match[3] in line)
     lines.insert(at, text)
     path.write_text("".join(lines))
+    return path
 
 
 @pytest.mark.slow
@@ -44,7 +45,6 @@ def test_worked_example_adds_an_effect(tmp_path: Path) -> None:
     start, stop = page.index("## Adding an effect"), page.index("## Adding a plant")
     edits = re.findall(r"```python\n(.*?)```", page[start:stop], re.DOTALL)
     assert len(edits) == 7
-    for edit in edits:
-        apply(edit, tmp_path)
+    assert len({apply(edit, tmp_path) for edit in edits}) == 3
     (tmp_path / "model.toml").write_text(axis_record.MODEL)
     assert run_in_copy(PROGRAM, tmp_path).split() == ["effects", "fan", "True", "1"]
