@@ -1,9 +1,9 @@
 """Steps that an FMU discards, done in shorter ones: from a saved state, else from where the FMU says that it came to.
 
-Both are what FMI 2.0 (4.2.2, ``fmi2DoStep``) allows after ``fmi2Discard``.
+Both are what FMI 2.0 (4.2.2, ``fmi2DoStep``) allows after ``fmi2Discard``; in FMI 3.0 it is ``fmi3DoStep``.
 """
 
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from orchestrator.master.protocol import ModelInterface, RunEndedError, StepDiscardedError
 from orchestrator.master.result import RunRemark
@@ -13,6 +13,7 @@ SMALLEST = 2.0**-20
 
 
 class _Stepped(Protocol):
+    PREFIX: ClassVar[str]
     name: str
     model: ModelInterface
 
@@ -53,7 +54,7 @@ class ShorterSteps:
     def take_remarks(self) -> list[RunRemark]:
         """Return how many communication steps were done in shorter ones, and forget it."""
         count, self._steps = self._steps, 0
-        text = f"fmi2DoStep at t = {self._first:g} s returned Discard"
+        text = f"{self._slave.PREFIX}DoStep at t = {self._first:g} s returned Discard"
         done = f"done in shorter steps, the least of {self._least:g} s"
         return [RunRemark(self._slave.name, f"{text}: {done}", count)] if count else []
 

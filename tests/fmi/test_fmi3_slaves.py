@@ -175,7 +175,8 @@ def test_steps_that_are_discarded_are_done_in_shorter_ones(tmp_path: Path, step:
     result = simulate(scenario(tmp_path, f"DISCARDS_ABOVE={0.6 * step}", step=step, saves=saves))
     assert result["a.y[1]"][-1] == pytest.approx(2.0)
     (remark,) = result.run.remarks
-    assert (remark.count, "returned Discard: done in shorter steps" in remark.text) == (round(1.0 / step), True)
+    assert remark.count == round(1.0 / step)
+    assert remark.text.startswith("fmi3DoStep at t = 0 s returned Discard: done in shorter steps")
 
 
 @pytest.mark.parametrize("algorithm", ["jacobi", "iterated", "adaptive"])
