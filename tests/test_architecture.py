@@ -230,3 +230,8 @@ def test_rooms_keep_their_private_names():
             if words[0] == "orchestrator" and private and room(words) != own:
                 wrong.append(f"{path.relative_to(ROOT)} imports {name}")
     assert not wrong
+
+
+def test_no_test_reads_a_place_of_one_machine():
+    named = re.compile(r"""Path\(f?["']/(home|root|srv|Users|work)\b""")
+    assert [path for path in (ROOT / "tests").rglob("*.py") if named.search(path.read_text(encoding="utf-8"))] == []

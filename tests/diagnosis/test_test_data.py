@@ -14,7 +14,6 @@ from tests.support.independent_plant import make_record
 
 ROOM = Path(__file__).resolve().parents[2] / "orchestrator"
 OPENER = ROOM / "diagnosis" / "report" / "open_test_data.py"
-DEFINITION = ROOM / "diagnosis" / "data" / "test_data.py"
 HELD = {"_records", "_first_rows"}
 
 

@@ -9,9 +9,9 @@ from orchestrator.api.simulate import simulate
 from orchestrator.errors import ConnectionMismatchError, ScenarioError
 from tests.support.answers_fmu import build_answers_fmu
 from tests.support.c_fmu import have_compiler
+from tests.support.shared_inputs import shared_input
 
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
-SHARED = Path("/work/shared/data/reports/09-tables-and-discrete")
 HEAD = (
     'stop = 1.0\nrecord = ["a.x", "a.mode", "a.on"]\n[master]\nstep = 0.1\nalgorithm = "{}"\n'
     '[instances.a]\nfmu = "Answers.fmu"\n[[sources]]\nto = "a.u"\nkind = "constant"\nvalue = 1.0\n'
@@ -89,9 +89,8 @@ def test_a_string_is_given_where_the_error_says(tmp_path: Path) -> None:
     assert simulate(path)["a.x"][-1] == pytest.approx(2.0 + 4)
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="the shared inputs are not here")
 @pytest.mark.parametrize(
     ("name", "last"), [("t11_integer", 10.0), ("t12_boolean", 1000.0), ("t14_integer_constant", 20.0)]
 )
 def test_shared_inputs(name: str, last: float) -> None:
-    assert simulate(SHARED / f"{name}.toml")["s.y"][-1] == last
+    assert simulate(shared_input(f"09-tables-and-discrete/{name}.toml"))["s.y"][-1] == last

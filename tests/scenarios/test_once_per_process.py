@@ -10,9 +10,9 @@ from orchestrator.api.simulate import simulate
 from orchestrator.errors import OrchestratorError
 from tests.support.answers_fmu import build_answers_fmu
 from tests.support.c_fmu import have_compiler
+from tests.support.shared_inputs import shared_input
 
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
-SHARED = Path("/work/shared/data/reports/16-once-per-process/two.toml")
 
 
 def scenario(folder: Path, *macros: str, once: bool = True, **kind: bool) -> Path:
@@ -62,6 +62,5 @@ def test_what_a_sweep_says_of_it_works(tmp_path: Path) -> None:
     assert simulate(path).steps == 20
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="the shared inputs are not here")
 def test_shared_input() -> None:
-    assert simulate(SHARED).steps == 100
+    assert simulate(shared_input("16-once-per-process/two.toml")).steps == 100

@@ -10,9 +10,9 @@ from orchestrator.api.simulate import simulate
 from orchestrator.errors import ConnectionMismatchError, ScenarioError
 from tests.support.answers_fmu import build_answers_fmu
 from tests.support.c_fmu import have_compiler
+from tests.support.shared_inputs import shared_input
 
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
-SHARED = Path("/work/shared/data/reports/06-ssp-system-level")
 SPACES = "".join(
     f' xmlns:{key}="http://ssp-standard.org/SSP1/SystemStructure{name}"'
     for key, name in (
@@ -207,16 +207,16 @@ def test_the_step_of_omsimulators_annotation(tmp_path: Path) -> None:
     assert simulate(package(tmp_path, top, None), step=0.5).steps == 2
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="the shared inputs are not here")
 @pytest.mark.parametrize(
     ("name", "signal", "last"),
     [("01_in_deg", "a.x", 0.0349066), ("02_out_deg", "OUT", 114.592), ("04_component_deg", "a.x", 2.0),
      ("05_system_parameter", "a.x", 6.0), ("06_inner_parameter", "inner/a.x", 8.0), ("11_mm_in_ssv", "a.y", 4000.25)],
 )  # fmt: skip
 def test_shared_inputs(name: str, signal: str, last: float) -> None:
-    assert simulate(SHARED / f"{name}.ssp", inputs={"IN": 2.0})[signal][-1] == pytest.approx(last, rel=1e-5)
+    assert simulate(shared_input(f"06-ssp-system-level/{name}.ssp"), inputs={"IN": 2.0})[signal][-1] == pytest.approx(
+        last, rel=1e-5
+    )
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="the shared inputs are not here")
 def test_the_shared_step() -> None:
-    assert simulate(SHARED / "10_oms_step.ssp", inputs={"IN": 2.0}).steps == 20
+    assert simulate(shared_input("06-ssp-system-level/10_oms_step.ssp"), inputs={"IN": 2.0}).steps == 20

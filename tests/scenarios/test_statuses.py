@@ -14,9 +14,9 @@ from orchestrator.errors import SlaveError
 from orchestrator.scenarios.scenario import load_scenario
 from tests.support.answers_fmu import build_answers_fmu
 from tests.support.c_fmu import have_compiler
+from tests.support.shared_inputs import shared_input
 
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
-SHARED = Path("/work/shared/data/reports/07-fmu-statuses")
 
 
 def scenario(folder: Path, *macros: str, algorithm: str = "gauss_seidel", step: float = 0.01, **more: bool) -> Path:
@@ -157,13 +157,12 @@ def test_each_run_of_a_sweep_has_remarks_of_its_own(tmp_path: Path) -> None:
     assert all("ended the run at t = 0.7 s" in row.outcome.values[-1] for row in result.rows())
 
 
-@pytest.mark.skipif(not SHARED.exists(), reason="the shared inputs are not here")
 @pytest.mark.parametrize(
     ("name", "last", "said"),
     [("01", 0.42, "returned Warning: communication point"), ("02", 2.0, "(100 times)"), ("03", 2.0, "table ended"),
      ("05", 1.4, "ended the run at t = 0.7 s"), ("07", 1.0, "(51 times)")],
 )  # fmt: skip
 def test_shared_inputs(name: str, last: float, said: str) -> None:
-    result = simulate(SHARED / f"{name}.toml")
+    result = simulate(shared_input(f"07-fmu-statuses/{name}.toml"))
     assert result["a.x"][-1] == pytest.approx(last)
     assert said in str(result.run.remarks[0])
