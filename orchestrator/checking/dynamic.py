@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 from pathlib import Path
 
 from orchestrator.checking.archive import FmuFiles
@@ -52,6 +53,7 @@ PROBES: dict[Version, tuple[str, ...]] = {
     "3.0": tuple(_PROBES),
 }
 _MOST_FINDINGS = 10_000
+_ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,16}\b")
 
 
 def obstacle(d: Description, files: FmuFiles) -> str:
@@ -124,7 +126,7 @@ class _Watcher:
         """The findings of one child."""
         before = _snapshot(self.fmu)
         with Process(self._start) as process:
-            library = Library(process, job.version, job.variables)
+            library = Library(process, job.version, job.variables, self._add)
             try:
                 self._probes(library, job, names)
             except ChildError as error:
@@ -162,7 +164,11 @@ class _Watcher:
             self.stages[self.probe] = ""
 
     def _add(self, rule: str, message: str, path: str = "", when: str = "") -> None:
-        """Take a finding, unless the same was found before; ``when`` is the first time that it was."""
+        """Take a finding, unless the same was found before; ``when`` is the first time that it was.
+
+        What differs from run to run is left out, so that a baseline knows the finding again: the folder, addresses.
+        """
+        message = _ADDRESS.sub("0x...", message.replace(f"{self.fmu}/", ""))
         if (rule, message) not in self._said and len(self.findings) < _MOST_FINDINGS:
             self._said.add((rule, message))
             self.findings.append(Finding(rule, path or f"({self.interface}{self.probe})", f"{message} {when}".rstrip()))

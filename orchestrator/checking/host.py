@@ -53,6 +53,14 @@ def open_host(_: Any) -> Callable[[Any], Any]:
     return lambda request: getattr(host, request[0])(*request[1:])
 
 
+def _describe_left(error: SystemError) -> str:
+    """The exception that a function of the library left in this thread."""
+    left: BaseException = error.__cause__ or error
+    while left.__cause__ is not None:
+        left = left.__cause__
+    return f"the Python exception {type(left).__name__}: {left}"[:200]
+
+
 class Host:
     """One loaded library, its instances and saved states by number."""
 
@@ -64,6 +72,7 @@ class Host:
         self._messages: list[str] = []
         self._errors = 0
         self._function = ""
+        self._left = ""
         self._updates: list[list[Any]] = []
         self._plan: list[Any] = [0, [], [], [], -1]
         self._locks = 0
@@ -104,7 +113,7 @@ class Host:
 
     def text(self, function: str) -> str | None:
         """Call a function without arguments that returns a text; None: a null pointer."""
-        value = getattr(self._handle, function)()
+        value = self._foreign(function)
         return None if value is None else value[:_LONGEST_TEXT].decode("utf-8", "replace")
 
     def instantiate_2(self, name: str, kind: int, guid: str, resources: str) -> list[Any]:
@@ -120,9 +129,8 @@ class Host:
         allocate, free = ctypes.cast(memory.calloc, c_void_p), ctypes.cast(memory.free, c_void_p)
         callbacks = _Callbacks(self._logger, allocate, free, None, None)
         self._messages = []
-        component = self._handle.fmi2Instantiate(
-            name.encode(), kind, guid.encode(), resources.encode(), ctypes.byref(callbacks), 0, 1
-        )
+        head = (name.encode(), kind, guid.encode(), resources.encode())
+        component = self._foreign("fmi2Instantiate", *head, ctypes.byref(callbacks), 0, 1)
         return self._make(component, callbacks)
 
     def instantiate_3(
@@ -149,7 +157,7 @@ class Host:
             rest = (wanted,)
         elif function.endswith("ScheduledExecution"):
             rest = (self._clock_update, self._lock, self._unlock)
-        component = getattr(self._handle, function)(*head, c_void_p(), self._log3, *rest)
+        component = self._foreign(function, *head, c_void_p(), self._log3, *rest)
         return self._make(component, rest)
 
     def _make(self, component: int | None, number: Any) -> list[Any]:
@@ -161,7 +169,32 @@ class Host:
 
     def free(self, instance: int, function: str) -> None:
         """Free an instance."""
-        getattr(self._handle, function)(self._instances[instance][0])
+        self._foreign(function, self._instances[instance][0])
+
+    def _foreign(self, function: str, *arguments: Any) -> Any:
+        """Call a function of the library; None where it leaves an exception of Python, which is taken for a message."""
+        try:
+            return getattr(self._handle, function)(*arguments)
+        except SystemError as error:
+            self._take(_describe_left(error))
+            return None
+
+    def _status(self, function: str, *arguments: Any) -> int:
+        """Call a function that returns a status, and take note of an exception of Python that it leaves behind.
+
+        An FMU that runs Python may leave one in this thread. The interpreter would raise it here and drop the status,
+        so the status is taken before.
+        """
+        returned: list[int] = []
+        call = getattr(self._handle, function)
+        call.restype = returned.append
+        try:
+            call(*arguments)
+        except SystemError as error:
+            if not returned:
+                raise
+            self._left = _describe_left(error)
+        return returned[0]
 
     def plan(self, instance: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:
         """Say what to do in intermediate updates.
@@ -197,19 +230,21 @@ class Host:
     def _access(self, function: str, component: c_void_p, references: list[int], buffer: Any) -> int:
         numbers = (c_uint * len(references))(*references)
         size = c_size_t(len(buffer))
-        return int(getattr(self._handle, function)(component, numbers, c_size_t(len(references)), buffer, size))
+        return self._status(function, component, numbers, c_size_t(len(references)), buffer, size)
 
     def call(self, instance: int, function: str, arguments: list[Any]) -> list[Any]:
         """Call a function.
 
         Returns:
-            Status, what the output arguments hold, what was logged, and how many of that as errors.
+            Status, what the output arguments hold, what was logged, how many of that as errors, and the exception of
+            Python that was left behind.
         """
-        self._messages, self._errors, self._function = [], 0, function
+        self._messages, self._errors, self._function, self._left = [], 0, function, ""
         made = [self._argument(*a) for a in arguments]
         values = [value for group, _ in made for value in group]
-        status = getattr(self._handle, function)(self._instances[instance][0], *values)
-        return [int(status), [read() for _, read in made if read is not None], self._messages, self._errors]
+        status = self._status(function, self._instances[instance][0], *values)
+        found = [read() for _, read in made if read is not None]
+        return [status, found, self._messages, self._errors, self._left]
 
     def calls(self, instance: int, requests: list[list[Any]]) -> list[Any]:
         """Call several functions, up to the first that returns neither OK nor Warning.

@@ -11,6 +11,7 @@ import pytest
 from orchestrator.checking.check import check_fmu
 from orchestrator.errors import FmuError
 from orchestrator.fmi.model_description import read_description
+from tests.support.ball3 import ball_files
 from tests.support.broken_archives import pack
 from tests.support.broken_fmus import QUICK
 from tests.support.c_fmu import LIBRARY, fmu_files, have_compiler, write_fmu
@@ -159,3 +160,31 @@ def test_two_contents_of_one_path_are_refused(name: str, tmp_path: Path) -> None
     assert not report.executed
     with pytest.raises(FmuError, match="has two contents"):
         read_description(path)
+
+
+@pytest.mark.parametrize("behaviour", ["logs_address", "missing_function", "undefined_symbol"])
+def test_findings_are_the_same_in_each_run_so_that_a_baseline_knows_them(behaviour: str, tmp_path: Path) -> None:
+    path = write_fmu(tmp_path / "a.fmu", fmu_files(behaviour))
+    first, second = (check_fmu(path, QUICK).findings for _ in range(2))
+    assert first == second
+    text = " ".join(f.message for f in first)
+    assert str(tmp_path) not in text
+    assert "/fmu/" not in text
+    assert behaviour != "logs_address" or "<Slave object at 0x...> cannot go on" in text
+
+
+def test_an_exception_of_python_that_a_call_leaves_hides_no_status(tmp_path: Path) -> None:
+    report = check_fmu(write_fmu(tmp_path / "a.fmu", fmu_files("python_exception")), QUICK)
+    (finding,) = report.findings
+    assert (finding.rule, finding.severity) == ("run.python-exception", "warning")
+    assert finding.message.endswith("TypeError: nobody cleared me")
+    assert set(report.executions[0].stages.values()) == {""}
+
+
+@pytest.mark.parametrize(("starts", "wrong"), [("1 2 3", 0), ("1 2 4", 1), ("9 9 9", 3)])
+def test_a_wrong_start_of_an_array_is_one_finding(starts: str, wrong: int, tmp_path: Path) -> None:
+    files = ball_files("")
+    files[XML] = files[XML].replace(b'start="1 2 3"', f'start="{starts}"'.encode())
+    found = [f for f in check_fmu(write_fmu(tmp_path / "a.fmu", files), QUICK).findings if f.rule == "value.start"]
+    assert len(found) == min(wrong, 1)
+    assert wrong < 2 or "2 more of its 3 elements" in found[0].message

@@ -8,6 +8,9 @@
 #include <unistd.h>
 #include <signal.h>
 #include "fmi3Functions.h"
+#ifdef FAULT_python_exception
+#include "python_exception.h"
+#endif
 #ifdef HOSTILE
 static void *volatile hoard;
 #endif

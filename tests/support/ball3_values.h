@@ -37,6 +37,9 @@ FMI3_Export fmi3Status fmi3GetFloat64(fmi3Instance i, const fmi3ValueReference r
     double found[SIZE];
     size_t used, next = 0;
     AT(get);
+#ifdef FAULT_python_exception
+    leave_exception();
+#endif
 #ifdef FAULT_update_outside
     if (b->update && b->mode == STEP) { bool early = false; double when = 0.0; b->update(b->environment, b->s.time, false, true, false, false, &early, &when); }
 #endif

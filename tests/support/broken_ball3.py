@@ -43,6 +43,7 @@ CO_SIMULATION = {
     "fatal_step": "run.status",
     "illegal_status": "run.status",
     "get_error": "run.status",
+    "python_exception": "run.python-exception",
     "terminate_error": "run.status",
     "crash_step": "run.crash",
     "exit_step": "run.crash",

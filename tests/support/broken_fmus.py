@@ -48,6 +48,7 @@ BEHAVIOURS = {
     "orphan": "process.left",
     "out_of_range": "value.out-of-range",
     "pending_step": "run.pending",
+    "python_exception": "run.python-exception",
     "python_symbols": "binary.python-symbols",
     "random": "run.determinism",
     "reset_error": "run.reset",

@@ -14,6 +14,9 @@
 #include <unistd.h>
 
 #include "fmi2Functions.h"
+#ifdef FAULT_python_exception
+#include "python_exception.h"
+#endif
 
 #ifndef FMU_GUID
 #define FMU_GUID "{00000000-0000-0000-0000-000000000000}"
@@ -210,6 +213,9 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     int known = 1;
 #ifdef FAULT_crash_get
     abort();
+#endif
+#ifdef FAULT_python_exception
+    leave_exception();
 #endif
     for (size_t i = 0; i < n; i++) {
         value[i] = real_value(self, vr[i], &known);

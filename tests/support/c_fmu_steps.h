@@ -47,6 +47,13 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 #ifdef FAULT_error_step
     if (self->s.steps == 5) return refuse(self, "solver failed");
 #endif
+#ifdef FAULT_logs_address
+    if (self->s.steps == 5) {
+        char text[80];
+        snprintf(text, sizeof text, "<Slave object at %p> cannot go on", (void *)self);
+        return refuse(self, text);
+    }
+#endif
 #ifdef FAULT_logs_arguments
     if (self->s.steps == 5) {
         self->callbacks.logger(self->callbacks.componentEnvironment, self->name, fmi2Error, "logStatusError",

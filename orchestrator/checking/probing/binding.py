@@ -5,7 +5,7 @@ types and sizes, and nothing more.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -75,8 +75,14 @@ class Library:
         errors: how many it logged as errors during the present call.
     """
 
-    def __init__(self, host: FmiProcess, version: Version = "2.0", variables: Sequence[ProbedVariable] = ()) -> None:
-        self._host = host
+    def __init__(
+        self,
+        host: FmiProcess,
+        version: Version = "2.0",
+        variables: Sequence[ProbedVariable] = (),
+        report: Callable[[str, str], None] = lambda _rule, _message: None,
+    ) -> None:
+        self._host, self._report = host, report
         self.names = NAMES[version]
         self.current = ""
         self.ended = False
@@ -112,7 +118,10 @@ class Library:
             self.ended = True
             raise
         except SimulationError as error:
-            raise StatusError(doing, ERROR, f"{doing} cannot be called: {error}", "binary.exports") from None
+            missing = str(error).startswith("AttributeError")
+            text = "must be exported, but is not" if missing else f"cannot be called: {error}"
+            rule = "binary.exports" if missing else "run.status"
+            raise StatusError(doing, ERROR, f"{doing} {text}", rule) from None
         self.current = ""
         return answer
 
@@ -143,8 +152,12 @@ class Library:
     def _check_answer(self, answer: Any, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
         """An answer that has the shape of one."""
         match answer:
-            case [int() as status, list() as values, messages, int() as errors]:
+            case [int() as status, list() as values, messages, int() as errors, str() as left]:
                 self.messages, self.errors = self._texts(messages), errors
+                if left:
+                    self._report(
+                        "run.python-exception", f"{function} must clear what it catches, but leaves {left[:200]}"
+                    )
                 if len(values) == sum(a[0].startswith(("out", "new", "free", "event")) for a in arguments):
                     return status, values
         raise odd(function)

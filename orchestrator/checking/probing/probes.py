@@ -150,13 +150,16 @@ def _start_values(context: Context, driver: Driver) -> None:
     ]
     found = iter(driver.read(fixed, "in initialisation mode"))
     for v in fixed:
+        wrong = []
         for label, wanted in zip(v.labels, v.start or (), strict=True):
             value = next(found)
             _string(context, v, value)
             if value is not None and not _close(value, wanted):
                 shown, should = (x.decode("utf-8", "replace") if isinstance(x, bytes) else x for x in (value, wanted))
-                message = f"`{label}` must start at {should!r} as the XML says, but starts at {shown!r}"
-                context.report("value.start", message, v.name)
+                wrong.append(f"`{label}` must start at {should!r} as the XML says, but starts at {shown!r}")
+        if wrong:
+            more = f" ({len(wrong) - 1} more of its {v.size} elements differ too)" if wrong[1:] else ""
+            context.report("value.start", wrong[0] + more, v.name)
 
 
 def _close(a: Any, b: Any) -> bool:

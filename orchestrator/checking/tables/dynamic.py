@@ -24,6 +24,7 @@ run.status | E | 4.2.4 | 2.3 | every call of a normal life cycle returns OK or W
 run.pending | E | 4.2.2 | - | fmi2Pending only with canRunAsynchronuously | return when the step is done, or set the flag
 run.warning | W | 2.1.3 | 2.2.4 | calls of a normal life cycle return OK, not Warning | see the message; every host goes on after it, and not every host shows it
 run.logged-error | W | 2.1.3 | 2.2.4 | what is logged as an error comes with a status of an error | return an error, or log it as a warning
+run.python-exception | W | * | * | no call leaves an exception of Python in the thread | call PyErr_Clear before the function returns; the next call may fail for it
 value.not-finite | E | 2.2.7 | 2.4.7.5 | outputs are finite | look for a division by zero or a missing initialisation
 value.out-of-range | W | 2.2.7 | 2.2.7.3 | outputs stay within min and max | correct the bounds or the model
 value.start | W | 2.2.7 | 2.4.7.5 | start values of the XML are those of the binary | generate both from one source
