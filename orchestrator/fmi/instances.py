@@ -10,6 +10,7 @@ from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.exchange2 import Exchange2Slave
 from orchestrator.fmi.exchange3 import Exchange3Slave
 from orchestrator.fmi.model_description import FmuDescription, read_description
+from orchestrator.fmi.ours import is_ours
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.fmi.slave2 import Fmu2Slave
 from orchestrator.fmi.slave3 import Fmu3Slave
@@ -61,6 +62,7 @@ def fmu_instance(
     events: bool = False,
     clocks: Mapping[str, ClockTimes] | None = None,
     exchange: bool = False,
+    resets: bool | None = None,
 ) -> Instance:
     """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
 
@@ -69,11 +71,13 @@ def fmu_instance(
         events: whether event mode is used where the FMU has it.
         clocks: times of clocks, by name; see ``times_problem``.
         exchange: an FMU for both is used as model exchange.
+        resets: its reset is trusted (default: if the FMU is ours).
     """
     description, rest = read_configured(path, start or {}, events, exchange)
     if clocks:
         description = _with_times(description, clocks)
-    return Instance(name, description.model, FmuFactory(path, description), rest, solver_tolerance)
+    trusted = is_ours(path) if resets is None else resets
+    return Instance(name, description.model, FmuFactory(path, description), rest, solver_tolerance, trusted)
 
 
 def read_configured(path: Path, start: Start, events: bool, exchange: bool = False) -> tuple[FmuDescription, Start]:

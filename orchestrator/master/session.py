@@ -1,4 +1,4 @@
-"""Slaves that are made once and run as often as needed."""
+"""Slaves that run as often as needed: reset between runs, or made anew."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -36,9 +36,10 @@ COMPILED_FROM = 2_000
 
 
 class Session:
-    """Runs one system again and again: slaves are made once and reset between runs.
+    """Runs one system again and again.
 
-    Use as a context manager, or call ``close``. A slave that failed is dropped, and made anew by the next run.
+    Use as a context manager, or call ``close``. Between runs slaves are reset; where an instance does not say that it
+    ``resets``, all are made anew. A slave that failed is dropped, and made anew by the next run.
 
     Args:
         stop: end of a run [s].
@@ -62,6 +63,7 @@ class Session:
         self._events: EventIteration | None = None
         self._compiled: CompiledWiring | None = None
         self._used: set[str] = set()
+        self._shortened: set[str] = set()  # whose discarded steps are done in shorter ones
         self._do_steps = 0
         self._own: dict[str, dict[str, Value]] | None = None
         self._units = {name: getattr(system.unit(name), "name", None) for name in names}
@@ -105,13 +107,12 @@ class Session:
             Times [s], recorded signals and statistics.
         """
         values = self._start_values(start or {})
-        wiring = self._ready()
         table = self._signal_table(signals or {})
         rows = np.empty((self.steps + 1, len(self.record)))
         try:
-            statistics, ended = self._run(wiring, values, table, rows, signals or {}, allow_early_end)
-            for stage in wiring.stages:
-                stage.slave.terminate()
+            statistics, ended = self._run(values, table, rows, signals or {}, allow_early_end)
+            for slave in self._slaves.values():
+                slave.terminate()
         except SimulationError:
             self.close()
             raise
@@ -122,7 +123,6 @@ class Session:
 
     def _run(
         self,
-        wiring: Wiring,
         values: Mapping[str, Mapping[str, Value]],
         table: Array,
         rows: Array,
@@ -131,6 +131,7 @@ class Session:
     ) -> tuple[Statistics, list[RunRemark]]:
         """Initialise and run, once more with shorter steps where a slave discards one; also say who ended the run."""
         while True:
+            wiring = self._ready()
             self._initialise(wiring, values, table)
             self._used.update(self._slaves)
             try:
@@ -149,6 +150,7 @@ class Session:
                 shorten = getattr(self._slaves[error.instance], "shorten_steps", None)
                 if isinstance(self.algorithm, Adaptive) or shorten is None or not shorten():
                     raise SlaveError(str(error)) from None
+                self._shortened.add(error.instance)
                 self._compiled = None
 
     def _remarks(self, rows: Array) -> list[RunRemark]:
@@ -174,11 +176,15 @@ class Session:
         return table
 
     def _ready(self) -> Wiring:
+        if self._used and not all(instance.resets for instance in self.system.instances):
+            self.close()
         if self._wiring is None:
             self._used.clear()
             try:
                 for instance in self.system.instances:
                     self._slaves[instance.name] = self._create(instance)
+                for name in self._shortened:
+                    self._slaves[name].shorten_steps()  # type: ignore[attr-defined]
                 self._wiring = wire(self.layout, self._slaves)
                 if any(instance.model.has_events for instance in self.system.instances):
                     self._events = EventIteration(self._wiring)

@@ -33,6 +33,7 @@ class Instance:
         create: makes the slave, given the instance's name.
         start: parameters and start values by variable name.
         solver_tolerance: relative tolerance for the slave's own solver; None: its default.
+        resets: a reset is trusted to leave nothing of a run behind.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Instance:
     create: Callable[[str], Slave]
     start: Start = field(default_factory=dict)
     solver_tolerance: float | None = None
+    resets: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,8 @@ def loop_system(
     sources: list[SignalSource] = []
     for prefix in prefixes:
         instances += [
-            fmu_instance(f"{prefix}{part}", fmus[fmu], values[fmu]) for fmu, part in zip(FMUS, PARTS, strict=True)
+            fmu_instance(f"{prefix}{part}", fmus[fmu], values[fmu], resets=True)
+            for fmu, part in zip(FMUS, PARTS, strict=True)
         ]
         connections += [Connection(source, target) for source, target in loop_connections(prefix)]
         sources += _sources(experiment, prefix)

@@ -67,6 +67,7 @@ class _Made:
     events: bool
     clocks: Mapping[str, ClockTimes]
     exchange: bool
+    resets: bool
 
     @classmethod
     def of(cls, instance: Instance) -> "_Made":
@@ -76,7 +77,14 @@ class _Made:
         clocks = {name: ClockTimes(clock.interval, clock.shift) for name, clock in told.items()}
         start = {**instance.start, **description.configured}
         exchange = description.exchange is not None
-        return cls(start, instance.solver_tolerance, instance.model.has_events, clocks, exchange)
+        events = instance.model.has_events
+        return cls(start, instance.solver_tolerance, events, clocks, exchange, instance.resets)
+
+    def instance(self, name: str, path: Path) -> Instance:
+        """Return the instance, of the unpacked FMU at ``path``."""
+        return fmu_instance(
+            name, path, self.start, self.solver_tolerance, self.events, self.clocks, self.exchange, self.resets
+        )
 
 
 @dataclass(frozen=True)
@@ -92,10 +100,7 @@ def _path(instance: Instance) -> Path:
 
 
 def _prepare(payload: _Payload, files: Mapping[str, Path]) -> Session:
-    instances = tuple(
-        fmu_instance(name, files[name], made.start, made.solver_tolerance, made.events, made.clocks, made.exchange)
-        for name, made in payload.instances.items()
-    )
+    instances = tuple(made.instance(name, files[name]) for name, made in payload.instances.items())
     scenario = replace(payload.scenario, system=replace(payload.scenario.system, instances=instances))
     return scenario.session()
 

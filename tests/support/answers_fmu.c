@@ -7,6 +7,7 @@
  *   OWN_STEP=h      steps of its own, until the communication point is reached or passed
  *   PENDS           fmi2DoStep returns fmi2Pending
  *   ONCE            a second instance in a process is refused
+ *   RESETS=code     what fmi2Reset does after it began anew, with x and gain of before; LEFT: a variable of the library that outlives instances
  */
 #include <math.h>
 #include <stdlib.h>
@@ -17,6 +18,7 @@ typedef struct { double x, u, gain, time, last; int steps, mode, on; char name[6
 typedef struct { State s; const fmi2CallbackFunctions *host; } Slave;
 
 static int instances = 0;
+static double left = 0.0;
 
 static void say(Slave *m, fmi2Status status, const char *text)
 {
@@ -28,6 +30,9 @@ static void begin(Slave *m)
     memset(&m->s, 0, sizeof m->s);
     m->s.gain = 2.0;
     strcpy(m->s.name, "answers");
+#ifdef LEFT
+    m->s.x = left;
+#endif
 }
 
 const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -47,7 +52,20 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     return m;
 }
 void fmi2FreeInstance(fmi2Component c) { instances--; free(c); }
-fmi2Status fmi2Reset(fmi2Component c) { begin(c); return fmi2OK; }
+fmi2Status fmi2Reset(fmi2Component c)
+{
+#ifdef RESETS
+    Slave *m = c;
+    double x = m->s.x, gain = m->s.gain;
+    begin(m);
+    RESETS
+    (void)x; (void)gain;
+    return fmi2OK;
+#else
+    begin(c);
+    return fmi2OK;
+#endif
+}
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean a, fmi2Real b, fmi2Real start, fmi2Boolean e, fmi2Real f)
 {
     (void)a; (void)b; (void)e; (void)f;
@@ -83,7 +101,12 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference r[], size_t n
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2String v[]) { (void)r; (void)n; (void)c; v[0] = ""; return fmi2OK; }
 
 /* A Boolean doubles the rate, an Integer adds to it: what they are shows in x. */
-static void integrate(State *s, double h) { s->x += h * (s->gain * s->u * (s->on ? 2.0 : 1.0) + s->mode); s->steps++; }
+static void integrate(State *s, double h)
+{
+    s->x += h * (s->gain * s->u * (s->on ? 2.0 : 1.0) + s->mode);
+    s->steps++;
+    left = s->x;
+}
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean k)
 {

@@ -11,6 +11,7 @@ from orchestrator.errors import FmuError, ScenarioError
 from orchestrator.fmi.clocks import clock_interval
 from orchestrator.fmi.instances import FmuFactory, read_configured
 from orchestrator.fmi.model_description import FmuDescription, read_description
+from orchestrator.fmi.ours import is_ours
 from orchestrator.master.algorithms import GaussSeidel, Jacobi
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import NUMERIC, Value
@@ -308,8 +309,9 @@ def _instances(
                 value = own_value(description.model, variable, given, structure.units, f"$.{name}", structure.problems)
                 if value is not None:
                     start[variable] = value
-        factory = FmuFactory(structure.components[name], description)
-        instances.append(Instance(names[name], description.model, factory, start, tolerance))
+        path = structure.components[name]
+        factory = FmuFactory(path, description)
+        instances.append(Instance(names[name], description.model, factory, start, tolerance, is_ours(path)))
     return instances
 
 
