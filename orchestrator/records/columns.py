@@ -141,17 +141,18 @@ def unwrap(values: Array, column: Column) -> Array:
 
 def check_wraps(values: Array, name: str, label: str, source: str) -> None:
     """Refuse an angle that starts again at an end of its range."""
-    steps = np.diff(values[np.isfinite(values)])
-    span = float(np.ptp(values[np.isfinite(values)])) if steps.size else 0.0
-    if span <= 0.0:
-        return
+    finite = np.isfinite(values)
+    good = values if finite.all() else values[finite]
+    steps = np.diff(good)
+    span = float(np.ptp(good)) if steps.size else 0.0
     far = np.abs(steps) > 0.8 * span
-    good = values[np.isfinite(values)]
+    if span <= 0.0 or not far.any():
+        return
     usual = float(np.quantile(np.abs(steps[~far]), 0.999)) if np.any(~far) else span
     # An angle that wraps leaves one end of its range and comes in at the other.
     ends = np.minimum(good - good.min(), good.max() - good)
     at_ends = np.maximum(ends[:-1], ends[1:])[far] <= 2.0 * usual
-    if np.any(far) and np.mean(far) < 0.05 and usual < 0.25 * span and np.all(at_ends):
+    if np.mean(far) < 0.05 and usual < 0.25 * span and np.all(at_ends):
         guess = _round_turn(span + usual)
         raise RecordError(
             f"{source}: column `{label}` must go on over a full turn, but jumps by {np.abs(steps[far]).max():.6g} at "
@@ -166,6 +167,8 @@ def unwrap_time(values: Array, column: Column, label: str, source: str) -> Array
     Args:
         values: (n,), in the numbers of the file.
     """
+    if column.modulo is None and not np.any(np.diff(values) < 0.0) and np.isfinite(values).all():
+        return values
     rows = np.flatnonzero(np.isfinite(values))
     good = values[rows]
     steps = np.diff(good)

@@ -74,13 +74,21 @@ def load(
     values, time, spoken = _in_part(
         source, places, chosen, columns.get("time", Column()), labels["time"], path, reading
     )
+    shared = set(extra.values())
+
+    def take(place: int) -> Array:
+        """Return a channel's numbers, which are let go of: its conversion is what is kept."""
+        return np.asarray(values[place] if place in shared else values.pop(place), dtype=float)
+
+    if "time" in chosen and chosen["time"].place not in shared:
+        values.pop(chosen["time"].place, None)
     table: dict[str, Array] = {"time": time}
     notes = [source.dialect, *(choice.assumed for choice in chosen.values() if choice.assumed)]
     units = [spoken]
     for name in COLUMNS[1:]:
         if name in chosen:
-            raw = values[chosen[name].place].astype(float)
             written = source.heads[chosen[name].place].unit
+            raw = take(chosen[name].place)
             table[name], said = _convert(name, raw, columns.get(name, Column()), written, labels[name], path, time)
             units.append(said)
     table |= {name: values[place].astype(float) for name, place in extra.items() if name not in table}
@@ -160,17 +168,19 @@ def _time(
     rate = column.rate if column.rate is not None else source.rate
     if "time" not in chosen:
         assert rate is not None
+        _refuse_broken(source, path)
         return np.arange(rows) / rate, f"time from the row and {rate:g} Hz"
     choice = chosen["time"]
     raw = values[choice.place]
     if column.rate is not None and not _are_sample_numbers(raw):
+        _refuse_broken(source, path)
         return np.arange(raw.size) / column.rate, f"time from the row and {column.rate:g} Hz, `{label}` not used"
     if raw.dtype.kind == "M":
         return seconds_of(raw, label, path), f"{label} as date and time"
-    numbers = raw.astype(float)
+    numbers = np.asarray(raw, dtype=float)
     if whole or column.modulo is not None:
         numbers = unwrap_time(numbers, column, label, str(path))
-    numbers = numbers * column.factor + column.offset
+    numbers = _scale(numbers, column.factor, column.offset)
     written = source.heads[choice.place].unit
     if choice.numbered or column.rate is not None:
         if rate is None:
@@ -183,7 +193,25 @@ def _time(
     factor, spoken = (unit.factor, column.unit or written) if unit is not None else _epoch(numbers)
     first = float(numbers[np.isfinite(numbers)][0]) if np.isfinite(numbers).any() else 0.0
     start = first if abs(first * factor) > 1e6 else 0.0
-    return (numbers - start) * factor, f"{label} in {spoken or 's'}"
+    return _scale(numbers, factor, -start * factor), f"{label} in {spoken or 's'}"
+
+
+def _scale(values: Array, factor: float, offset: float) -> Array:
+    """Return ``values * factor + offset``: the values themselves where that is the same."""
+    if factor == 1.0 and offset == 0.0:
+        return values
+    out = values * factor
+    out += offset
+    return out
+
+
+def _refuse_broken(source: RecordSource, path: Path) -> None:
+    """Refuse rows without times between which a line says something: samples may be lost there."""
+    if source.broken:
+        raise RecordError(
+            f"{path}: {source.broken}, but without time stamps nobody knows whether samples are lost there: delete "
+            "such lines where none are, else keep the rows before or behind them in a file of their own"
+        )
 
 
 def _are_sample_numbers(raw: NDArray[Any]) -> bool:
@@ -211,7 +239,8 @@ def _convert(
     where = str(path)
     unit = unit_of(name, column, written, label, where)
     scale = scale_of(name, column, unit, label, where)
-    values = raw * column.factor + column.offset
+    values = _scale(raw, column.factor, column.offset)
+    del raw
     spoken = f"{label} in {(column.unit or written) if unit is not None else SI[KINDS[name][0]]}"
     if unit is None and not written and not column.unit:
         spoken += " (no unit given)" if label != name else ""
@@ -227,7 +256,7 @@ def _convert(
         if column.modulo is None and np.all(np.diff(time[np.isfinite(time)]) > 0.0):  # else the time is what is wrong
             check_wraps(values, name, label, where)
         values = unwrap(values, column)
-    return values * scale, spoken
+    return _scale(values, scale, 0.0), spoken
 
 
 def _same_rows(

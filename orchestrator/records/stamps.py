@@ -1,4 +1,4 @@
-"""Dates and times of day as text: ISO 8601, German and clock stamps, to times."""
+"""Dates and times of day as text: ISO 8601, German and American dates, clocks of 24 and of 12 hours."""
 
 import re
 from collections.abc import Sequence
@@ -10,44 +10,28 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 
-_ISO = re.compile(r"(\d{4})-(\d\d?)-(\d\d?)[T _]+(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?(Z|[+-]\d\d:?\d\d)?")
-_GERMAN = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})[T _]+(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?")
-_CLOCK = re.compile(r"(\d\d?):(\d\d):(\d\d)(?:[.,](\d{1,12}))?")
+# A fraction of a second, or a count of milliseconds behind `:` or `;`.
+_SECOND = r":(?P<second>\d\d)(?:[.,](?P<fraction>\d{1,12})|[:;](?P<count>\d{1,3}))?"
+_HALF = r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\.?)?"
+_HOUR = r"(?P<hour>\d\d?):(?P<minute>\d\d)"
+_TIME = rf"[T _]+{_HOUR}(?:{_SECOND})?{_HALF}"
+_ISO = re.compile(
+    rf"(?P<year>\d{{4}})(?P<mark>[-/])(?P<month>\d\d?)(?P=mark)(?P<day>\d\d?){_TIME}(?P<zone>Z|[+-]\d\d:?\d\d)?"
+)
+_GERMAN = re.compile(rf"(?P<day>\d\d?)\.(?P<month>\d\d?)\.(?P<year>\d{{4}}){_TIME}")
+_SLASHES = re.compile(rf"(?P<date>\d\d?/\d\d?/\d{{4}}){_TIME}")  # day or month first: nobody knows
+_CLOCK = re.compile(rf"{_HOUR}{_SECOND}{_HALF}")
+_PATTERNS = (_ISO, _GERMAN, _SLASHES, _CLOCK)
 DAY = 86_400 * 10**9  # ns
 _NO_TIME = np.datetime64("NaT", "ns").astype(np.int64)
 
 
 def is_stamp(cell: str) -> bool:
     """Return whether a cell is a date with a time, or a time of day."""
+    if ":" not in cell:
+        return False
     plain = cell.strip().strip('"')
-    return any(pattern.fullmatch(plain) for pattern in (_ISO, _GERMAN, _CLOCK))
-
-
-def parse_stamps(cells: Sequence[str], label: str, path: Path, before: int = 0) -> NDArray[Any]:
-    """Return the stamps as datetime64[ns], NaT for empty cells; a clock that passes midnight goes on."""
-    out = np.empty(len(cells), dtype=np.int64)
-    first = next((cell for cell in cells if cell), "")
-    pattern = next((p for p in (_ISO, _GERMAN, _CLOCK) if p.fullmatch(first)), _ISO)
-    days: dict[tuple[str, str, str], int] = {}
-    previous, shift = -(2**62), 0
-    for n, cell in enumerate(cells):
-        if not cell:
-            out[n] = _NO_TIME
-            continue
-        found = pattern.fullmatch(cell)
-        if found is None:
-            raise RecordError(
-                f"{path}: row {before + n + 1}, column `{label}` must be a time like the first row's, but is "
-                f"`{cell[:40]}`"
-            )
-        value = _nanoseconds(found, pattern, days, label, path, before + n)
-        if pattern is _CLOCK:
-            value += shift
-            if value < previous - DAY // 2:
-                shift += DAY
-                value += DAY
-        out[n] = previous = value
-    return out.view("datetime64[ns]")
+    return any(pattern.fullmatch(plain) for pattern in _PATTERNS)
 
 
 def seconds_of(stamps: NDArray[Any], label: str, path: Path) -> NDArray[np.float64]:
@@ -60,33 +44,97 @@ def seconds_of(stamps: NDArray[Any], label: str, path: Path) -> NDArray[np.float
     return np.where(good, away, np.nan)
 
 
-def _nanoseconds(
-    match: re.Match[str],
-    pattern: re.Pattern[str],
-    days: dict[tuple[str, str, str], int],
-    label: str,
-    path: Path,
-    row: int,
-) -> int:
-    parts = match.groups()
-    date, clock, zone = 0, parts, None
-    if pattern is not _CLOCK:
-        key = (parts[0], parts[1], parts[2]) if pattern is _ISO else (parts[2], parts[1], parts[0])
-        if key not in days:
+class StampReader:
+    """Reads a column of stamps, piece by piece: all are written like the first one; a clock goes on at midnight."""
+
+    def __init__(self, label: str, path: Path) -> None:
+        self._label, self._path = label, path
+        self._pattern: re.Pattern[str] | None = None
+        self._halved = False
+        self._days: dict[tuple[str, str, str], int] = {}
+        self._date, self._previous, self._shift = "", -(2**62), 0
+        self._digits = self._row = 0
+        self.has_fractions = False
+
+    def read(self, cells: Sequence[str], row: int) -> NDArray[np.int64]:
+        """Return stamps as ns (n,), the least integer for empty cells.
+
+        Args:
+            row: number of the first one, from 0.
+        """
+        out = np.empty(len(cells), dtype=np.int64)
+        for n, cell in enumerate(cells):
+            self._row = row + n
+            out[n] = self._stamp(cell) if cell else _NO_TIME
+        return out
+
+    def check(self) -> None:
+        """Refuse counts behind a colon that are never of three digits: they may be frames, or hundredths."""
+        if 0 < self._digits < 3:
+            raise self._error(
+                "must have milliseconds of three digits behind the seconds, but has at most "
+                f"{self._digits}: write the times with a decimal point"
+            )
+
+    def _stamp(self, cell: str) -> int:
+        if self._pattern is None:
+            self._pattern = next((p for p in _PATTERNS if p.fullmatch(cell)), _ISO)
+            found = self._pattern.fullmatch(cell)
+            self._halved = found is not None and found["half"] is not None
+        found = self._pattern.fullmatch(cell)
+        if found is None or self._halved != (found["half"] is not None):
+            raise self._error(f"must be a time like the first row's, but is `{cell[:40]}`")
+        value = self._time_of_day(found)
+        if self._pattern in (_CLOCK, _SLASHES):
+            return self._go_on(value, found)
+        value += self._midnight(found)
+        zone = found["zone"] if self._pattern is _ISO else None
+        if zone and zone != "Z":
+            digits = zone[1:].replace(":", "")
+            away = (int(digits[:2]) * 60 + int(digits[2:])) * 60 * 10**9
+            value -= away if zone[0] == "+" else -away
+        return value
+
+    def _time_of_day(self, match: re.Match[str]) -> int:
+        hour = int(match["hour"])
+        if self._halved and hour <= 12:
+            hour = hour % 12 + (12 if match["half"] in "Pp" else 0)
+        elif self._halved and match["half"] in "Aa":
+            raise self._error(f"must have at most 12 hours before noon, but is `{match[0][:40]}`")
+        whole = (hour * 60 + int(match["minute"])) * 60 + int(match["second"] or 0)
+        count = match["count"]
+        self.has_fractions |= bool(count or match["fraction"])
+        self._digits = max(self._digits, len(count or ""))
+        below = int(count) * 10**6 if count else int((match["fraction"] or "0").ljust(9, "0")[:9])
+        return whole * 10**9 + below
+
+    def _midnight(self, match: re.Match[str]) -> int:
+        """Return when the day of a date begins [ns]."""
+        key = match["year"], match["month"], match["day"]
+        if key not in self._days:
             try:
                 day = np.datetime64(f"{key[0]}-{int(key[1]):02d}-{int(key[2]):02d}", "ns")
             except ValueError:
-                raise RecordError(
-                    f"{path}: row {row + 1}, column `{label}` must be a date, but is `{match[0][:40]}`"
-                ) from None
-            days[key] = int(day.astype(np.int64))
-        date, clock = days[key], parts[3:7]
-        zone = parts[7] if pattern is _ISO else None
-    hours, minutes, seconds, fraction = clock
-    whole = (int(hours) * 60 + int(minutes)) * 60 + int(seconds or 0)
-    value = date + whole * 10**9 + int((fraction or "0").ljust(9, "0")[:9])
-    if zone and zone != "Z":
-        digits = zone[1:].replace(":", "")
-        away = (int(digits[:2]) * 60 + int(digits[2:])) * 60 * 10**9
-        value -= away if zone[0] == "+" else -away
-    return value
+                raise self._error(f"must be a date, but is `{match[0][:40]}`") from None
+            self._days[key] = int(day.astype(np.int64))
+        return self._days[key]
+
+    def _go_on(self, value: int, match: re.Match[str]) -> int:
+        """Return the time since the first day; a date whose order is unknown may only change at midnight."""
+        value += self._shift
+        over = value < self._previous - DAY // 2
+        if over:
+            self._shift += DAY
+            value += DAY
+        if self._pattern is _SLASHES:
+            if self._date and (match["date"] != self._date) != over:
+                raise self._error(
+                    f"must go on by a day at midnight, but `{match[0][:40]}` does not; its day and month cannot be "
+                    "told apart: write dates as 2024-12-31"
+                )
+            self._date = match["date"]
+        self._previous = value
+        return value
+
+    def _error(self, must: str) -> RecordError:
+        return RecordError(f"{self._path}: row {self._row + 1}, column `{self._label}` {must}")

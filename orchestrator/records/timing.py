@@ -141,11 +141,16 @@ def _places(time: Array, step: float) -> tuple[float, NDArray[np.int64]]:
         return step, place
     # Stamps that jitter move the counts by one here and there; the line through them all does not.
     for _ in range(3):
-        slope, start = np.polyfit(place - place.mean(), time - time[0], 1)
+        middle = float(place.mean())
+        centred = place - middle
+        away = time - time[0]
+        slope = float(centred @ away) / float(centred @ centred)
         if slope <= 0.0:
             break
-        first = start - slope * place.mean()
-        new = np.rint((time - time[0] - first) / slope).astype(np.int64)
+        del centred
+        away -= float(away.mean()) - slope * middle
+        away /= slope
+        new = np.rint(away, out=away).astype(np.int64)
         new -= new[0]
         if np.any(np.diff(new) <= 0):
             break
@@ -161,9 +166,15 @@ def _rounding(time: Array) -> float:
     away = time - time[0]
     for digits in (1, 2, 3, 4, 5, 6):
         unit = 10.0**-digits
-        if np.all(np.abs(away / unit - np.rint(away / unit)) < 1e-3):
+        if _are_multiples(away[:1000], unit) and _are_multiples(away, unit):
             return unit
     return 0.0
+
+
+def _are_multiples(away: Array, unit: float) -> bool:
+    off = away / unit
+    off -= np.rint(off)
+    return bool(np.all(np.abs(off, out=off) < 1e-3))
 
 
 def _check_grid(

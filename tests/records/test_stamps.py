@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import RecordError
-from orchestrator.records.stamps import is_stamp, parse_stamps, seconds_of
+from orchestrator.records.stamps import StampReader, is_stamp, seconds_of
 
 FILE = Path("log.csv")
+
+
+def _read(cells: list[str], row: int = 0) -> np.ndarray:
+    reader = StampReader("t", FILE)
+    halves = [reader.read(cells[:2], row), reader.read(cells[2:], row + 2)]  # as from two blocks of a file
+    reader.check()
+    return np.concatenate(halves).view("datetime64[ns]")
+
 
 # Stamps, and the seconds from the first one on.
 INSTANTS = {
@@ -28,6 +36,16 @@ INSTANTS = {
         ["2024-05-13T08:00:00.1", "2024-05-13T08:00:00.100000001", "2024-05-13T08:00:00.100000002999"],
         [0.0, 1e-9, 2e-9],
     ),
+    "twelve hours, over noon": (["11:59:59.5 AM", "12:00:00.25 PM", "", "1:00:00 pm"], [0.0, 0.75, np.nan, 3600.5]),
+    "twelve hours, over midnight": (["11:59:59 p.m.", "12:00:01 a.m.", "12:00:03 A.M."], [0.0, 2.0, 4.0]),
+    "twelve hours with an American date": (
+        ["12/31/2024 11:59:59 PM", "1/1/2025 12:00:00.125 AM", "1/1/2025 12:00:01 AM"], [0.0, 1.125, 2.0],
+    ),
+    "slashes, the day first": (["31/01/2024 23:59:59", "01/02/2024 00:00:00", "01/02/2024 00:00:01"], [0.0, 1.0, 2.0]),
+    "slashes, the year first": (["2024/02/28 23:59:59", "2024/02/29 00:00:01"], [0.0, 2.0]),
+    "milliseconds behind a colon": (["08:00:00:5", "08:00:00:10", "08:00:00:995", "08:00:01:0"],
+                                    [0.0, 0.005, 0.99, 0.995]),
+    "milliseconds behind a semicolon": (["2024-05-13 08:00:00;005", "2024-05-13 08:00:00;010"], [0.0, 0.005]),
     "an empty cell first": (["", "2024-05-13 08:00:00", "2024-05-13_08:00:02"], [np.nan, 0.0, 2.0]),
 }  # fmt: skip
 
@@ -36,7 +54,7 @@ INSTANTS = {
 def test_stamps_are_instants(name: str) -> None:
     cells, seconds = INSTANTS[name]
     assert all(is_stamp(cell) for cell in cells if cell)
-    np.testing.assert_allclose(seconds_of(parse_stamps(cells, "t", FILE), "t", FILE), seconds, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(seconds_of(_read(cells), "t", FILE), seconds, rtol=0.0, atol=1e-10)
 
 
 @pytest.mark.parametrize("cell", ["12:00", "2024-05-13", "1.5", "2024-05-13T08:00:00.", "13.05.24 08:00:00"])
@@ -49,14 +67,18 @@ def test_other_texts_are_no_stamps(cell: str) -> None:
     [
         (["08:00:00", "", "noon"], "row 13, column `t` must be a time like the first row's, but is `noon`"),
         (["08:00:00", "2024-05-13 08:00:00"], "row 12, column `t` must be a time like the first row's"),
+        (["08:00:00 AM", "08:00:00"], "row 12, column `t` must be a time like the first row's"),
+        (["08:00:00 AM", "13:00:00 AM"], "row 12, column `t` must have at most 12 hours before noon"),
+        (["01/02/2024 10:00:00", "02/02/2024 10:00:01"], "day and month cannot be told apart: write dates as 2024"),
+        (["10:00:00:05", "10:00:00:24"], "must have milliseconds of three digits .* but has at most 2"),
         (["2024-02-29 08:00:00", "2023-02-29 08:00:00"], "row 12, column `t` must be a date, but is `2023-02-29 08"),
     ],
 )
 def test_a_cell_that_is_no_such_stamp_is_named_by_its_row_in_the_file(cells: list[str], said: str) -> None:
     with pytest.raises(RecordError, match=said):
-        parse_stamps(cells, "t", FILE, before=10)
+        _read(cells, 10)
 
 
 def test_a_column_without_a_stamp_is_refused() -> None:
     with pytest.raises(RecordError, match="column `t` must hold times, but is empty"):
-        seconds_of(parse_stamps(["", ""], "t", FILE), "t", FILE)
+        seconds_of(_read(["", ""]), "t", FILE)

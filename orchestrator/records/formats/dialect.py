@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.cells import cells_of, is_value
+from orchestrator.records.formats.cells import cells_of, is_missing, is_value
 from orchestrator.records.formats.heading import UNIT_KEYS, Heading
 from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import MAXIMUM_CHANNELS, Head
+from orchestrator.records.formats.text_file import TextFile
 from orchestrator.records.stamps import is_stamp
 
 SEPARATORS = (";", "\t", ",", "|", " ")
@@ -25,7 +26,8 @@ class Dialect:
         separator: between cells; a blank stands for any run of blanks.
         decimal: sign before the fraction.
         width: cells of a row.
-        start: where in the text the first row begins.
+        first: line of the first row, from 0.
+        texts: places of columns that hold words.
         preamble: lines before the names.
         units_row: whether a row of its own holds the units.
         named: whether there is a row of names.
@@ -35,7 +37,8 @@ class Dialect:
     decimal: str
     heads: tuple[Head, ...]
     width: int
-    start: int
+    first: int
+    texts: frozenset[int]
     preamble: tuple[str, ...]
     units_row: bool
     named: bool
@@ -43,7 +46,9 @@ class Dialect:
     def describe(self, encoding: str) -> str:
         """Return the dialect in words."""
         words = ["CSV", f"separator {SPOKEN[self.separator]}", f"decimal {'comma' if self.decimal == ',' else 'point'}"]
-        words += [{"utf-8-sig": "UTF-8 with BOM", "cp1252": "Windows-1252"}.get(encoding, encoding.upper())]
+        words += [
+            {"ascii": "UTF-8", "utf-8-sig": "UTF-8 with BOM", "cp1252": "Windows-1252"}.get(encoding, encoding.upper())
+        ]
         filled = sum(bool(line.strip()) for line in self.preamble)
         words += [f"{filled} lines besides the names"] * (filled > 0) + ["a row of units"] * self.units_row
         words += [f"`{key}` above the names not used" for key in self._further_units()]
@@ -60,24 +65,28 @@ def _further(line: str, separator: str) -> str:
     return cells[0] if len(cells) > 2 and re.search(r"(?i)unit|einheit", cells[0]) else ""
 
 
-def detect(text: str, path: Path, header: int | None = None) -> Dialect:
+def detect(file: TextFile, header: int | None = None) -> Dialect:
     """Return the dialect of a text: the names are the last line before the longest run of rows of numbers.
 
     Args:
         header: line of the names, from 1; 0: there are none; None: found.
     """
-    skipped = _start_of(text, header or 0, path)
-    below = text[skipped:]
+    skipped, path = header or 0, file.path
+    if skipped >= file.lines > 0 and skipped > 0:
+        raise RecordError(f"{path}: `header` must be a line of the file, but is {skipped} of {file.lines}")
+    below = file.head(skipped, SAMPLE_CHARACTERS + 1)
     lines = below[:SAMPLE_CHARACTERS].split("\n")
     if len(below) > SAMPLE_CHARACTERS:
         lines.pop()
     lines = lines[:SAMPLE_LINES]
-    found = [entry for s in SEPARATORS for d in (".", ",") if (entry := _block(lines, s, d)) is not None]
+    signs = {*"".join(lines)}
+    decimals = (".", ",") if "," in signs else (".",)
+    found = [entry for s in SEPARATORS if s in signs for d in decimals if (entry := _block(lines, s, d)) is not None]
     if not found:
-        raise _no_table(text, path)
+        raise _no_table(file)
     # More values tell the right separator; a decimal point is preferred where both fit.
     _, width, first, separator, decimal = max(found, key=lambda e: (e[0], e[1], e[4] == "."))
-    if decimal == "." and separator != "," and _only_commas(lines[first:], text, separator):
+    if decimal == "." and separator != "," and _only_commas(lines[first:], file.last_comma > skipped, separator):
         decimal = ","
     if width > MAXIMUM_CHANNELS:
         raise RecordError(f"{path}: a record must have at most {MAXIMUM_CHANNELS} columns, but has {width}")
@@ -86,7 +95,7 @@ def detect(text: str, path: Path, header: int | None = None) -> Dialect:
     above = lines[:first]
     head = Heading(separator, decimal, width, path)
     if header:
-        above = [text[:skipped].rstrip("\n").rsplit("\n", 1)[-1], *above]
+        above = [file.head(skipped - 1, SAMPLE_CHARACTERS).split("\n", 1)[0], *above]
         names, units, preamble = head.read_stated(above, header)
     else:
         names, units, preamble = (None, [""] * width, above) if header == 0 else head.read_names(above)
@@ -95,21 +104,11 @@ def detect(text: str, path: Path, header: int | None = None) -> Dialect:
         heads = [Head(f"#{n + 1}", "", kind) for n, kind in enumerate(kinds)]
     else:
         heads = [_head(name, unit, kind) for name, unit, kind in zip(names, units, kinds, strict=True)]
-    start = skipped + sum(len(line) + 1 for line in lines[:first])
+    texts = frozenset(place for place in range(width) if _is_text_column(rows, place, decimal))
     has_units = any(units) and names is not None
-    return Dialect(separator, decimal, tuple(heads), width, start, tuple(preamble), has_units, names is not None)
-
-
-def _start_of(text: str, line: int, path: Path) -> int:
-    """Return where the line after the given one begins."""
-    at = 0
-    for _ in range(line):
-        at = text.find("\n", at) + 1
-        if at == 0:
-            raise RecordError(
-                f"{path}: `header` must be a line of the file, but is {line} of {text.count(chr(10)) + 1}"
-            )
-    return at
+    return Dialect(
+        separator, decimal, tuple(heads), width, skipped + first, texts, tuple(preamble), has_units, names is not None
+    )
 
 
 def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int, str, str] | None:
@@ -155,19 +154,26 @@ def _first_row(lines: list[str], first: int, separator: str, decimal: str, width
     return first
 
 
-def _only_commas(lines: list[str], text: str, separator: str) -> bool:
-    """Return whether numbers have decimal commas although the first rows are whole."""
+def _only_commas(lines: list[str], later: bool, separator: str) -> bool:
+    """Return whether numbers have decimal commas although the first rows are whole.
+
+    Args:
+        later: whether there is a comma anywhere below the first line.
+    """
     cells = [cell for line in lines for cell in cells_of(line, separator) if not is_stamp(cell)]
     if any("." in cell for cell in cells):
         return False
-    return "," in text[sum(len(line) + 1 for line in lines[:1]) :] and any(
-        "," in cell or cell.isdigit() for cell in cells
-    )
+    return later and any("," in cell or cell.isdigit() for cell in cells)
 
 
 def _is_stamp_column(rows: list[list[str]], place: int) -> bool:
     cells = [row[place] for row in rows if place < len(row)]
     return bool(cells) and is_stamp(cells[0]) and 2 * sum(map(is_stamp, cells)) > len(cells)
+
+
+def _is_text_column(rows: list[list[str]], place: int, decimal: str) -> bool:
+    cells = [row[place] for row in rows if place < len(row) and not is_missing(row[place])]
+    return 2 * sum(is_value(cell, decimal) for cell in cells) < len(cells)
 
 
 def _head(text: str, unit: str, kind: str) -> Head:
@@ -178,8 +184,9 @@ def _head(text: str, unit: str, kind: str) -> Head:
     return head_of(plain, "", kind)
 
 
-def _no_table(text: str, path: Path) -> RecordError:
-    first = next((line.strip() for line in text.split("\n") if line.strip()), "")
+def _no_table(file: TextFile) -> RecordError:
+    path = file.path
+    first = next((line.strip() for line in file.head(0, SAMPLE_CHARACTERS).split("\n") if line.strip()), "")
     if not first:
         return RecordError(f"{path}: a record must have a header and rows, but the file is empty")
     shown = "".join(c if c.isprintable() else "?" for c in first[:60])

@@ -38,11 +38,13 @@ class RecordSource(Protocol):
     Attributes:
         dialect: what was detected, in one line.
         rate: samples per second where the file states it outside its channels, or None.
+        broken: what stands among the rows of a text and is no row, as far as it was read; empty: nothing.
     """
 
     heads: Sequence[Head]
     dialect: str
     rate: float | None
+    broken: str = ""
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """Return the values of the channels at ``places``, float64 or datetime64; NaN or NaT where one is missing.
