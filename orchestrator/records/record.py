@@ -61,7 +61,7 @@ def record_from_columns(
     """Check columns that are already numbers (any mapping of name to (n,) array) and return the record."""
     arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in table.items()}
     label = {name: name for name in arrays} | dict(shown or {})
-    arrays = _stamp(arrays, label["time"], source)
+    arrays, notes = _stamp(arrays, label["time"], source)
     size = arrays["time"].size
     if size < MINIMUM_ROWS:
         raise RecordError(
@@ -79,21 +79,23 @@ def record_from_columns(
             check_moving(
                 {key: interpolate_missing(values) for key, values in arrays.items()}, name, label[name], source
             )
-    return _on_grid(arrays, grid, source, trust_rows)
+    record = _on_grid(arrays, grid, source, trust_rows)
+    return replace(record, notes=(*notes, *record.notes))
 
 
-def _stamp(arrays: dict[str, Array], label: str, source: str) -> dict[str, Array]:
-    """Return the rows that have a time."""
+def _stamp(arrays: dict[str, Array], label: str, source: str) -> tuple[dict[str, Array], list[str]]:
+    """Return the rows that have a time, and what was left out."""
     good = np.isfinite(arrays["time"])
     lost = int(np.count_nonzero(~good))
     if lost == 0:
-        return arrays
+        return arrays, []
     if lost > 0.2 * good.size:
         raise RecordError(
             f"{source}: row {int(np.flatnonzero(~good)[0]) + 1}, column `{label}` must be a finite number, but {lost} "
             "rows are not: name another time, or say `[columns.time] rate = ...`"
         )
-    return {name: values[good] for name, values in arrays.items()}
+    kept = {name: values[good] for name, values in arrays.items()}
+    return kept, [f"{lost} {'row' if lost == 1 else 'rows'} without a time left out"]
 
 
 def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: bool) -> Record:
