@@ -15,7 +15,7 @@ _SHOWN = 3
 
 
 @dataclass(frozen=True)
-class Block:
+class RowBlock:
     """Rows that follow each other.
 
     Attributes:
@@ -32,7 +32,7 @@ class Block:
 
 
 @dataclass
-class Rows:
+class TableRows:
     """The rows of a table.
 
     A line is left out where its first cell is a word, though the column holds numbers, and few of its cells are
@@ -56,7 +56,7 @@ class Rows:
         """Return what the number of rows is at most."""
         return max(self._end - self.dialect.first, 0)
 
-    def blocks(self, part: slice = slice(0, None)) -> Iterator[Block]:
+    def blocks(self, part: slice = slice(0, None)) -> Iterator[RowBlock]:
         """Yield the rows in blocks.
 
         Args:
@@ -70,7 +70,7 @@ class Rows:
             plain = separator != " " and '"' not in text
             odd = not text or _ODD.match(text) is not None or _ODD_BELOW.search(text) is not None
             if plain and not odd and count_of(text, separator) == count * (width - 1):
-                block = Block(row, text, count)
+                block = RowBlock(row, text, count)
             else:
                 block = self._block(row, self._sift(line, text))
             row += block.count
@@ -105,11 +105,11 @@ class Rows:
                 kept.append(entry)
         return kept
 
-    def _block(self, first: int, rows: list[str]) -> Block:
+    def _block(self, first: int, rows: list[str]) -> RowBlock:
         width, separator = self.dialect.width, self.dialect.separator
         lengths = ((n, len(cells_of(row, separator))) for n, row in enumerate(rows))
         misfit = next(((first + n, length) for n, length in lengths if length != width), None)
-        return Block(first, "\n".join(rows), len(rows), misfit)
+        return RowBlock(first, "\n".join(rows), len(rows), misfit)
 
     def _is_remark(self, cells: list[str]) -> bool:
         """Return whether a line among the rows is none."""

@@ -13,7 +13,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.formats.cells import cells_of, is_number, plain_number, plain_signs
 from orchestrator.records.formats.dialect import Dialect, detect
 from orchestrator.records.formats.preamble import rate_of
-from orchestrator.records.formats.rows import Block, Rows
+from orchestrator.records.formats.rows import RowBlock, TableRows
 from orchestrator.records.formats.source import Head, RecordSource
 from orchestrator.records.formats.text_file import TextFile, open_text
 from orchestrator.records.stamps import StampReader, is_stamp
@@ -25,7 +25,7 @@ _ALL = slice(0, None)
 class TextSource(RecordSource):
     """A CSV file whose dialect is known."""
 
-    def __init__(self, file: TextFile, dialect: Dialect, rows: Rows, part: slice = _ALL) -> None:
+    def __init__(self, file: TextFile, dialect: Dialect, rows: TableRows, part: slice = _ALL) -> None:
         self._file, self._path, self._dialect, self._rows, self._part = file, file.path, dialect, rows, part
         self.heads: Sequence[Head] = dialect.heads
         self.rate = rate_of(dialect.preamble, dialect.separator)
@@ -79,12 +79,12 @@ class TextSource(RecordSource):
         """Return what the file calls a column."""
         return self.heads[place].full or self.heads[place].name
 
-    def texts(self, block: Block, place: int) -> list[str]:
+    def texts(self, block: RowBlock, place: int) -> list[str]:
         """Return the cells of a column."""
         rows = (cells_of(line, self._dialect.separator) for line in block.text.split("\n"))
         return [row[place].strip('"') if place < len(row) else "" for row in rows]
 
-    def numbers(self, block: Block, places: Sequence[int], strict: bool) -> Sequence[NDArray[np.float64]]:
+    def numbers(self, block: RowBlock, places: Sequence[int], strict: bool) -> Sequence[NDArray[np.float64]]:
         """Return columns (n,) of numbers."""
         separator, comma = self._dialect.separator, self._dialect.decimal == ","
         if not places:
@@ -144,7 +144,7 @@ class _StampColumn:
         unit = parse_unit(head.name, ("time",))
         self._further = unit.factor if unit is not None and unit.factor < 1.0 and head.kind == "number" else 0.0
 
-    def read(self, block: Block) -> NDArray[np.int64]:
+    def read(self, block: RowBlock) -> NDArray[np.int64]:
         """Return the stamps of a block [ns]."""
         cells = self._source.texts(block, self._place)
         stamps = self._reader.read(cells if self._strict else [c if is_stamp(c) else "" for c in cells], block.first)
@@ -167,7 +167,7 @@ def open_file(path: Path, header: int | None = None) -> TextSource:
     """
     file = open_text(path)
     dialect = detect(file, header)
-    return TextSource(file, dialect, Rows(file, dialect))
+    return TextSource(file, dialect, TableRows(file, dialect))
 
 
 def _number_cure(cell: str) -> str:
