@@ -210,10 +210,7 @@ def _misfit(
     if not types_fit(output, entry) or (factor != 1.0 and entry.type != "Real"):
         text = f"member {name} must have types that fit, but {addresses[0]} has {output.type} and {addresses[1]}"
         return f"{text} has {entry.type}"
-    known = [
-        None if v.unit is None else units.resolve(v.unit, end.model.units)
-        for end, v in ((source, output), (target, entry))
-    ]
+    known = [units.unit_of(v, end.model.units) for end, v in ((source, output), (target, entry))]
     if units.conversion(known[0], known[1]) is None:
         text = f"member {name} must have units that measure the same, but {addresses[0]} has {output.unit}"
         return f"{text} and {addresses[1]} has {entry.unit}"

@@ -44,6 +44,7 @@ def _variable(scalar: etree._Element, kind: etree._Element, types: dict[str, etr
         items=tuple((item.attrib["name"], int(item.attrib["value"])) for item in items),
         description=scalar.get("description", ""),
         reference=int(scalar.attrib["valueReference"]),
+        relative=attribute("relativeQuantity") in {"true", "1"},
     )
 
 

@@ -148,6 +148,7 @@ def _alias(scalar: Variable, name: str, description: str | None) -> Variable:
         items=scalar.items,
         description=description or scalar.description,
         reference=scalar.reference,
+        relative=scalar.relative,
     )
 
 
@@ -171,7 +172,7 @@ def _maker(element: etree._Element, declared: etree._Element | None) -> Callable
     items = [] if inherited is None else inherited.findall("Item")
     literals = tuple((item.attrib["name"], int(item.attrib["value"])) for item in items)
     unit, text = attribute("unit") or None, element.get("description", "")
-    reference = int(element.attrib["valueReference"])
+    reference, relative = int(element.attrib["valueReference"]), attribute("relativeQuantity") in {"true", "1"}
 
     def make(name: str, start: str | None) -> Variable:
         return Variable(
@@ -186,6 +187,7 @@ def _maker(element: etree._Element, declared: etree._Element | None) -> Callable
             items=literals,
             description=text,
             reference=reference,
+            relative=relative,
         )
 
     return make

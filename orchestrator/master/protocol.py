@@ -67,12 +67,15 @@ class Unit:
         exponents: of kg, m, s, A, K, mol, cd, rad; ``None`` when the unit is a mere name.
         factor: by which a value is multiplied to be in SI.
         offset: that is added to the product, in SI.
+        difference: it is the unit of a difference, for which the offset does not count; ``None``: of what its value
+            is handed to.
     """
 
     name: str
     exponents: tuple[int, ...] | None = None
     factor: float = 1.0
     offset: float = 0.0
+    difference: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +87,7 @@ class Variable:
         causality: ``input``, ``output``, ``parameter``, ``calculatedParameter``, ``local`` or ``independent``.
         type: ``Real``, ``Integer``, ``Boolean``, ``Enumeration`` or ``String``.
         unit: name of the unit of a ``Real``, a key of ``ModelInterface.units``; ``None`` when none is declared.
+        relative: it is a difference: 5 degC of it are 5 K.
         variability: ``continuous``, ``discrete``, ``tunable``, ``fixed`` or ``constant``.
         start: start value; ``None`` when none is declared.
         minimum: smallest value allowed; ``None`` when none is declared.
@@ -104,6 +108,7 @@ class Variable:
     items: tuple[tuple[str, int], ...] = ()
     description: str = ""
     reference: int = 0
+    relative: bool = False
 
 
 @dataclass(frozen=True, slots=True)

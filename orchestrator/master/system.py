@@ -135,9 +135,7 @@ class System:
         """Return the unit of the variable at ``address``, if it has one."""
         variable = self.variable(address)
         instance = self.instance(split(address)[0])
-        if variable is None or variable.unit is None or instance is None:
-            return None
-        return units.resolve(variable.unit, instance.model.units)
+        return None if variable is None or instance is None else units.unit_of(variable, instance.model.units)
 
     def loops(self) -> list[tuple[str, ...]]:
         """Return the algebraic loops: groups of instances whose outputs depend on one another at the same instant."""
@@ -262,9 +260,7 @@ class System:
         if units.conversion(source, target) is None:
             assert source is not None
             assert target is not None
-            text = (
-                f"must have a unit that measures what {source.name} of {connection.source} does, but has {target.name}"
-            )
+            text = units.describe_mismatch(source, target, f" of {connection.source}")
             return [Problem(f"{path}.to", text, mismatch=True)]
         if connection.unit is not None and (source is None or connection.unit != source.name):
             own = "no unit" if source is None else source.name

@@ -138,6 +138,30 @@ def test_units_that_measure_something_else_are_refused(tmp_path: Path) -> None:
         simulate(package(tmp_path, top, unit="K"), inputs={"IN": 1.0})
 
 
+def test_differences_have_no_offset_in_systems_parameters_and_components(tmp_path: Path) -> None:
+    celsius = {name: connector(name, kind, unit="degC") for name, kind in (("in", "input"), ("held", "input"))}
+    gain = binding(value("gain", "3", unit="degC"))
+    inner = system(
+        connectors(*celsius.values(), connector("out", "output")),
+        component("a", gain, unit="K") + component("b") + component("c", unit="degC"),
+        wire("in", "a/u") + wire("held", "b/u") + wire("a/x", "c/u") + wire("a/x", "out"),
+        "inner",
+    )
+    kelvin = connectors(
+        connector("IN", "input", unit="K"),
+        connector("HELD", "input", unit="K"),
+        connector("OUT", "output", unit="degC"),
+    )
+    wires = wire("IN", "inner/in") + wire("HELD", "inner/held") + wire("inner/out", "OUT")
+    top = system(kelvin + binding(value("HELD", "5", unit="degC")), inner, wires)
+    result = simulate(package(tmp_path, top, unit="K", relative=True), inputs={"IN": 2.0})
+    assert result["inner/a.x"][-1] == pytest.approx(6.0)
+    assert result["inner/b.x"][-1] == pytest.approx(10.0)
+    assert result["inner/c.x"][-1] == pytest.approx(6.0, rel=0.2)  # a held value, integrated
+    assert result["OUT"] == pytest.approx(result["inner/a.x"])
+    assert result.units["OUT"] == "degC"
+
+
 def test_values_in_a_systems_own_binding_reach_what_they_feed(tmp_path: Path) -> None:
     names = {"G": ("gain", "Real", "3"), "M": ("mode", "Integer", "5"), "B": ("on", "Boolean", "true")}
     own = connectors(

@@ -22,10 +22,16 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
+UNITS = """<UnitDefinitions><Unit name="K"><BaseUnit K="1"/></Unit>
+  <Unit name="mK"><BaseUnit K="1" factor="0.001"/></Unit>
+  <Unit name="degC"><BaseUnit K="1" offset="273.15"/><DisplayUnit name="degF" factor="1.8" offset="32"/></Unit>
+  </UnitDefinitions>"""
+
+
 def _variable(
-    reference: int, name: str, causality: str, variability: str, kind: str, start: str | None, unit: str | None = None
+    reference: int, name: str, causality: str, variability: str, kind: str, start: str | None, more: str = ""
 ) -> str:
-    given = ("" if start is None else f' start="{start}"') + (f' unit="{unit}"' if unit else "")
+    given = ("" if start is None else f' start="{start}"') + more
     attributes = f'name="{name}" valueReference="{reference}" causality="{causality}" variability="{variability}"'
     return f"\n    <ScalarVariable {attributes}><{kind}{given}/></ScalarVariable>"
 
@@ -38,6 +44,7 @@ def build_answers_fmu(
     parameters: bool = False,
     more: str = "",
     unit: str | None = None,
+    relative: bool = False,
     name: str = "Answers",
 ) -> Path:
     """Compile the FMU into ``folder`` and return its path.
@@ -48,7 +55,8 @@ def build_answers_fmu(
         saves, varies: capabilities that it declares: it saves its state, it takes steps of any length.
         parameters: whether ``mode`` (Integer) and ``on`` (Boolean) are fixed parameters, not inputs.
         more: attributes of CoSimulation.
-        unit: of ``u`` and ``x``: "K", or none.
+        unit: of ``u``, ``x`` and ``gain``: "K", "mK", "degC" or none.
+        relative: whether these are differences.
         name: stem of the file.
     """
     library = folder / "Answers.so"
@@ -59,16 +67,17 @@ def build_answers_fmu(
     attributes = f'canHandleVariableCommunicationStepSize="{str(varies).lower()}" {more}'
     attributes += f' canGetAndSetFMUstate="{str(saves).lower()}"'
     mode, held = ("parameter", "fixed") if parameters else ("input", "discrete")
+    kind = (f' unit="{unit}"' if unit else "") + (' relativeQuantity="true"' if relative else "")
     variables = (
-        _variable(0, "u", "input", "continuous", "Real", "0", unit),
-        _variable(1, "x", "output", "continuous", "Real", None, unit),
-        _variable(2, "gain", "parameter", "fixed", "Real", "2"),
+        _variable(0, "u", "input", "continuous", "Real", "0", kind),
+        _variable(1, "x", "output", "continuous", "Real", None, kind),
+        _variable(2, "gain", "parameter", "fixed", "Real", "2", kind),
         _variable(0, "mode", mode, held, "Integer", "0"),
         _variable(1, "steps", "output", "discrete", "Integer", None),
         _variable(0, "on", mode, held, "Boolean", "false"),
         _variable(0, "label", "parameter", "fixed", "String", ""),
     )
-    units = '<UnitDefinitions><Unit name="K"><BaseUnit K="1"/></Unit></UnitDefinitions>' if unit else ""
+    units = UNITS if unit else ""
     path = folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(

@@ -12,7 +12,7 @@ import msgspec
 from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import Unit, Value, Variable
-from orchestrator.master.units import resolve
+from orchestrator.master.units import unit_of
 from orchestrator.master.values import coerce_value
 from orchestrator.records.model_file import ModelParameter
 
@@ -177,9 +177,9 @@ class _MapCheck:
             n: msgspec.structs.replace(e, position=e.position or e.velocity or "") for n, e in written.ports.items()
         }
         units = {
-            name: resolve(text, self._system.model.units)
+            name: unit
             for name in (*written.inputs, *written.outputs)
-            if (text := self._variables[name].unit)
+            if (unit := unit_of(self._variables[name], self._system.model.units)) is not None
         }
         tunable = tuple(u.name for u in uncertain if self._variables[u.name].variability == "tunable")
         initial = tuple(u.name for u in uncertain if u.name in written.start)

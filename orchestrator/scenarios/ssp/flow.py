@@ -1,7 +1,7 @@
 """Where values go in a package: through the connectors of systems from component to component, units converted."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -85,13 +85,13 @@ class Flow:
         for target, root in self._ends():
             name = self._address(target)
             if root[0] in self._models:
-                value = self._carry(root, target, self._start_at(root))
+                value = self._carry(root, target, self._start_at(root, target))
                 source, own = self._own_unit(root), self._own_unit(target)
                 ratio = units.conversion(source, own) or (1.0, 0.0)  # what the master converts by itself
                 factor = value.factor / ratio[0]
                 connections.append(Connection(self._address(root), name, factor, value.offset - factor * ratio[1]))
             elif root[0] == "" and root[1] in inputs:
-                value = self._carry(root, target, self._start_at(root))
+                value = self._carry(root, target, self._start_at(root, target))
                 # As other tools do: what is set at a communication point holds over the step from there.
                 sources.append(SignalSource(name, Scaled(inputs[root[1]], value.factor, value.offset), at="start"))
         for name in inputs:
@@ -112,7 +112,8 @@ class Flow:
                 continue
             unit = None if given.unit is None else units.resolve(given.unit, {**self._structure.units, **given.units})
             number = given.factor * float(given.text) + given.offset
-            value = self._carry(root, target, self._step(_Value(1.0, 0.0, unit), self._connector_unit(root), root))
+            begin = _Value(1.0, 0.0, self._unit_for(target, unit))
+            value = self._carry(root, target, self._step(begin, self._connector_unit(root), root))
             number = value.factor * number + value.offset
             text = f"{number:.0f}" if number.is_integer() and abs(number) < 1e15 else repr(number)
             found[target] = Given(given.type, text, None, {})
@@ -124,7 +125,7 @@ class Flow:
             if node[0] == "" and kind == "output" and node in self._structure.drivers:
                 root = self._root(node)
                 if root[0] in self._models and self._address(root) in record:
-                    value = self._carry(root, node, self._start_at(root))
+                    value = self._carry(root, node, self._start_at(root, node))
                     unit = None if value.unit is None else value.unit.name
                     yield Derived(node[1], self._address(root), value.factor, value.offset, unit)
 
@@ -160,12 +161,20 @@ class Flow:
             _, factor, offset = self._structure.drivers[node]
             value = self._step(value, self._connector_unit(node), node)
             if (factor, offset) != (1.0, 0.0):
-                unit = self._connector_unit(node)
+                unit = self._unit_for(target, self._connector_unit(node))
                 value = _Value(factor * value.factor, factor * value.offset + offset, unit)
         return self._step(value, self._own_unit(target), target)
 
-    def _start_at(self, root: Node) -> _Value:
-        return self._step(_Value(1.0, 0.0, self._own_unit(root)), self._connector_unit(root), root)
+    def _start_at(self, root: Node, target: Node) -> _Value:
+        unit = self._unit_for(target, self._own_unit(root))
+        return self._step(_Value(1.0, 0.0, unit), self._connector_unit(root), root)
+
+    def _unit_for(self, target: Node, unit: Unit | None) -> Unit | None:
+        """Return a unit that is one of a difference where the value goes to a difference, unless it says itself."""
+        own = self._own_unit(target)
+        if unit is None or own is None or unit.difference is not None:
+            return unit
+        return replace(unit, difference=own.difference)
 
     def _step(self, value: _Value, unit: Unit | None, node: Node) -> _Value:
         """Return a value in another unit; where that measures something else, it is a problem."""
@@ -174,11 +183,13 @@ class Flow:
         ratio = units.conversion(value.unit, unit)
         if ratio is None:
             assert value.unit is not None
-            text = f"must have a unit that measures what {value.unit.name} does, but has {unit.name}"
+            text = units.describe_mismatch(value.unit, unit)
             problem = Problem(f"$.{'.'.join(filter(None, node))}", text, mismatch=True)
             if problem not in self._structure.problems:
                 self._structure.problems.append(problem)
             ratio = 1.0, 0.0
+        if unit.difference is None and value.unit is not None:
+            unit = replace(unit, difference=value.unit.difference)
         return _Value(ratio[0] * value.factor, ratio[0] * value.offset + ratio[1], unit)
 
     def _connector_unit(self, node: Node) -> Unit | None:
@@ -187,8 +198,10 @@ class Flow:
     def _own_unit(self, node: Node) -> Unit | None:
         """The unit that the FMU states; of a system's connector, and where the FMU states none, the connector's own."""
         model = self._models.get(node[0])
-        name = None if model is None or node[1] not in model.variables else model.variables[node[1]].unit
-        return self._connector_unit(node) if model is None or name is None else units.resolve(name, model.units)
+        variable = None if model is None else model.variables.get(node[1])
+        if model is None or variable is None or variable.unit is None:
+            return self._connector_unit(node)
+        return units.unit_of(variable, model.units)
 
     def _address(self, node: Node) -> str:
         return f"{self._names[node[0]]}.{node[1]}"

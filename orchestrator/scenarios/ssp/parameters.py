@@ -182,11 +182,11 @@ def _number(text: str) -> float:
 
 def _real(model: ModelInterface, name: str, given: Given, declared: Mapping[str, Unit]) -> float:
     value = given.factor * _number(given.text) + given.offset
-    unit = model.variables[name].unit
+    unit = units.unit_of(model.variables[name], model.units)
     if given.unit is None or unit is None:
         return value
     theirs = units.resolve(given.unit, {**declared, **given.units})
-    ratio = units.conversion(theirs, units.resolve(unit, model.units))
+    ratio = units.conversion(theirs, unit)
     if ratio is None:
-        raise ValueError(f" in {given.unit!r}, which does not measure what {unit} does")
+        raise ValueError(f" in {given.unit!r}, which does not measure what {unit.name} does")
     return ratio[0] * value + ratio[1]
