@@ -33,12 +33,12 @@ def _of_line(line: str, separator: str) -> float | None:
         key = pattern.search(line)
         if key is None:
             continue
-        rest = line[key.end() :]
-        in_brackets = _BRACKETS.match(rest.lstrip())
+        behind = line[key.end() :]
+        in_brackets = _BRACKETS.match(behind.lstrip())
         if in_brackets is not None:
-            rest = rest.lstrip()[in_brackets.end() :]
-        number = _VALUE.search(rest.replace(separator, " ") if separator in ";\t|" else rest)
-        if number is None or re.search(r"[^\s:=,;|\t\".]", rest[: _start_of(rest)]):
+            behind = behind.lstrip()[in_brackets.end() :]
+        number = _VALUE.search(behind.replace(separator, " ") if separator in ";\t|" else behind)
+        if number is None or re.search(r"[^\s:=,;|\t\".]", behind[: _start_of(behind)]):
             continue
         text = number[1].rstrip(".,")
         text = text.replace(",", ".") if text.count(",") == 1 and "." not in text else text
@@ -51,8 +51,8 @@ def _of_line(line: str, separator: str) -> float | None:
     return None
 
 
-def _start_of(rest: str) -> int:
-    digit = re.search(r"[-+]?\d", rest)
+def _start_of(behind: str) -> int:
+    digit = re.search(r"[-+]?\d", behind)
     return digit.start() if digit is not None else 0
 
 

@@ -21,7 +21,7 @@ class RowBlock:
     Attributes:
         first: number of the first row in the table, from 0.
         text: the rows, a line each.
-        count: number of rows.
+        count: rows in ``text``.
         misfit: number of the first row that has more or fewer cells than the table, and how many; None: none has.
     """
 

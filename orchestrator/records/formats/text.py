@@ -31,13 +31,13 @@ class TextSource(RecordSource):
         self.rate = rate_of(dialect.preamble, dialect.separator)
 
     @property
-    def dialect(self) -> str:
+    def dialect(self) -> str:  # type: ignore[override]
         """Return what was detected, and what was left out of the rows that were read."""
         left_out = self._rows.describe()
         return self._dialect.describe(self._file.encoding) + (f"; {left_out}" if left_out else "")
 
     @property
-    def broken(self) -> str:
+    def broken(self) -> str:  # type: ignore[override]
         """Return what stands among the rows that were read and is no row; empty: nothing."""
         return self._rows.describe() if self._rows.broken else ""
 

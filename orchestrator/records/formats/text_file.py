@@ -20,7 +20,7 @@ class TextFile:
 
     Attributes:
         encoding: as Python names it.
-        lines: number of lines.
+        lines: how many there are, the last one included where nothing ends it.
         last_comma: the last line that has a comma; -1: none has.
         tail: the last lines, whole ones.
     """
