@@ -62,6 +62,7 @@ def build(
     native: bool = False,
     platforms: str = "all",
     fmi: int = 2,
+    real_outputs: bool = False,
 ) -> BuildResult:
     """Build the FMUs that are missing or older than what they are made from.
 
@@ -73,12 +74,15 @@ def build(
         native: translate the sources to C and compile them, so that the FMUs need no Python at run time.
         platforms: of native FMUs: "all" that the compiler can make, or this one alone ("here"), which is quicker.
         fmi: version of FMI, 2 or 3.
+        real_outputs: of native FMUs: make outputs that are no real numbers local variables, for hosts that read every
+            output as a real number; they go to ``real/`` within the folder.
 
     Returns:
         The path of each FMU, by name.
 
     Raises:
-        FmuError: a name is unknown, a build fails, or a native one lacks a compiler.
+        FmuError: a name is unknown, a build fails, a native one lacks a compiler, or ``real_outputs`` is asked of
+            others.
         OutputError: ``directory`` is a file.
 
     Examples:
@@ -87,7 +91,11 @@ def build(
     """
     if fmi not in VERSIONS:
         raise FmuError(f"`fmi` must be one of {', '.join(map(str, VERSIONS))}, but is {fmi!r}", "fmi")
-    usual = native_directory(fmi) if native else default_directory(fmi)
+    if real_outputs and not native:
+        raise FmuError(
+            "`real_outputs` must be asked of native FMUs (`--native`), but is asked of others", "real_outputs"
+        )
+    usual = native_directory(fmi, real_outputs) if native else default_directory(fmi)
     folder = usual if directory is None else Path(directory)
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"`directory` must be a folder, but {folder} is a file", "directory")
@@ -97,15 +105,19 @@ def build(
     if platforms not in PLATFORMS:
         raise FmuError(f"`platforms` must be one of {', '.join(PLATFORMS)}, but is {platforms!r}", "platforms")
     if native:
-        return _native(list(names) if names else None, folder, force, platforms, fmi)
+        return _native(list(names) if names else None, folder, force, platforms, fmi, real_outputs)
     ensure = ensure_built if fmi == 2 else ensure_python_fmi3
     paths = ensure(list(names) if names else None, folder, force=force)
     given = {"names": list(paths), "directory": str(folder), "force": force} | ({"fmi": fmi} if fmi != 2 else {})
     return BuildResult(paths, find_toolchain().remark, given)
 
 
-def _native(names: Sequence[str] | None, folder: Path, force: bool, platforms: str, fmi: int) -> BuildResult:
-    paths = ensure_native(names, folder, force=force, here=platforms == "here", fmi=fmi)
+def _native(
+    names: Sequence[str] | None, folder: Path, force: bool, platforms: str, fmi: int, real_outputs: bool
+) -> BuildResult:
+    here = platforms == "here"
+    paths = ensure_native(names, folder, force=force, here=here, fmi=fmi, real_outputs=real_outputs)
     given = {"names": list(paths), "directory": str(folder), "force": force, "native": True, "platforms": platforms}
     given |= {"fmi": fmi} if fmi != 2 else {}
+    given |= {"real_outputs": True} if real_outputs else {}
     return BuildResult(paths, native_remark() if platforms == "all" else None, given)

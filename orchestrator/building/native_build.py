@@ -1,6 +1,7 @@
 """Builds native FMUs: the same slaves, translated to C and compiled, so that they need no Python at run time.
 
-In all functions: ``fmi``: version of FMI, 2 or 3.
+In all functions: ``fmi``: version of FMI, 2 or 3. ``real_outputs``: outputs that are no real numbers become local
+variables, for hosts that read every output as a real number.
 """
 
 from __future__ import annotations
@@ -30,9 +31,10 @@ PLACEHOLDER = "{00000000-0000-0000-0000-000000000000}"
 NO_COMPILER = "native FMUs need a C compiler: install one (cc), or `pip install 'backlash-cosim[native]'` for zig"
 
 
-def native_directory(fmi: int = 2) -> Path:
+def native_directory(fmi: int = 2, real_outputs: bool = False) -> Path:
     """Return where native FMUs live: ``native/`` beside the others, because they have the same names."""
-    return default_directory(fmi) / "native"
+    folder = default_directory(fmi) / "native"
+    return folder / "real" if real_outputs else folder
 
 
 def ensure_native(
@@ -41,6 +43,7 @@ def ensure_native(
     force: bool = False,
     here: bool = False,
     fmi: int = 2,
+    real_outputs: bool = False,
 ) -> dict[str, Path]:
     """Return the path of each native FMU in ``names`` (default: all), after building what is missing or stale.
 
@@ -49,7 +52,7 @@ def ensure_native(
     """
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = native_directory(fmi) if directory is None else directory
-    return {recipe.name: _ensure(recipe, folder, force, here, fmi) for recipe in recipes}
+    return {recipe.name: _ensure(recipe, folder, force, here, fmi, real_outputs) for recipe in recipes}
 
 
 def _require_compiler(here: bool = False) -> Compiler:
@@ -72,10 +75,11 @@ def native_remark() -> str | None:
     )
 
 
-def native_fingerprint(recipe: Recipe, compiler: Compiler, fmi: int = 2) -> str:
+def native_fingerprint(recipe: Recipe, compiler: Compiler, fmi: int = 2, real_outputs: bool = False) -> str:
     """Return what changes whenever a native build would."""
     options = {
         "fmi": fmi,
+        "real_outputs": real_outputs,
         "name": recipe.name,
         "class": recipe.class_name,
         "starts": {name: float(value).hex() for name, value in sorted(recipe.starts.items())},
@@ -99,19 +103,21 @@ def _builder_files() -> tuple[Path, ...]:
     return (*files, *DATA_FILES)
 
 
-def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int) -> Path:
+def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int, real_outputs: bool) -> Path:
     compiler = _require_compiler(here)
     path = directory / f"{recipe.name}.fmu"
-    current = native_fingerprint(recipe, compiler, fmi)
+    current = native_fingerprint(recipe, compiler, fmi, real_outputs)
     if force or stamp_of(path) != current or not is_trusted(path):
-        write_archive(path, _native_members(recipe, compiler, current, fmi))
+        write_archive(path, _native_members(recipe, compiler, current, fmi, real_outputs))
         record(path)
     return path
 
 
-def _native_members(recipe: Recipe, compiler: Compiler, fingerprint: str, fmi: int) -> dict[str, bytes]:
+def _native_members(
+    recipe: Recipe, compiler: Compiler, fingerprint: str, fmi: int, real_outputs: bool
+) -> dict[str, bytes]:
     """Return the members of the archive."""
-    cls = slave_class(recipe, fmi)
+    cls = slave_class(recipe, fmi, real_outputs)
     sources = c_sources(recipe, cls, PLACEHOLDER, fmi)
     folders = {target: target.folders(fmi) for target in compiler.targets}
     description = native_description(recipe, cls, indicator_count(sources[f"{recipe.name}.c"]))

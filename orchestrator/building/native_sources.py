@@ -54,11 +54,12 @@ _FILE = """/* {name}: {title}
 """
 
 
-def slave_class(recipe: Recipe, fmi: int = 2) -> Any:
+def slave_class(recipe: Recipe, fmi: int = 2, real_outputs: bool = False) -> Any:
     """Return the adapter of a recipe with the recipe's name and start values, as a class of its own.
 
     Args:
         fmi: version of FMI, 2 or 3; in the latter event indicators are variables too.
+        real_outputs: outputs that are no real numbers become local variables.
     """
     base = getattr(importlib.import_module(f"pyfmu_sources.{recipe.module}"), recipe.class_name)
     cls: Any = type(base.__name__, (base,), {"__module__": base.__module__, "__doc__": base.__doc__})
@@ -66,9 +67,16 @@ def slave_class(recipe: Recipe, fmi: int = 2) -> Any:
         cls.customise(recipe.name, "native", default_starts(recipe.class_name) | dict(recipe.starts))
     except ValueError as error:
         raise FmuError(str(error)) from None
+    if real_outputs:
+        cls.table = tuple(_hide_whole_output(variable) for variable in cls.table)
     cls.table = (*cls.table, *_state_variables(cls), *(_indicators(cls) if fmi == 3 else ()))
     cls._index()
     return cls
+
+
+def _hide_whole_output(variable: FmuVariable) -> FmuVariable:
+    whole = variable.causality == "output" and variable.type != "Real"
+    return variable._replace(causality="local") if whole else variable
 
 
 def _state_variables(cls: Any) -> Iterator[FmuVariable]:

@@ -30,6 +30,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of native FMUs: all that the compiler can make (default), or this one alone, which is quicker",
     )
     parser.add_argument("--fmi", type=int, choices=VERSIONS, default=2, help="version of FMI (default: 2)")
+    parser.add_argument(
+        "--real-outputs",
+        action="store_true",
+        help="of native FMUs: no outputs but real numbers, for hosts that read all as such; into real/",
+    )
     parser.add_argument("--force", action="store_true", help="build even what is up to date")
 
 
@@ -43,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
             native=args.native,
             platforms=args.platforms,
             fmi=args.fmi,
+            real_outputs=args.real_outputs,
         )
         result.write(folder, args.out)
     print_blocks(result.blocks())

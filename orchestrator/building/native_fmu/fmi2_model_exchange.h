@@ -54,7 +54,7 @@ EXPORT Status FMI(fmi2SetTime)(Component c, double time)
 EXPORT Status FMI(fmi2SetContinuousStates)(Component c, const double x[], size_t n)
 {
     ENTER_EXCHANGE(fmi2SetContinuousStates, x != NULL && n == CONTINUOUS_STATES)
-    return set_states(s, x);
+    return set_states(s, 0, x, CONTINUOUS_STATES);
 }
 
 EXPORT Status FMI(fmi2GetContinuousStates)(Component c, double x[], size_t n)

@@ -8,7 +8,7 @@
 static bool in_mode(Instance *s, bool event_mode)
 {
     if (s->course.phase != STEPPING)
-        say(s, ERROR, "%s must not be called %s", s->function, phase_names[s->course.phase]);
+        say(s, ERROR, "%s must not be called %s", s->function, mode_name(s));
     else if (!s->course.in_event_mode == event_mode)
         say(s, ERROR, "%s must %sbe called in event mode", s->function, event_mode ? "" : "not ");
     return s->worst == OK;
@@ -196,7 +196,7 @@ EXPORT Status FMI(fmi3GetNumberOfEventIndicators)(Component c, size_t *n)
 EXPORT Status FMI(fmi3SetContinuousStates)(Component c, const double x[], size_t n)
 {
     ENTER_NUMBERS(fmi3SetContinuousStates, x, CONTINUOUS_STATES)
-    return in_mode(s, false) ? set_states(s, x) : s->worst;
+    return in_mode(s, false) ? set_states(s, 0, x, CONTINUOUS_STATES) : s->worst;
 }
 
 EXPORT Status FMI(fmi3GetContinuousStates)(Component c, double x[], size_t n)

@@ -95,11 +95,17 @@ static const char *name_of(Reference r, char text[64])
     return text;
 }
 
+static const char *mode_name(const Instance *s)
+{
+    const bool exchange = s->course.phase == STEPPING && s->course.type == MODEL_EXCHANGE;
+    return exchange ? "in event or continuous-time mode" : phase_names[s->course.phase];
+}
+
 static bool expects(Instance *s, Phase phase)
 {
     if (s->course.phase == (int32_t)phase)
         return true;
-    say(s, ERROR, "%s must not be called %s; ignored", s->function, phase_names[s->course.phase]);
+    say(s, ERROR, "%s must not be called %s; ignored", s->function, mode_name(s));
     return false;
 }
 
@@ -329,7 +335,7 @@ static Status refuse_step(Instance *s, double time, double step)
     if (s->course.type != CO_SIMULATION)
         say(s, ERROR, "%s must not be called in model exchange", s->function);
     else if (s->course.phase != STEPPING)
-        say(s, ERROR, "%s must not be called %s", s->function, phase_names[s->course.phase]);
+        say(s, ERROR, "%s must not be called %s", s->function, mode_name(s));
     else if (!(0.0 < step && step <= LARGEST_REAL))
         say(s, DISCARD, "communicationStepSize must be positive and finite, but is %r", step);
     else if (!(fabs(time - s->course.time) <= TIME_TOLERANCE * (1.0 + fabs(time))))
@@ -393,9 +399,22 @@ static Status refuse_types(Instance *s, const Reference r[], size_t n)
     return s->worst;
 }
 
+#ifdef CONTINUOUS_STATES
+/* Whether a host may set a continuous state by its variable, as CasADi does: when it may set them all. */
+static bool is_state_to_set(const Instance *s, Reference r)
+{
+    return r >= FIRST_STATE && r < FIRST_STATE + CONTINUOUS_STATES && s->course.type == MODEL_EXCHANGE &&
+           s->course.phase == STEPPING && !s->course.in_event_mode;
+}
+#endif
+
 static bool settable(const Instance *s, Reference r)
 {
     const Causality causality = variables[r].causality;
+#ifdef CONTINUOUS_STATES
+    if (is_state_to_set(s, r))
+        return true;
+#endif
     return (causality == INPUT && s->course.phase <= STEPPING) || (causality == PARAMETER && s->course.phase < STEPPING);
 }
 
@@ -408,13 +427,34 @@ static bool may_set(Instance *s, Reference r, bool is_type)
     if (is_type && settable(s, r))
         return true;
     say(s, ERROR, "%s must not set %s, which %s %s", s->function, name_of(r, text),
-        is_type ? causalities[variables[r].causality] : "has another type", phase_names[s->course.phase]);
+        is_type ? causalities[variables[r].causality] : "has another type", mode_name(s));
     return false;
 }
+
+#ifdef CONTINUOUS_STATES
+/* Set continuous states from the k-th on, if all are finite. */
+static Status set_states(Instance *s, size_t k, const double x[], size_t n)
+{
+    for (size_t m = 0; m < n; m++)
+        if (!(-LARGEST_REAL <= x[m] && x[m] <= LARGEST_REAL)) {
+            say(s, DISCARD, "continuous states must be finite, but %s is %r", variables[FIRST_STATE + k + m].shown, x[m]);
+            return s->worst;
+        }
+    memcpy(STATES(&s->slave) + k, x, n * sizeof *x);
+    s->fresh = false;
+    return s->worst;
+}
+#endif
 
 static void set_real(Instance *s, Reference r, double value)
 {
     const Variable *variable = &variables[r];
+#ifdef CONTINUOUS_STATES
+    if (is_state_to_set(s, r)) {
+        set_states(s, r - FIRST_STATE, &value, 1);
+        return;
+    }
+#endif
     if (variable->low <= value && value <= variable->high)
         s->slave.real[r] = value;
     else

@@ -6,7 +6,7 @@
     ENTER(name, condition) \
     if (s->course.type != MODEL_EXCHANGE || s->course.phase != STEPPING) { \
         say(s, ERROR, "%s must not be called %s", s->function, \
-            s->course.type != MODEL_EXCHANGE ? "in co-simulation" : phase_names[s->course.phase]); \
+            s->course.type != MODEL_EXCHANGE ? "in co-simulation" : mode_name(s)); \
         return s->worst; \
     }
 
@@ -48,18 +48,6 @@ static Status completed_step(Instance *s, bool *event)
         *event = *event || values[n] <= 0.0;
 #endif
     return s->worst;
-}
-
-static Status set_states(Instance *s, const double x[])
-{
-    for (size_t k = 0; k < CONTINUOUS_STATES; k++)
-        if (!(-LARGEST_REAL <= x[k] && x[k] <= LARGEST_REAL)) {
-            say(s, DISCARD, "continuous states must be finite, but %s is %r", variables[FIRST_STATE + k].shown, x[k]);
-            return s->worst;
-        }
-    memcpy(STATES(&s->slave), x, CONTINUOUS_STATES * sizeof *x);
-    s->fresh = false;
-    return OK;
 }
 
 static Status derivatives_of(Instance *s, double derivatives[])

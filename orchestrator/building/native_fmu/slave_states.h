@@ -200,7 +200,7 @@ static Status directional_derivative(Instance *s, const Reference unknown[], siz
     Fault fault;
     fault.kind = NO_FAULT;
     if (s->course.phase != INITIALIZING && s->course.phase != STEPPING) {
-        say(s, ERROR, "%s must not be called %s", s->function, phase_names[s->course.phase]);
+        say(s, ERROR, "%s must not be called %s", s->function, mode_name(s));
         return s->worst;
     }
     for (size_t k = 0; k < m; k++) {
