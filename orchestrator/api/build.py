@@ -92,9 +92,7 @@ def build(
     if fmi not in VERSIONS:
         raise FmuError(f"`fmi` must be one of {', '.join(map(str, VERSIONS))}, but is {fmi!r}", "fmi")
     if real_outputs and not native:
-        raise FmuError(
-            "`real_outputs` must be asked of native FMUs (`--native`), but is asked of others", "real_outputs"
-        )
+        raise FmuError("`real_outputs` must be asked of native FMUs, but is asked of others", "real_outputs")
     usual = native_directory(fmi, real_outputs) if native else default_directory(fmi)
     folder = usual if directory is None else Path(directory)
     if folder.exists() and not folder.is_dir():
