@@ -1,5 +1,6 @@
 """The corrected plant as an FMU: built, checked, and run beside the nominal one by the master algorithm."""
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,7 @@ from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
 from orchestrator.plants.measurement import LEAD
 from orchestrator.records.model_file import Model
+from orchestrator.records.model_text import entry_texts, toml_text
 
 Array = NDArray[np.float64]
 
@@ -140,10 +142,10 @@ def requests_for_fmu(signals: RunSignals, plant: Plant, p: Array) -> Array:
 
 
 def format_corrected_model(model: Model, diagnosis: Diagnosis) -> str:
-    """Return the TOML text of a model with the values of a diagnosis.
+    """Return the TOML text of a model with the values of a diagnosis; it reads records as ``model`` does.
 
     Every value that differs from the FMU's default is stated. Those that were fitted carry the half-width of their
-    95 % interval as uncertainty, so that another record may move them.
+    95 % interval as uncertainty, so that another record may move them; all others are exact.
     """
     plant, final = model.plant, diagnosis.workings.final
     fitted: dict[str, ValueEstimate] = dict(diagnosis.parameters)
@@ -151,19 +153,19 @@ def format_corrected_model(model: Model, diagnosis: Diagnosis) -> str:
         named = next((one for one in diagnosis.effects if one.label == row.label and one.in_model), None)
         if named is not None:
             fitted |= {name: named.parameters[short] for short, name in row.parameters.items()}
-    lines = [f'fmu = "{model.fmu}"']
+    lines = [f"fmu = {toml_text(model.fmu)}"]
+    lines += [] if model.header is None else [f"header = {model.header}"]
     for place, entry in enumerate(plant.table):
         value = float(final[place])
-        if value == entry.default and entry.name not in fitted:
+        if value == entry.default and entry.name not in fitted and entry.name not in plant.linear:
             continue
-        lines += ["", f'[parameters."{entry.name}"]', f"value = {value!r}"]
+        uncertainty = 0.0
         if entry.name in fitted:
             low, high = fitted[entry.name].interval
-            lines.append(f"uncertainty = {0.5 * (high - low)!r}")
-    for name, encoder in model.encoders.items():
-        lines += ["", f"[encoders.{name}]"]
-        lines += [f"{key} = {v!r}" for key in ("resolution", "noise") if (v := getattr(encoder, key)) is not None]
-    for name, column in model.columns.items():
-        lines += ["", f"[columns.{name}]", f'name = "{column.name}"']
-        lines += [f'unit = "{column.unit}"'] if column.unit else []
+            half = 0.5 * float(high - low)
+            uncertainty = half if math.isfinite(half) else model.parameters[entry.name].uncertainty
+        lines += ["", f"[parameters.{toml_text(entry.name)}]", f"value = {value!r}", f"uncertainty = {uncertainty!r}"]
+    for table, entries in (("encoders", model.encoders), ("columns", model.columns)):
+        for name, said in entries.items():
+            lines += ["", f"[{table}.{name}]", *(f"{key} = {text}" for key, text in entry_texts(said).items())]
     return "\n".join(lines) + "\n"

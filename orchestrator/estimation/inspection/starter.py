@@ -10,6 +10,7 @@ from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
 from orchestrator.records.loading import choose_channels
 from orchestrator.records.model_file import Model
+from orchestrator.records.model_text import entry_texts
 from orchestrator.records.units import parse_unit
 
 ASSUMED_COUNTS = 4096.0
@@ -97,20 +98,8 @@ def starter(
 
 
 def _column_lines(column: Column, assumed: Sequence[str], name: str) -> list[str]:
-    quoted = column.name.replace("\\", "\\\\").replace('"', '\\"')
-    lines = [f'name = "{quoted}"']
-    if column.unit:
-        lines.append(f'unit = "{column.unit}"')
     mark = "   # ASSUMED: put in the drive's" if any(name in text or name == "time" for text in assumed) else ""
-    for key in MACHINE_KEYS:
-        value = getattr(column, key)
-        if value is not None:
-            lines.append(f"{key} = {value:.10g}{mark}")
-    for key, default in (("factor", 1.0), ("offset", 0.0), ("relative_uncertainty", 0.0)):
-        value = getattr(column, key)
-        if value != default:
-            lines.append(f"{key} = {value:.10g}")
-    return lines
+    return [f"{key} = {text}{mark if key in MACHINE_KEYS else ''}" for key, text in entry_texts(column).items()]
 
 
 def _further(model: Model, written: Mapping[str, str]) -> list[str]:
