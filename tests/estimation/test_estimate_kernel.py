@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 from orchestrator.estimation.innovations import _discrete, affine_model
 from orchestrator.estimation.kernel import BLUR, advance_blurred, propagate
@@ -62,3 +63,19 @@ def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
     rate = free @ x + model.inputs * TORQUE + model.constants[1] + by_twist * wound
     np.testing.assert_allclose((after - x) / h, rate, rtol=1e-3, atol=1e-2)
     np.testing.assert_allclose((total - np.eye(5)) / h, free + touching * (tight - free), rtol=0.02, atol=1e-2)
+
+
+@pytest.mark.parametrize("lag", [1.0, 5e-3, 2e-4, 6e-5, 1e-6])
+def test_the_transition_is_exact_for_a_drive_of_any_lag(lag):
+    """A lag of a thousandth of a sample too: the series of the whole sample would have lost every digit."""
+    model = affine_model(parameters(J_m=0.002, J_l=0.3, k=900.0, c=1.0, b_m=0.003, b_l=0.1, i=12.0, tau=lag))
+    phi, gain_u, gain_1 = _discrete(model, STEP)
+    for mode in range(3):
+        whole = np.zeros((7, 7))
+        whole[:5, :5] = model.matrices[mode]
+        whole[:5, 5], whole[:5, 6] = model.inputs, model.constants[mode]
+        expected = scipy.linalg.expm(STEP * whole)
+        scale = np.abs(expected[:5]).max()
+        np.testing.assert_allclose(phi[mode], expected[:5, :5], rtol=1e-9, atol=1e-12 * scale)
+        np.testing.assert_allclose(gain_u[mode], expected[:5, 5], rtol=1e-9, atol=1e-12 * scale)
+        np.testing.assert_allclose(gain_1[mode], expected[:5, 6], rtol=1e-9, atol=1e-12 * scale)
