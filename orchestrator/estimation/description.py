@@ -27,7 +27,10 @@ def describe(fit: GapFit) -> Estimate:
     curve = profile(fit)
     # Torque noise above the least means that the model is not exact; what it lacks is not white, as the likelihood
     # takes it to be, so the interval is widened.
-    inexact = max(likelihood.noise(fit.point.theta).torque) > 10.0 * LEAST_TORQUE_NOISE
+    torque_noise = likelihood.noise(fit.point.theta).torque
+    inexact = any(
+        w > 10.0 * LEAST_TORQUE_NOISE * unit for w, unit in zip(torque_noise, problem.torque_units, strict=True)
+    )
     wider = max(settings.misfit_widening**2 if inexact else 1.0, _block_variance(fit, column, settings.blocks))
     limit = NORMAL_95**2 * wider
     low, high = curve.interval(alpha, limit)

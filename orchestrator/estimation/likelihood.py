@@ -195,10 +195,12 @@ class Likelihood:
         """
         base = point.result
         basis = self._basis(free)
+        lower, upper = (np.array([getattr(self.problem.unknowns[n], end) for n in free]) for end in ("lower", "upper"))
 
         def look(n: int, step: float) -> tuple[Array, Array]:
+            # Beyond a bound a plant may be none: a drive whose lag is negative runs away.
             moved = point.theta.copy()
-            moved[free] += step * basis[:, n]
+            moved[free] = np.clip(point.theta[free] + step * basis[:, n], lower, upper)
             result = self.run(moved)
             error = (result.errors - base.errors) / (step * np.sqrt(base.variances))
             spread = (result.variances - base.variances) / (step * base.variances)

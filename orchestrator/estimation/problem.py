@@ -23,7 +23,9 @@ NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of
 # law is not the machine's is too sure of itself; a least noise of motor and load keeps both honest.
 LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-9, 30.0
 LEAST_WHERE_INEXACT = (1e-4, 1e-3)
-DRIVES = (3.0, 20.0)  # rms of the drive's torque [N.m] for which levels of torque noise hold as they are
+# Least and largest rms of the drive's torque [N.m], at motor and load, for which levels of torque noise hold as they
+# are. They were found with the thesis's gear.
+DRIVES = ((3.0, 20.0), (12.0, 80.0))
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,8 @@ class GapProblem:
         unknowns: every unknown, in the order of the vector; free or not is decided per fit.
         outputs: (n, 1 or 2) measured angles [rad].
         noise: nominal noise levels, for those that are not among the unknowns.
-        torque_unit: by what levels of torque noise are to be multiplied for a drive as weak, or as strong, as this one.
+        torque_units: by what levels of torque noise at motor and load are to be multiplied for a drive as weak, or as
+            strong, as this one.
     """
 
     record: Record
@@ -55,7 +58,7 @@ class GapProblem:
     unknowns: tuple[Unknown, ...]
     outputs: Array
     noise: NoiseLevels
-    torque_unit: float = 1.0
+    torque_units: tuple[float, float] = (1.0, 1.0)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,6 +69,11 @@ class GapProblem:
     def start(self) -> Array:
         """Return the prior means."""
         return np.array([unknown.mean for unknown in self.unknowns])
+
+    @property
+    def least_where_inexact(self) -> tuple[float, float]:
+        """Return the least torque noise at motor and load [N.m.s^0.5] that keeps an inexact model honest."""
+        return scale_noise(LEAST_WHERE_INEXACT, self.torque_units)
 
     def index(self, name: str) -> int:
         """Return the place of an unknown in the vector, from 0."""
@@ -95,7 +103,8 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     if record.u_scale_uncertainty > 0.0:
         spread = record.u_scale_uncertainty / math.sqrt(3.0)
         unknowns.append(Unknown(SCALE, 1.0, spread, spread, 0.1, 10.0))
-    unknowns += _initial_state(record, ratio)
+    units = _torque_units(record, model.parameters["tau"].value, ratio)
+    unknowns += _initial_state(record, ratio, units[0])
     levels, noises = [], []
     for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
         level = measurement_noise(record, model, column)
@@ -105,26 +114,35 @@ def make_problem(record: Record, model: Model) -> GapProblem:
         spread = 0.02 if known else NOISE_SPREAD
         least = max(math.log(level) - 6.0, math.log(max(rounding_noise(record, model, column), 1e-12)))
         noises.append(Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, least, math.log(level) + 6.0))
-    unit = _torque_unit(record, model.parameters["tau"].value)
-    exact = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE)
-    for side, low in zip(
-        ("motor", "load"), exact if both else tuple(unit * w for w in LEAST_WHERE_INEXACT), strict=True
-    ):
-        noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(LARGEST_TORQUE_NOISE)))
+    least = scale_noise((LEAST_TORQUE_NOISE,) * 2 if both else LEAST_WHERE_INEXACT, units)
+    most = scale_noise((LARGEST_TORQUE_NOISE,) * 2, units)
+    for side, low, high in zip(("motor", "load"), least, most, strict=True):
+        noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(high)))
     if not both:
         levels.append(levels[0])
     return GapProblem(
-        record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0)), unit
+        record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0)), units
     )
 
 
-def _torque_unit(record: Record, lag: float) -> float:
-    """Return the rms of the drive's torque, ``lag`` [s] behind the request, over the nearest of usual drives."""
+def scale_noise(level: tuple[float, float], units: tuple[float, float]) -> tuple[float, float]:
+    """Return a level of torque noise at motor and load [N.m.s^0.5] as the strength of a drive asks for."""
+    return units[0] * level[0], units[1] * level[1]
+
+
+def _torque_units(record: Record, lag: float, ratio: float) -> tuple[float, float]:
+    """Return the rms of the drive's torque, ``lag`` [s] behind the request, over the nearest of usual drives.
+
+    It is taken at the motor and, multiplied by the gear, at the load.
+    """
     rms = rms_behind_lag(record.u, record.step, lag)
-    return rms / min(max(rms, DRIVES[0]), DRIVES[1])
+    motor, load = (
+        value / min(max(value, low), high) for value, (low, high) in zip((rms, abs(ratio) * rms), DRIVES, strict=True)
+    )
+    return motor, load
 
 
-def _initial_state(record: Record, ratio: float) -> list[Unknown]:
+def _initial_state(record: Record, ratio: float, torque_unit: float) -> list[Unknown]:
     """Return unknowns for the initial state, centred on a straight line through the first rows."""
     speed_m, angle_m = _first_line(record.time, record.theta_m)
     if record.theta_l is not None:
@@ -133,8 +151,8 @@ def _initial_state(record: Record, ratio: float) -> list[Unknown]:
     else:
         speed_l, angle_l, spread_l = speed_m / ratio, angle_m / ratio, 0.1
     means = (float(angle_m), float(speed_m), float(angle_l), float(speed_l), 0.0)
-    spreads = (0.02, 3.0, spread_l, 1.0, 30.0)
-    scales = (1e-4, 1e-2, 1e-4, 1e-2, 1e-1)
+    spreads = (0.02, 3.0, spread_l, 1.0, 30.0 * torque_unit)
+    scales = (1e-4, 1e-2, 1e-4, 1e-2, 0.1 * torque_unit)
     return [Unknown(*entry) for entry in zip(STATE_NAMES, means, spreads, scales, strict=True)]
 
 

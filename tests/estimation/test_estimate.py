@@ -132,7 +132,7 @@ def test_the_motor_encoder_of_a_weak_drive_is_enough() -> None:
     """A loop that asks for 0.3 N.m: torque noise that a strong drive hardly feels would hide all of the motion."""
     case = one_encoder_case(715003, 15.0)
     problem = make_problem(case.record, model_of(case))
-    assert problem.torque_unit == pytest.approx(0.1, rel=0.5)
+    assert problem.torque_units[0] == pytest.approx(0.1, rel=0.5)
     fit = fit_record(Likelihood(problem))
     assert fit.point.theta[problem.index("alpha")] == pytest.approx(case.truth["effects"]["alpha"], rel=0.02)
 

@@ -19,7 +19,13 @@ from orchestrator.estimation.description import describe
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
-from orchestrator.estimation.problem import IMPULSE, LEAST_WHERE_INEXACT, make_problem, with_least_torque_noise
+from orchestrator.estimation.problem import (
+    IMPULSE,
+    LEAST_WHERE_INEXACT,
+    make_problem,
+    scale_noise,
+    with_least_torque_noise,
+)
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.model_file import Model
@@ -93,8 +99,8 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit
         return None
     report("fitting the whole record", BEFORE_WHOLE)
     likelihood = likelihood.with_options(soft=short.soft, information=short.information)
-    if short.problem.unknowns[_split(short)[0][-1]].lower >= math.log(LEAST_WHERE_INEXACT[-1]):
-        likelihood = likelihood.with_options(problem=with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT))
+    if _has_least_noise(short):
+        likelihood = _with_least_noise(likelihood)
     torque, others = _split(likelihood)
     start = maximise(likelihood, first.point.theta, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
     best = _free_fit(start.likelihood, start, torque, others)
@@ -107,12 +113,13 @@ def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
     torque, others = _split(likelihood)
     report("trying sizes", 0.0)
     if problem.outputs.shape[1] == 2:
-        tried, likelihood = _first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
+        levels = _levels(likelihood, BOTH_ENCODERS)
+        tried, likelihood = _first_fits(likelihood, torque, others, np.log(levels[0]))
         firsts = _different(tried, problem.index("alpha"), likelihood.settings.fit.different)
         fits = []
         for n, first in enumerate(firsts):
             report("fitting all values", BEFORE_FIT + (BEFORE_FREE - BEFORE_FIT) * n / len(firsts))
-            best, likelihood = _continue(likelihood, first, BOTH_ENCODERS[1:])
+            best, likelihood = _continue(likelihood, first, levels[1:])
             fits.append(best)
         report("fitting the noise", BEFORE_FREE)
         best = _free_fit(likelihood, min(fits, key=lambda fit: fit.point.objective), torque, others)
@@ -126,13 +133,25 @@ def _with_contact(best: GapFit, torque: list[int], others: list[int]) -> GapFit:
     likelihood = best.likelihood
     if not _has_other_contact(likelihood, best):
         return best
-    if likelihood.problem.unknowns[torque[-1]].lower >= math.log(LEAST_WHERE_INEXACT[-1]):
-        return best  # it has that already
-    likelihood = likelihood.with_options(problem=with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT))
+    if _has_least_noise(likelihood):
+        return best
+    likelihood = _with_least_noise(likelihood)
     start = best.point.theta.copy()
-    start[torque] = np.maximum(start[torque], np.log(LEAST_WHERE_INEXACT))
+    start[torque] = np.maximum(start[torque], np.log(likelihood.problem.least_where_inexact))
     best = maximise(likelihood, start, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
     return _free_fit(best.likelihood, best, torque, others)
+
+
+def _has_least_noise(likelihood: Likelihood) -> bool:
+    """Return whether the torque noise is kept above what an inexact model needs."""
+    problem = likelihood.problem
+    return problem.unknowns[problem.index("log_torque_load")].lower >= math.log(problem.least_where_inexact[-1])
+
+
+def _with_least_noise(likelihood: Likelihood) -> Likelihood:
+    """Return the likelihood with the torque noise kept above what an inexact model needs."""
+    problem = likelihood.problem
+    return likelihood.with_options(problem=with_least_torque_noise(problem, problem.least_where_inexact))
 
 
 def _has_other_contact(likelihood: Likelihood, fit: GapFit) -> bool:
@@ -205,13 +224,12 @@ def _sharpen(
 
 def _levels(likelihood: Likelihood, levels: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Return levels of torque noise as the strength of the record's drive asks for."""
-    unit = likelihood.problem.torque_unit
-    return [(unit * motor, unit * load) for motor, load in levels]
+    return [scale_noise(level, likelihood.problem.torque_units) for level in levels]
 
 
 def _is_calm(likelihood: Likelihood, fit: GapFit) -> bool:
     """Tell whether a fit of one encoder gets down to as little torque noise at the load as a right one does."""
-    most = likelihood.problem.torque_unit * likelihood.settings.fit.calm_torque_noise
+    most = likelihood.problem.torque_units[1] * likelihood.settings.fit.calm_torque_noise
     return likelihood.noise(fit.point.theta).torque[1] <= most
 
 

@@ -1,0 +1,66 @@
+"""A fit does not depend on the size of the machine: torques and inertias by any factor, gears of any ratio."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.methods import maximum_likelihood
+from orchestrator.estimation.problem import make_problem
+from orchestrator.records.model_file import Model, default_model
+from orchestrator.records.record import Record, record_from_columns
+from tests.support.independent_plant import make_record
+
+TORQUES = ("J_m", "J_l", "k", "c", "b_m", "b_l")  # parameters that a torque's unit is in
+GAP = 0.012
+
+
+def _weak(factor: float) -> tuple[Record, Model]:
+    """Return a record of 4 s of a machine with a weak drive, all of whose torques are multiplied by a factor."""
+    columns, _ = make_record(
+        {"alpha": GAP}, 5, 4.0, mismatch=0.04, torque=0.05, linear={"tau": 0.02}, substeps=50, noise=(1e-4, 5e-5),
+        counts=None,
+    )  # fmt: skip
+    record = record_from_columns(columns | {"u": factor * columns["u"]}, "weak")
+    model = default_model()
+    parameters = dict(model.parameters)
+    for name in TORQUES:
+        one = parameters[name]
+        parameters[name] = replace(one, value=factor * one.value, uncertainty=factor * one.uncertainty)
+    parameters["tau"] = replace(parameters["tau"], value=0.02, uncertainty=0.002)
+    return record, replace(model, parameters=parameters)
+
+
+def test_all_torques_by_a_factor_leave_the_gap_as_it_is() -> None:
+    """Levels of torque noise that were fixed would call a drive of microwatts noise."""
+    found = [maximum_likelihood.estimate(*_weak(factor), threads=1) for factor in (1.0, 1e-5)]
+    assert found[0].alpha == pytest.approx(GAP, rel=0.01)
+    assert found[1].alpha == pytest.approx(found[0].alpha, rel=1e-5)
+    assert found[1].standard_error == pytest.approx(found[0].standard_error, rel=0.01)
+    assert found[1].message == found[0].message
+
+
+def test_levels_of_noise_at_the_load_follow_the_gear() -> None:
+    record, model = _weak(1.0)
+    geared = replace(model, parameters=model.parameters | {"i": replace(model.parameters["i"], value=100.0)})
+    plain, high = (make_problem(record, one).torque_units for one in (model, geared))
+    assert plain[0] == high[0] < 1.0
+    assert plain[1] == pytest.approx(plain[0], rel=0.01)
+    assert high[1] == pytest.approx(100.0 * 3.0 * high[0] / 80.0, rel=0.01)  # of 80 N.m, which is much for the thesis's
+
+
+def test_a_difference_is_not_taken_beyond_a_bound() -> None:
+    """A drive whose lag has become as small as it may be is not looked at with a negative one, which runs away."""
+    problem = make_problem(*_weak(1.0))
+    likelihood, theta = Likelihood(problem), problem.start
+    place = problem.index("tau")
+    lowest = 1e-6
+    unknowns = list(problem.unknowns)
+    unknowns[place] = replace(unknowns[place], mean=lowest, lower=lowest, deviation=math.inf, scale=1e-3)
+    likelihood = Likelihood(replace(problem, unknowns=tuple(unknowns)))
+    theta[place], theta[problem.index("alpha")] = lowest, GAP
+    gradient, information, _ = likelihood.derivatives(likelihood.at(theta), np.arange(theta.size))
+    assert np.isfinite(gradient).all()
+    assert np.isfinite(information).all()
