@@ -1,5 +1,6 @@
 """Clocks of FMI 3.0, from a model description: ticked by the master, timed by the FMU, or ticked by nobody."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -9,12 +10,11 @@ from lxml import etree
 from orchestrator.fmi.variables3 import Variables3
 from orchestrator.master.protocol import PeriodicClock, TriggeredClock
 
+_TIME = re.compile(
+    r"(?P<number>[+-]?(\d{1,40}\.?\d{0,40}|\.\d{1,40})([eE][+-]?0?\d{1,2})?)(/(?P<divisor>\d{1,40}))?", re.ASCII
+)
 SELF_SAMPLING = "backlash-cosim.samples-itself"
 """Type of the annotation of a clock whose FMU samples by itself where event mode is not used."""
-
-
-class UnusableError(Exception):
-    """An FMU that follows the standard, but needs what no master here does."""
 
 
 @dataclass(frozen=True)
@@ -100,27 +100,43 @@ def _samples_itself(clock: etree._Element) -> bool:
     return any(note.get("type") == SELF_SAMPLING for note in clock.iterfind("Annotations/Annotation"))
 
 
-def clock_interval(clock: etree._Element) -> Fraction | None:
-    """Return a clock's interval in seconds, where it is declared."""
-    interval = _seconds(clock, "interval")
+def clock_interval(clock: etree._Element, name: str | None = None) -> Fraction | None:
+    """Return a clock's interval in seconds, where it is declared.
+
+    Args:
+        name: of the clock, where the element has none.
+    """
+    named = f"interval of its clock {name or clock.get('name')!r}"
+    interval = _seconds(clock, "interval", named)
     if interval is not None and interval <= 0:
-        raise ValueError(f"its clock {clock.get('name')!r} has an interval of {float(interval):g} s")
+        raise ValueError(f"the {named} must be positive, but is {float(interval):g} s")
     return interval
 
 
 def _shift(clock: etree._Element) -> Fraction:
-    shift = _seconds(clock, "shift") or Fraction(0)
+    named = f"shift of its clock {clock.get('name')!r}"
+    shift = _seconds(clock, "shift", named) or Fraction(0)
     if shift < 0:
-        raise ValueError(f"its clock {clock.get('name')!r} has a shift of {float(shift):g} s")
+        raise ValueError(f"the {named} must not be negative, but is {float(shift):g} s")
     return shift
 
 
-def _seconds(clock: etree._Element, what: str) -> Fraction | None:
+def _seconds(clock: etree._Element, what: str, named: str) -> Fraction | None:
     """Return a time of a clock: the exact one, where there is one."""
     counter, resolution, decimal = clock.get(f"{what}Counter"), clock.get("resolution"), clock.get(f"{what}Decimal")
-    if counter is not None and resolution is not None:
-        return Fraction(int(counter), int(resolution))
-    return None if decimal is None else Fraction(decimal)
+    text = decimal if counter is None or resolution is None else f"{counter.strip()}/{resolution.strip()}"
+    try:
+        return None if text is None else exact_time(text)
+    except ValueError as error:
+        raise ValueError(f"the {named} {error}") from None
+
+
+def exact_time(text: str) -> Fraction:
+    """Return a time as it is written: a decimal number, or a quotient such as "1/3000"."""
+    match = _TIME.fullmatch(text.strip())
+    if match is None or (match["divisor"] and not int(match["divisor"])):
+        raise ValueError(f"must be a finite number of seconds or a quotient such as 1/3000, but is {text!r}")
+    return Fraction(match["number"]) / int(match["divisor"] or 1)
 
 
 @dataclass(frozen=True)
@@ -156,6 +172,6 @@ def times_problem(name: str, clocks: Mapping[str, PeriodicClock], features: Even
     return f"must be a clock whose interval can be set ({known or 'there is none'}), but is {name!r}"
 
 
-def clock_names(names: Sequence[str]) -> str:
+def names_in_words(names: Sequence[str]) -> str:
     """Return names as a sentence lists them."""
     return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")

@@ -11,7 +11,7 @@ from lxml import etree
 from orchestrator.errors import FmuError
 from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
-from orchestrator.fmi.clocks import EventFeatures, UnusableError, clock_names, read_clocks
+from orchestrator.fmi.clocks import EventFeatures, names_in_words, read_clocks
 from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange2, read_exchange3
 from orchestrator.master.protocol import ModelInterface, Unit, Value, Variable
 from orchestrator.shared.isolation.archives import open_archive
@@ -77,7 +77,7 @@ def read_description(
         return description
     clocks = [*description.model.clocks, *description.model.triggered, *description.events.timed]
     if clocks and not description.events.self_sampling:
-        raise FmuError(f"{path}: its clocks ({clock_names(clocks)}) tick in event mode, which is not used here")
+        raise FmuError(f"{path}: its clocks ({names_in_words(clocks)}) tick in event mode, which is not used here")
     model = replace(
         description.model,
         has_events=False,
@@ -149,7 +149,7 @@ def parse_description(
         if version == "2.0":
             return _description2(root, interface, python)
         return _description3(root, interface, python, configured or {})
-    except UnusableError as error:
+    except FmuError as error:
         raise FmuError(f"{origin}: {error}") from None
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise FmuError(f"{origin}: modelDescription.xml must follow FMI {version}, but does not: {error}") from None
@@ -194,7 +194,7 @@ def _description3(
     has_events = exchange is not None or _flag(interface, "hasEventMode")
     clocks = read_clocks(found)
     if found.clocks and not has_events:
-        raise ValueError(f"it has clocks ({clock_names(list(found.clocks))}), but no event mode")
+        raise ValueError(f"it has clocks ({names_in_words(list(found.clocks))}), but no event mode")
     model = ModelInterface(
         name=root.attrib["modelName"],
         variables=dict(zip(names, variables, strict=True)),
@@ -231,7 +231,7 @@ def _description3(
 
 
 def _note_on_unusable(binaries: Sequence[str], clocks: Sequence[str]) -> str:
-    texts = [f"{kind} {clock_names(names)}" for kind, names in (("Binary", binaries), ("clocks", clocks)) if names]
+    texts = [f"{kind} {names_in_words(names)}" for kind, names in (("Binary", binaries), ("clocks", clocks)) if names]
     return f"variables that nothing here can use are left as they are: {'; '.join(texts)}" if texts else ""
 
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from orchestrator.errors import FmuError
 from orchestrator.fmi.access import Access, whole_range
+from orchestrator.fmi.size import MOST_VARIABLES, element_count
 from orchestrator.fmi.starts import number, start_value
 from orchestrator.master.protocol import Value, Variable
 
@@ -19,8 +21,6 @@ TYPES = {
     "Enumeration": "Enumeration",
 }
 """The type that a master knows, by the element of FMI 3.0."""
-MOST_ELEMENTS = 1_000_000
-"""Elements beyond which the arrays of an FMU are refused."""
 
 
 @dataclass(frozen=True)
@@ -77,14 +77,16 @@ def read_variables(root: etree._Element, configured: Mapping[str, Value] | None 
             if element.get("causality") == "structuralParameter":
                 found.structural.append(name)
             shape = _shape(element, lengths)
+            count = element_count(shape) * (1 + len(element.findall("Alias")))
+            if len(found.scalars) + count > MOST_VARIABLES:
+                text = f"must have at most {MOST_VARIABLES} variables, elements of arrays included, but has more"
+                raise FmuError(f"{text}: counted up to {name!r}")
             if shape:
                 found.arrays[name] = shape
             starts = [given[name]] if name in given else _starts(element, math.prod(shape), resized=bool(given))
             _add(found, element, types.get(element.get("declaredType", "")), shape, starts)
         else:
             raise ValueError(f"the variable {name!r} has the type {element.tag}, which FMI 3.0 does not have")
-        if len(found.scalars) > MOST_ELEMENTS:
-            raise ValueError(f"its arrays have more than {MOST_ELEMENTS} elements")
     return found
 
 
@@ -94,11 +96,9 @@ def _shape(element: etree._Element, lengths: Mapping[str, str]) -> tuple[int, ..
     for dimension in element.iterfind("Dimension"):
         of = dimension.get("valueReference")
         size = int(dimension.attrib["start"] if of is None else lengths[of])
-        if not 0 < size <= MOST_ELEMENTS:
+        if size < 1:
             raise ValueError(f"the variable {element.get('name')!r} has a dimension of size {size}")
         shape.append(size)
-        if math.prod(shape) > MOST_ELEMENTS:
-            raise ValueError(f"the variable {element.get('name')!r} has more than {MOST_ELEMENTS} elements")
     return tuple(shape)
 
 
@@ -218,11 +218,11 @@ def _starts(element: etree._Element, count: int, resized: bool) -> list[str] | N
 def read_feedthrough(root: etree._Element, variables: Variables3) -> dict[str, frozenset[str]]:
     """Return for each output whose dependencies are declared the inputs on which it depends at once."""
     inputs = {v.name for v in variables.scalars if v.causality == "input"}
-    direct = {}
+    direct: dict[str, frozenset[str]] = {}
     for output in root.iterfind("ModelStructure/Output"):
         listed = output.get("dependencies")
         if listed is not None:
-            known = [name for r in listed.split() for name in variables.names.get(int(r), ())]
-            for name in variables.names.get(int(output.attrib["valueReference"]), ()):
-                direct[name] = frozenset(inputs.intersection(known))
+            known = (name for r in listed.split() for name in variables.names.get(int(r), ()))
+            of_each = frozenset(inputs.intersection(known))  # one set for all elements of an array
+            direct |= dict.fromkeys(variables.names.get(int(output.attrib["valueReference"]), ()), of_each)
     return direct

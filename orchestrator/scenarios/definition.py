@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.master.algorithms import Algorithm
-from orchestrator.master.result import Recording
+from orchestrator.master.result import Recording, RunRemark
 from orchestrator.master.session import Session
 from orchestrator.master.system import System
 
@@ -38,6 +38,7 @@ class Scenario:
         name: shown in titles of tables and figures.
         origin: the file that describes it, for messages.
         derived: signals that are recorded beside those of ``record``.
+        remarks: what of the file is passed over.
     """
 
     system: System
@@ -48,16 +49,18 @@ class Scenario:
     name: str = "scenario"
     origin: str = ""
     derived: tuple[Derived, ...] = ()
+    remarks: tuple[RunRemark, ...] = ()
 
-    def with_derived(self, recording: Recording) -> Recording:
-        """Return a recording with the derived signals.
+    def complete(self, recording: Recording) -> Recording:
+        """Return a recording with the derived signals and the remarks of the scenario.
 
         Args:
             recording: of a run of this scenario, with all its recorded signals.
 
         Returns:
-            The recording, those of ``derived`` behind the others.
+            The recording, signals of ``derived`` behind the others and its own remarks behind those of the scenario.
         """
+        recording = replace(recording, remarks=(*self.remarks, *recording.remarks))
         if not self.derived:
             return recording
         more = [d.factor * recording[d.source] + d.offset for d in self.derived]

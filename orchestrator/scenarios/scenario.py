@@ -18,8 +18,9 @@ import msgspec
 from orchestrator.building.build import ensure_built
 from orchestrator.building.sources import catalogue
 from orchestrator.errors import FmuError, ScenarioError
-from orchestrator.fmi.clocks import ClockTimes
+from orchestrator.fmi.clocks import ClockTimes, exact_time
 from orchestrator.fmi.instances import fmu_instance
+from orchestrator.fmi.size import SystemSize
 from orchestrator.master import signals
 from orchestrator.master.algorithms import ALGORITHMS, Algorithm, step_count
 from orchestrator.master.problems import Problem, raise_problems
@@ -55,7 +56,7 @@ MAXIMUM_BYTES = 16 * 2**20
 def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
     """Run a scenario once; FMUs that are not ours run in a child process."""
     try:
-        return scenario.with_derived(run_safely(scenario, safety or Safety()))
+        return scenario.complete(run_safely(scenario, safety or Safety()))
     except FmuError as error:  # of what only comes out when an FMU is unpacked or loaded
         raise FmuError(f"{scenario.origin}: {error}" if scenario.origin else str(error)) from None
 
@@ -154,7 +155,7 @@ class _Reader:
         return kind(master.step, **settings), tuple(master.order)
 
     def instances(self, tables: dict[str, Any]) -> tuple[Instance, ...]:
-        found = []
+        found, size = [], SystemSize(self.path)
         for name, table in tables.items():
             path = f"$.instances.{name}"
             instance: InstanceTable | None = _convert(table, InstanceTable, path, self.problems)
@@ -173,8 +174,10 @@ class _Reader:
                 found.append(fmu_instance(name, fmu, start, instance.solver_tolerance, self._events, clocks, exchange))
             except ScenarioError as error:
                 self.problems.append(Problem(path, str(error)))
+                continue
             except FmuError as error:
                 raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
+            size.add(len(found[-1].model.variables), f"instance {name}")
         return tuple(found)
 
     def _clock(self, clock: ClockTable, path: str) -> ClockTimes:
@@ -187,8 +190,8 @@ class _Reader:
         if value is None:
             return None
         try:
-            seconds = Fraction(str(value))
-        except (ValueError, ZeroDivisionError):
+            seconds = exact_time(str(value))
+        except ValueError:
             seconds = Fraction(-1)
         if seconds < 0 or (signum and not seconds):
             sign = "positive" if signum else "not negative"

@@ -224,7 +224,7 @@ def test_what_is_fed_in_at_a_communication_point_holds_from_there_on(fmus, tmp_p
         (('target="alpha"', 'target="alhpa"'), ScenarioError, "did you mean 'alpha'"),
         (('unit="deg"', 'unit="N.m"'), ScenarioError, "does not measure what rad does"),
         (("resources/Drivetrain.fmu", "../Drivetrain.fmu"), ScenarioError, "must be a file of the archive"),
-        (("resources/Drivetrain.fmu", "SystemStructure.ssd"), FmuError, "readable zip archive"),
+        (("resources/Drivetrain.fmu", "SystemStructure.ssd"), FmuError, "intact zip archive"),
         (('kind="input"', 'kind="inputt"'), ScenarioError, "must follow SystemStructureDescription.xsd"),
         (('name="theta_m_hat"', 'name="theta_x"'), ConnectionMismatchError, "must be a variable of KalmanEstimator"),
         (('startTime="0" stopTime="0.05"', 'startTime="1" stopTime="0"'), ScenarioError, "`stop` must be"),

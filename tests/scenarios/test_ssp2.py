@@ -204,7 +204,7 @@ def test_an_element_is_joined_by_its_indices(sized: Path, tmp_path: Path) -> Non
         (('<ssc:Float64/><ssc:Dimension sizeConnector="size"/>', "<ssc:Binary/>"), "is Binary, which no conn"),
         (('source="resources/Sized.fmu"', ""), "must be a file of the archive, but there is none"),
         (('name="a" source', 'name="a" implementation="ScheduledExecution" source'), "but is ScheduledExecution"),
-        (('intervalDecimal="0.1"', 'intervalDecimal="-1"'), "must be a clock, but .* has an interval of -1 s"),
+        (('intervalDecimal="0.1"', 'intervalDecimal="-1"'), "clock .* must be positive, but is -1 s"),
         (('name="tick" kind="input"', 'name="tick" kind="inward"'), "must follow SSP 2.0, but does not: line .*kind"),
         (('<ssv:UInt16 value="3"/>', '<ssv:UInt16 value="-3"/>'), "must follow SSP 2.0"),
         (('<ssv:UInt16 value="3"/>', '<ssv:UInt16 value="30"/>'), "structural parameter size must lie in"),

@@ -244,3 +244,54 @@ def test_shared_inputs(name: str, signal: str, last: float) -> None:
 
 def test_the_shared_step() -> None:
     assert simulate(shared_input("06-ssp-system-level/10_oms_step.ssp"), inputs={"IN": 2.0}).steps == 20
+
+
+def remarks(path: Path) -> list[str]:
+    return [str(remark) for remark in simulate(path).run.remarks]
+
+
+def test_other_systems_in_a_package_are_told(tmp_path: Path) -> None:
+    path = package(tmp_path, system("", component("a"), ""))
+    assert remarks(path) == []
+    with zipfile.ZipFile(path, "a") as archive:
+        for name in ("Fast.ssd", "variants/slow.SSD"):
+            archive.writestr(name, "<x/>")
+    text = (
+        "the other systems in it are passed over (Fast.ssd, variants/slow.SSD), for SystemStructure.ssd is what is run"
+    )
+    assert remarks(path) == [f"package.ssp: {text}"]
+    with zipfile.ZipFile(tmp_path / "none.ssp", "w") as archive:
+        archive.writestr("Fast.ssd", "<x/>")
+    with pytest.raises(ScenarioError, match=r"must hold SystemStructure.ssd, but does not; it has Fast.ssd$"):
+        simulate(tmp_path / "none.ssp")
+
+
+@pytest.mark.parametrize("where", ["component", "system", "prefix"])
+def test_values_that_an_fmu_has_no_parameter_for_are_told_and_passed_over(where: str, tmp_path: Path) -> None:
+    values = [value("u", "1"), value("gain", "4"), value("gian", "9"), value("lubrication", "3", unit="m")]
+    if where == "component":
+        top = system("", component("a", binding(*values)), "")
+    elif where == "system":
+        top = system(binding(*(v.replace('name="', 'name="a.') for v in values)), component("a"), "")
+    else:
+        top = system("", component("a", binding(*values).replace("Binding><", 'Binding prefix=""><', 1)), "")
+    path = package(tmp_path, top)
+    assert simulate(path)["a.x"][-1] == pytest.approx(4.0)
+    assert remarks(path) == [
+        "a: the value of the parameter 'gian' is passed over, for Answers has no such variable; did you mean 'gain'?",
+        "a: the value of the parameter 'lubrication' is passed over, for Answers has no such variable",
+    ]
+
+
+def test_connectors_of_parameters_that_an_fmu_lacks_are_told_unless_they_are_joined(tmp_path: Path) -> None:
+    own = connector("lubrication", "parameter")
+    part = component("a", binding(value("u", "1"))).replace("</ssd:Connectors>", f"{own}</ssd:Connectors>")
+    path = package(tmp_path, system("", part, ""))
+    assert simulate(path)["a.x"][-1] == pytest.approx(2.0)
+    assert remarks(path) == ["a: its connector 'lubrication' is passed over, for Answers has no such variable"]
+    joined = system(connectors(connector("L", "parameter")), part, wire("L", "a/lubrication"))
+    with pytest.raises(ConnectionMismatchError, match="must be a variable of Answers, but 'lubrication' is none"):
+        simulate(package(tmp_path, joined))
+    fed = part.replace('name="lubrication" kind="parameter"', 'name="lubrication" kind="input"')
+    with pytest.raises(ConnectionMismatchError, match="must be a variable of Answers, but 'lubrication' is none"):
+        simulate(package(tmp_path, system("", fed, "")))

@@ -1,23 +1,27 @@
 """Arrays of SSP 2.0: connectors, connections and values of arrays become those of their elements."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 from orchestrator.fmi.model_description import FmuDescription
-from orchestrator.fmi.variables3 import MOST_ELEMENTS, element_places
+from orchestrator.fmi.size import SystemSize, element_count
+from orchestrator.fmi.variables3 import element_places
 from orchestrator.master.problems import Problem
 from orchestrator.scenarios.ssp.flow import Node, Structure
 
 
-def expand_arrays(structure: Structure, descriptions: Mapping[str, FmuDescription]) -> None:
-    """Replace what is said of arrays by what it says of their elements, which FMUs have as variables."""
-    places = _places(structure, descriptions)
+def expand_arrays(structure: Structure, descriptions: Mapping[str, FmuDescription], size: SystemSize) -> None:
+    """Replace what is said of arrays by what it says of their elements, which FMUs have as variables.
+
+    Args:
+        size: in which these have been counted.
+    """
+    places = _places(structure, descriptions, size)
     for node, sizes in structure.sizes.items():
         own = descriptions[node[0]].arrays.get(node[1], ()) if node[0] in descriptions else None
         if own is not None and None not in sizes and own != sizes:
             text = f"must have the sizes of the FMU's variable, {_shown(own)}, but has {_shown(sizes)}"
-            structure.problems.append(Problem(f"$.{'.'.join(filter(None, node))}", text, mismatch=True))
+            structure.problems.append(Problem(f"$.{_named(node)}", text, mismatch=True))
     _expand_drivers(structure, places)
     for node, elements in places.items():
         kind, unit = structure.kinds.pop(node, None), structure.connector_units.pop(node, None)
@@ -28,11 +32,17 @@ def expand_arrays(structure: Structure, descriptions: Mapping[str, FmuDescriptio
     _expand_values(structure, descriptions, places)
 
 
+def _named(node: Node) -> str:
+    return ".".join(filter(None, node))
+
+
 def _shown(sizes: tuple[int | None, ...]) -> str:
     return " x ".join(map(str, sizes)) if sizes else "none"
 
 
-def _places(structure: Structure, descriptions: Mapping[str, FmuDescription]) -> dict[Node, list[str]]:
+def _places(
+    structure: Structure, descriptions: Mapping[str, FmuDescription], size: SystemSize
+) -> dict[Node, list[str]]:
     """Return the elements of each connector that is an array: as its FMU, the file or what it is joined to says."""
     places: dict[Node, list[str]] = {}
     for node in structure.kinds:
@@ -40,14 +50,17 @@ def _places(structure: Structure, descriptions: Mapping[str, FmuDescription]) ->
             sizes = descriptions[node[0]].arrays.get(node[1], ())
         else:
             stated = structure.sizes.get(node, ())
-            sizes = () if None in stated else tuple(size for size in stated if size)
-        if sizes and math.prod(sizes) <= MOST_ELEMENTS:
+            sizes = () if None in stated else tuple(length for length in stated if length)
+            size.add(element_count(sizes), _named(node))
+        if sizes:
             places[node] = element_places(sizes)
     open_nodes = {node for node in structure.sizes if node[0] not in descriptions and node not in places}
     pairs = [
         pair for target, (source, _, _) in structure.drivers.items() for pair in ((target, source), (source, target))
     ]
     while learned := {a: places[b] for a, b in pairs if a in open_nodes and b in places and a not in places}:
+        for node, elements in learned.items():
+            size.add(len(elements), _named(node))
         places |= learned
     return places
 
@@ -58,7 +71,7 @@ def _expand_drivers(structure: Structure, places: Mapping[Node, list[str]]) -> N
         if ends == (None, None):
             continue
         del structure.drivers[target]
-        path = f"$.{'.'.join(filter(None, target))}"
+        path = f"$.{_named(target)}"
         if ends[0] is None or ends[0] != ends[1]:
             last = [elements[-1] if elements else " (a scalar)" for elements in ends]
             text = (
@@ -86,7 +99,7 @@ def _expand_values(
         texts = given.texts or (given.text,)
         if len(texts) != len(elements):
             text = f"must have {len(elements)} values, but has {len(texts)}"
-            structure.problems.append(Problem(f"$.{'.'.join(filter(None, node))}", text))
+            structure.problems.append(Problem(f"$.{_named(node)}", text))
             continue
         for place, text in zip(elements, texts, strict=True):
             structure.given.setdefault((node[0], node[1] + place), replace(given, text=text, texts=()))

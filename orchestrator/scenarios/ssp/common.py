@@ -179,7 +179,7 @@ def _numbers_of(system: etree._Element, element: str, attribute: str) -> Iterato
 def file_of_uri(folder: Path, source: str) -> Path | None:
     """Return the file of an archive that a URI names, such as ``resources/My%20Part.fmu``."""
     for text in (unquote(source), source):
-        file = (folder / text).resolve()
-        if "\0" not in text and file.is_relative_to(folder.resolve()) and os.path.isfile(file):
+        file = (folder / text.replace("\0", "%00")).resolve()
+        if file.is_relative_to(folder.resolve()) and os.path.isfile(file):
             return file
     return None

@@ -8,10 +8,14 @@ from pathlib import Path
 from orchestrator.master import units
 from orchestrator.master.problems import Problem
 from orchestrator.master.protocol import ModelInterface, Unit
+from orchestrator.master.result import RunRemark
 from orchestrator.master.signals import Scaled, Signal
 from orchestrator.master.system import Connection, SignalSource
 from orchestrator.scenarios.definition import Derived
 from orchestrator.scenarios.ssp.parameters import Given
+
+MOST_HOPS = 512
+"""Connectors between two components: up and down through as many systems as XML can nest, 256."""
 
 Node = tuple[str, str]
 """A connector: path of its element (empty: the outermost system), name."""
@@ -33,6 +37,7 @@ class Structure:
         intervals: of the connectors of type ``Clock`` that state one [s].
         drivers: for each connector that is fed: what feeds it, factor and offset.
         given: values of parameter bindings.
+        remarks: what is passed over.
     """
 
     folder: Path
@@ -47,6 +52,7 @@ class Structure:
     intervals: dict[Node, Fraction] = field(default_factory=dict)
     drivers: dict[Node, tuple[Node, float, float]] = field(default_factory=dict)
     given: dict[Node, Given] = field(default_factory=dict)
+    remarks: list[RunRemark] = field(default_factory=list)
 
 
 @dataclass
@@ -82,6 +88,8 @@ class Flow:
     def connections(self, inputs: Mapping[str, Signal]) -> tuple[list[Connection], list[SignalSource]]:
         """Return what feeds the inputs of components."""
         connections, sources = [], []
+        for node in self._structure.drivers:
+            self._root(node)  # rings and chains that reach no component are told too
         for target, root in self._ends():
             name = self._address(target)
             if root[0] in self._models:
@@ -136,19 +144,29 @@ class Flow:
                 yield target, self._root(target)
 
     def _root(self, node: Node) -> Node:
-        seen = {node}
-        while node in self._structure.drivers:
-            node = self._structure.drivers[node][0]
+        drivers, seen = self._structure.drivers, {node}
+        while node in drivers:
+            node = drivers[node][0]
             if node[0] in self._models:
                 break
             if node in seen:
-                problem = Problem(
-                    f"$.{'.'.join(filter(None, node))}", "must not be fed by itself, but is", mismatch=True
-                )
-                self._structure.problems += [] if problem in self._structure.problems else [problem]
+                ring, last = {node}, drivers[node][0]
+                while last not in ring:
+                    ring.add(last)
+                    last = drivers[last][0]
+                self._refuse(f"$.{'.'.join(filter(None, min(ring)))}", "must not be fed by itself, but is")
+                break
+            if len(seen) > MOST_HOPS:
+                text = f"must feed a connector through at most {MOST_HOPS} others, but do so through more"
+                self._refuse("$.Connections", text)
                 break
             seen.add(node)
         return node
+
+    def _refuse(self, path: str, text: str) -> None:
+        problem = Problem(path, text, mismatch=True)
+        if problem not in self._structure.problems:
+            self._structure.problems.append(problem)
 
     def _carry(self, root: Node, target: Node, value: _Value) -> _Value:
         """Return a value that has gone from ``root`` to ``target``."""
@@ -183,10 +201,7 @@ class Flow:
         ratio = units.conversion(value.unit, unit)
         if ratio is None:
             assert value.unit is not None
-            text = units.describe_mismatch(value.unit, unit)
-            problem = Problem(f"$.{'.'.join(filter(None, node))}", text, mismatch=True)
-            if problem not in self._structure.problems:
-                self._structure.problems.append(problem)
+            self._refuse(f"$.{'.'.join(filter(None, node))}", units.describe_mismatch(value.unit, unit))
             ratio = 1.0, 0.0
         if unit.difference is None and value.unit is not None:
             unit = replace(unit, difference=value.unit.difference)

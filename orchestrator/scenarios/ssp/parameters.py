@@ -32,6 +32,7 @@ class Given:
         unit: its unit, if it has one.
         units: units declared beside it.
         texts: the values of an array's elements; empty for a scalar.
+        mapped: a mapping names the variable; else the entry's own name does.
     """
 
     type: str
@@ -41,6 +42,7 @@ class Given:
     factor: float = 1.0
     offset: float = 0.0
     texts: tuple[str, ...] = ()
+    mapped: bool = False
 
 
 def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
@@ -133,7 +135,7 @@ def _map_values(values: list[tuple[str, Given]], rules: etree._Element) -> list[
         if linear is not None:
             factor, offset = float(linear.get("factor", "1")), float(linear.get("offset", "0"))
             given = replace(given, unit=None, factor=factor, offset=offset)
-        found.append((str(entry.get("target")), given))
+        found.append((str(entry.get("target")), replace(given, mapped=True)))
     return found
 
 

@@ -8,16 +8,19 @@ from pathlib import Path
 from lxml import etree
 
 from orchestrator.errors import FmuError, ScenarioError
-from orchestrator.fmi.clocks import clock_interval
+from orchestrator.fmi.clocks import clock_interval, names_in_words
 from orchestrator.fmi.instances import FmuFactory, read_configured
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.ours import is_ours
+from orchestrator.fmi.size import SystemSize
 from orchestrator.master.algorithms import GaussSeidel, Jacobi
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import NUMERIC, Value
+from orchestrator.master.result import RunRemark
 from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, System
 from orchestrator.master.units import resolve
+from orchestrator.master.values import nearest
 from orchestrator.scenarios.scenario import Scenario
 from orchestrator.scenarios.ssp.arrays import expand_arrays
 from orchestrator.scenarios.ssp.common import (
@@ -39,6 +42,7 @@ FMU_TYPE = "application/x-fmu-sharedlibrary"
 DEFAULT_STOP = 1.0
 DEFAULT_STEPS = 1000
 _REALS = tuple(tag("ssc", kind) for kind in ("Real", "Float64", "Float32"))
+_PARAMETERS = ("parameter", "structuralParameter", "calculatedParameter", "constant", "local")
 _GIVERS = ("output", "calculatedParameter", "constant", "local")
 
 
@@ -72,18 +76,26 @@ def _scenario(
     path: Path, folder: Path, inputs: Mapping[str, Signal], step: float | None, simultaneous: bool, events: bool
 ) -> Scenario:
     file = folder / STRUCTURE
+    others = sorted(
+        p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.suffix.lower() == ".ssd" and p != file
+    )
     if not file.is_file():
-        raise ScenarioError(f"{path}: must hold {STRUCTURE}, but does not")
+        has = f"; it has {names_in_words(others)}" if others else ""
+        raise ScenarioError(f"{path}: must hold {STRUCTURE}, but does not{has}")
     root = parse(file.read_bytes(), "ssd", f"{path}: {STRUCTURE}")
     structure = Structure(folder, read_units(root, "ssd"))
+    if others:
+        text = f"the other systems in it are passed over ({names_in_words(others)}), for {STRUCTURE} is what is run"
+        structure.remarks.append(RunRemark(path.name, text))
     system = root.find(tag("ssd", "System"))
     assert system is not None
     _walk(system, "", structure)
     raise_problems(structure.problems, f"{path}: {STRUCTURE}")
     descriptions = _descriptions(structure, path, events)
     names = instance_names(structure.components)
-    descriptions = _configured(structure, descriptions, names, inputs, path, events)
-    expand_arrays(structure, descriptions)
+    size = SystemSize(path)
+    descriptions = _configured(structure, descriptions, names, inputs, path, events, size)
+    expand_arrays(structure, descriptions, size)
     _check_names(structure, descriptions)
     flow = Flow(structure, {name: d.model for name, d in descriptions.items()}, names)
     instances = _instances(structure, descriptions, names, flow.starts(inputs), solver_tolerance(system))
@@ -101,7 +113,16 @@ def _scenario(
     )
     algorithm = Jacobi(grid) if simultaneous else GaussSeidel(grid)
     title = root.get("name") or path.stem
-    return Scenario(made, record, algorithm, stop, start, title, derived=tuple(flow.outputs(record)))
+    return Scenario(
+        made,
+        record,
+        algorithm,
+        stop,
+        start,
+        title,
+        derived=tuple(flow.outputs(record)),
+        remarks=tuple(structure.remarks),
+    )
 
 
 def _walk(system: etree._Element, path: str, structure: Structure) -> None:
@@ -129,9 +150,9 @@ def _connectors(element: etree._Element, path: str, structure: Structure) -> Non
         if kind is not None:
             structure.without_number[node] = kind
             try:
-                interval = clock_interval(connector.find(tag("ssc", kind)))
+                interval = clock_interval(connector.find(tag("ssc", kind)), node[1])
             except ValueError as error:
-                structure.problems.append(Problem(f"$.{'.'.join(filter(None, node))}", f"must be a clock, but {error}"))
+                structure.problems.append(Problem(f"$.{'.'.join(filter(None, node))}", str(error)))
                 continue
             structure.intervals |= {} if interval is None else {node: interval}
             continue
@@ -237,10 +258,16 @@ def _no_end(type_: str | None, kind: str | None) -> str:
 
 
 def _descriptions(structure: Structure, path: Path, events: bool) -> dict[str, FmuDescription]:
-    found = {}
+    found: dict[str, FmuDescription] = {}
+    known: dict[tuple[Path, bool], FmuDescription] = {}
+    size = SystemSize(path)
     for name, file in structure.components.items():
+        exchange = name in structure.exchanged
         try:
-            found[name] = read_description(file, events, exchange=name in structure.exchanged)
+            if (file, exchange) not in known:
+                known[file, exchange] = read_description(file, events, exchange=exchange)
+            found[name] = known[file, exchange]
+            size.add(len(found[name].model.variables), name)
         except FmuError as error:
             raise FmuError(f"{path}: {name}: {str(error).replace(str(file), file.name)}") from None
     return found
@@ -248,8 +275,12 @@ def _descriptions(structure: Structure, path: Path, events: bool) -> dict[str, F
 
 def _check_names(structure: Structure, models: Mapping[str, FmuDescription]) -> None:
     """Add connectors and values that components do not have, and clocks that have other intervals there."""
-    for owner, variable in structure.kinds:
+    joined = {*structure.drivers, *(source for source, _, _ in structure.drivers.values())}
+    for (owner, variable), kind in structure.kinds.items():
         if owner in models and variable not in models[owner].model.variables:
+            if kind in _PARAMETERS and (owner, variable) not in joined:
+                _pass_over(structure, models[owner], owner, variable, "its connector")
+                continue
             text = f"must be a variable of {models[owner].model.name}, but {variable!r} is none"
             structure.problems.append(Problem(f"$.{owner}.Connectors", text, mismatch=True))
     for owner, variable in structure.given:
@@ -263,6 +294,14 @@ def _check_names(structure: Structure, models: Mapping[str, FmuDescription]) -> 
             structure.problems.append(Problem(f"$.{owner}.Connectors", f"{clock} {text}", mismatch=True))
 
 
+def _pass_over(structure: Structure, description: FmuDescription, owner: str, variable: str, what: str) -> None:
+    """Say that a parameter is left aside, for the FMU has none of its name."""
+    model = description.model
+    text = f"{what} {variable!r} is passed over, for {model.name} has no such variable"
+    remark = RunRemark(owner, text + nearest(variable, list(model.variables)))
+    structure.remarks += [] if remark in structure.remarks else [remark]
+
+
 def _configured(
     structure: Structure,
     descriptions: Mapping[str, FmuDescription],
@@ -270,8 +309,13 @@ def _configured(
     inputs: Mapping[str, Signal],
     path: Path,
     events: bool,
+    size: SystemSize,
 ) -> dict[str, FmuDescription]:
-    """Return the descriptions with the values of structural parameters, which are taken out of the bindings."""
+    """Return the descriptions with the values of structural parameters, which are taken out of the bindings.
+
+    Args:
+        size: in which their variables are counted.
+    """
     flow = Flow(structure, {name: d.model for name, d in descriptions.items()}, names)
     handed, found = flow.starts(inputs), {}
     for name, description in descriptions.items():
@@ -288,8 +332,9 @@ def _configured(
             file = structure.components[name]
             exchange = name in structure.exchanged
             found[name] = read_configured(file, values, events, exchange)[0] if values else description
+            size.add(len(found[name].model.variables), name)
         except FmuError as error:
-            raise FmuError(f"{path}: {name}: {error}") from None
+            raise FmuError(f"{path}: {name}: {str(error).replace(str(file), file.name)}") from None
     return found
 
 
@@ -305,7 +350,9 @@ def _instances(
     for name, description in descriptions.items():
         start: dict[str, Value] = {}
         for (owner, variable), given in {**structure.given, **handed}.items():
-            if owner == name:
+            if owner == name and variable not in description.model.variables and not given.mapped:
+                _pass_over(structure, description, owner, variable, "the value of the parameter")
+            elif owner == name:
                 value = own_value(description.model, variable, given, structure.units, f"$.{name}", structure.problems)
                 if value is not None:
                     start[variable] = value
