@@ -7,10 +7,17 @@ from collections.abc import Iterator
 from lxml import etree
 
 from orchestrator.checking.description import Description, Interface, number
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.grammar import attributes_of
-from orchestrator.checking.units import dimension_of
+from orchestrator.checking.units import (
+    Conversion,
+    base_conversion,
+    dimension_of,
+    display_conversion,
+    lacks_angle,
+)
 from orchestrator.checking.xml_reading import xpath
+from orchestrator.master.protocol import EXPONENTS
 
 _DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])T([01]\d|2[0-3]):[0-5]\d:([0-5]\d|60)Z")
 _ANY_DATE = re.compile(r"-?\d{4,}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:\d\d)?")  # the schema has the rest
@@ -133,15 +140,58 @@ def _units(d: Description) -> Iterator[Finding]:
                 message = f"the factor of a unit must not be zero, but is for `{name}`"
                 yield Finding("unit.factor", xpath(inner, "factor"), message)
         base = element.find("BaseUnit")
-        expected = dimension_of(name)
-        if base is None or expected is None:
-            continue
-        # An angle may or may not be counted as a dimension, so rad is left out.
-        found = {k: int(number(base.get(k), "Integer") or 0) for k in ("kg", "m", "s", "A", "K", "mol", "cd")}
-        if any(found[k] != expected.get(k, 0) for k in found):
-            wanted = " ".join(f"{k}={e}" for k, e in expected.items() if e) or "none"
-            message = f"the exponents of the unit `{name}` must be {wanted}, but are not"
-            yield Finding("unit.exponents", xpath(base), message)
+        if base is not None:
+            yield from _base_unit(d, name, base)
+    yield from _display_units(d)
+
+
+def _base_unit(d: Description, name: str, base: etree._Element) -> Iterator[Finding]:
+    """What contradicts the name of a unit."""
+    expected = dimension_of(name)
+    if expected is None:
+        return
+    found = {k: int(number(base.get(k), "Integer") or 0) for k in EXPONENTS}
+    # An angle may or may not be counted as a dimension, so rad is left out.
+    if any(found[k] != expected.get(k, 0) for k in found if k != "rad"):
+        wanted = " ".join(f"{k}={e}" for k, e in expected.items() if e) or "none"
+        yield Finding(
+            "unit.exponents", xpath(base), f"the exponents of the unit `{name}` must be {wanted}, but are not"
+        )
+    elif lacks_angle(name, found["rad"]):
+        message = f"the exponents of the unit `{name}`, which has an angle, must have rad=1, but have rad=0"
+        yield Finding("unit.exponents", xpath(base), message)
+    conversion = base_conversion(name, found)
+    users = [v.attributes for v in d.variables if v.attributes.get("unit") == name]
+    if conversion is None or (conversion.offset and users and all(a.get("relativeQuantity") == "true" for a in users)):
+        return  # where all are differences, no offset counts
+    if not (stated := _conversion(base)).is_close(conversion):
+        message = f"BaseUnit of the unit `{name}` must have {conversion} to be what the name says, but has {stated}"
+        yield Finding("unit.conversion", xpath(base), message)
+
+
+def _display_units(d: Description) -> Iterator[Finding]:
+    """Display units whose conversion contradicts both names; all that are the wrong way round are one finding."""
+    turned = []
+    for name, element in d.units.items():
+        for inner in element.findall("DisplayUnit"):
+            stated, right = _conversion(inner), display_conversion(name, inner.get("name", ""))
+            if right is None or not stated.factor or stated.is_close(right):
+                continue
+            what = f"`{inner.get('name')}` of the unit `{name}`"
+            if stated.turned_round().is_close(right):
+                turned.append((inner, f"{what} has {stated} where {right} is right"))
+            else:
+                message = f"DisplayUnit {what} must have {right} to be what the names say, but has {stated}"
+                yield Finding("unit.conversion", xpath(inner), message)
+    if turned:
+        message = f"a DisplayUnit must convert from the unit to it, but {list_names([t for _, t in turned], 3)}"
+        yield Finding("unit.conversion", xpath(turned[0][0]), f"{message}: the wrong way round")
+
+
+def _conversion(element: etree._Element) -> Conversion:
+    factor, offset = (number(element.get(key), "Real") for key in ("factor", "offset"))
+    inverse = element.get("inverse") in ("true", "1")
+    return Conversion(1.0 if factor is None else factor, 0.0 if offset is None else offset, inverse)
 
 
 def _unique(elements: list[etree._Element], rule: str, what: str) -> Iterator[Finding]:

@@ -13,13 +13,11 @@ from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, names_in_words, read_clocks
 from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange2, read_exchange3
-from orchestrator.master.protocol import ModelInterface, Unit, Value, Variable
+from orchestrator.master.protocol import EXPONENTS, ModelInterface, Unit, Value, Variable
 from orchestrator.shared.isolation.archives import open_archive
 
 MAXIMUM_XML = 64 * 2**20
 """Bytes of XML beyond which a model description is refused: ten times the largest seen in the wild."""
-
-_EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 @dataclass(frozen=True)
@@ -261,6 +259,6 @@ def _units(root: etree._Element) -> dict[str, Unit]:
         if base is None:
             units[name] = Unit(name)
         else:
-            exponents = tuple(int(base.get(e, "0")) for e in _EXPONENTS)
+            exponents = tuple(int(base.get(e, "0")) for e in EXPONENTS)
             units[name] = Unit(name, exponents, float(base.get("factor", "1")), float(base.get("offset", "0")))
     return units

@@ -201,8 +201,10 @@ class System:
         if isinstance(value, Quantity):
             converted = self._convert(address, value)
             if converted is None:
-                own = variable.unit or "no unit"
-                return None, f"must be given in a unit that measures what {own} does, but is in {value.unit!r}"
+                own = self.unit(address)
+                name, why = ("no unit", "") if own is None else (own.name, units.contradiction(own))
+                why += f", or give a plain number, in {name}" if why else ""
+                return None, f"must be given in a unit that measures what {name} does, but is in {value.unit!r}{why}"
             value = converted
         return coerce_value(variable, value)
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from orchestrator.master.protocol import Unit, Variable
+from orchestrator.master.protocol import EXPONENTS, Unit, Variable
 from orchestrator.shared.units import parse_unit
 
 
@@ -48,7 +48,19 @@ def describe_mismatch(source: Unit, target: Unit, origin: str = "") -> str:
         words = {True: "is a difference (relativeQuantity)", False: "is none"}
         both = f"{source.name} {words[bool(source.difference)]} and {target.name} {words[bool(target.difference)]}"
         return f"must be a difference like what feeds it, or neither, but {both}: correct relativeQuantity of one FMU"
-    return f"must have a unit that measures what {source.name}{origin} does, but has {target.name}"
+    why = contradiction(source) or contradiction(target)
+    return f"must have a unit that measures what {source.name}{origin} does, but has {target.name}{why}"
+
+
+def contradiction(unit: Unit) -> str:
+    """Return how the description of a unit contradicts its name, for the end of a message; or nothing."""
+    known = _well_known(unit.name)
+    if unit.exponents is None or known.exponents is None or unit.exponents == known.exponents:
+        return ""
+    pairs = zip(EXPONENTS, unit.exponents, known.exponents, strict=True)
+    stated, right = zip(*((f"{name}={e}", f"{name}={k}") for name, e, k in pairs if e != k), strict=True)
+    what = f"the FMU's BaseUnit of `{unit.name}` has {' '.join(stated)}"
+    return f"; {what}, where its name means {' '.join(right)}: correct that in its modelDescription.xml"
 
 
 def _same_name(source: Unit | None, target: Unit | None) -> tuple[float, float] | None:

@@ -223,3 +223,76 @@ def test_no_rule_speaks_of_a_version_that_it_is_not_for(tmp_path: Path) -> None:
     findings = check_fmu(path, CheckOptions(static=True)).findings
     assert [f.rule for f in findings if "2.0" not in RULES[f.rule].versions] == []
     assert len(findings) <= 6  # one for each attribute: they are not in the schema
+
+
+def unit_findings(*units: str, variables: str = "") -> list[Finding]:
+    text = f'<fmiModelDescription fmiVersion="3.0"><UnitDefinitions>{"".join(units)}</UnitDefinitions>'
+    text += f"<ModelVariables>{variables}</ModelVariables><ModelStructure/></fmiModelDescription>"
+    found = check_model(read_description(etree.fromstring(text.encode())))
+    return [f for f in found if f.rule.startswith("unit.")]
+
+
+def unit(name: str, base: str, *shown: str) -> str:
+    """A unit with display units, each written ``name attributes``."""
+    inner = "".join(f'<DisplayUnit name="{s.split(" ", 1)[0]}" {s.partition(" ")[2]}/>' for s in shown)
+    return f'<Unit name="{name}"><BaseUnit {base}/>{inner}</Unit>'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        unit("rad", 'rad="1"', 'deg factor="57.29578"', 'rev factor="0.159"', "rad"),
+        unit("rad/s", 'rad="1" s="-1"', 'rpm factor="9.5493"', 'deg/s factor="57.3"', 'Hz factor="0.159155"'),
+        unit("K", 'K="1"', 'degC offset="-273.15"', 'degC_x offset="3"'),
+        unit("degC", 'K="1" offset="273.15"', 'K offset="273.15"'),
+        unit("deg", 'rad="1" factor="0.0174533"', 'rad factor="0.01745"'),
+        unit("m", 'm="1"', 'mm factor="1000"', 'furlong factor="7"'),
+        unit("bar", 'kg="1" m="-1" s="-2" factor="1e5"', 'Pa factor="1e5"', 'MPa factor="0.1"'),
+        unit("N.m/rad", 'kg="1" m="2" s="-2"'),  # stiffness is often written without its angle
+        unit("rev", 'rad="0"') + unit("rpm", 's="-1" factor="0.016667"') + unit("rev/s", 's="-1"'),  # counted
+        unit("%", ""),  # percent as a unit of its own
+        unit("g", 'm="1" s="-2" factor="9.81"') + unit("U", 'kg="1"') + unit("t", 's="1"'),  # of more things
+        unit("s", 's="1"', 'Hz factor="1" inverse="true"', 'min factor="0.016667"', 'h factor="2.77778e-4"'),
+        '<Unit name="radian"/><Unit name="deg"><DisplayUnit name="x"/></Unit>',
+    ],
+)
+def test_units_that_are_right_or_not_certain(text: str) -> None:
+    assert unit_findings(text) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (unit("radian", 'rad="0"'), "the unit `radian`, which has an angle, must have rad=1"),
+        (unit("rad/s", 's="-1"'), "the unit `rad/s`, which has an angle"),
+        (unit("deg", 'factor="0.01745"'), "the unit `deg`, which has an angle"),
+        (unit("rad", 'rad="1"', 'deg factor="0.0174533"'), "`deg` of the unit `rad` has factor 0.0174533"),
+        (unit("rad/s", 'rad="1" s="-1"', 'rpm factor="0.10472"'), "factor 9.5493 is right: the wrong way round"),
+        (unit("m", 'm="1"', "mm"), "DisplayUnit `mm` of the unit `m` must have factor 1000"),
+        (unit("K", 'K="1"', 'degC offset="273.15"'), "offset -273.15 is right: the wrong way round"),
+        (unit("K", 'K="1"', "degC"), "must have factor 1 and offset -273.15"),
+        (unit("mm", 'm="1"'), "BaseUnit of the unit `mm` must have factor 0.001"),
+        (unit("deg", 'rad="1" factor="57.29578"'), "BaseUnit of the unit `deg` must have factor 0.0174533"),
+        (unit("degC", 'K="1"'), "must have factor 1 and offset 273.15"),
+        (unit("s", 's="1"', 'Hz factor="1"'), "must have factor 1 and inverse"),
+        (unit("m", 'm="1"', 'cm factor="100" inverse="true"'), "must have factor 100 to be what the names say"),
+    ],
+)
+def test_units_that_contradict_their_names(text: str, words: str) -> None:
+    (finding,) = unit_findings(text)
+    assert words in finding.message
+    assert finding.severity == "warning"
+
+
+def test_display_units_that_are_all_the_wrong_way_round_are_one_finding() -> None:
+    shown = ('mm factor="0.001"', 'cm factor="0.01"', 'km factor="1000"', 'um factor="1e-6"')
+    (finding,) = unit_findings(unit("m", 'm="1"', *shown), unit("s", 's="1"', 'ms factor="0.001"'))
+    assert "and 2 more" in finding.message
+
+
+def test_the_offset_of_a_unit_of_differences_does_not_count() -> None:
+    kelvin = unit("degC", 'K="1"')
+    variable = '<Float64 name="{}" valueReference="{}" unit="degC" {}/>'
+    difference = variable.format("a", 1, 'relativeQuantity="true"')
+    assert unit_findings(kelvin, variables=difference) == []
+    assert len(unit_findings(kelvin, variables=difference + variable.format("b", 2, ""))) == 1

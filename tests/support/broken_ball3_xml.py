@@ -57,8 +57,9 @@ _HEAD: list[Edit] = [
 ]
 _TYPES: list[Edit] = [
     ("unit twice", "unit.name", '<Unit name="m/s2">', '<Unit name="m"/><Unit name="m/s2">'),
-    ("display unit twice", "unit.name", '<DisplayUnit name="mm" factor="1000"/>', '<DisplayUnit name="mm" factor="1000"/><DisplayUnit name="mm"/>'),
+    ("display unit twice", "unit.name", '<DisplayUnit name="mm" factor="1000"/>', '<DisplayUnit name="mm" factor="1000"/><DisplayUnit name="mm" factor="1e3"/>'),
     ("factor zero", "unit.factor", 'factor="1000"', 'factor="0"'),
+    ("display unit inverse", "unit.conversion", 'factor="1000"', 'factor="1000" inverse="true"'),
     ("exponents", "unit.exponents", 'm="1" s="-1"', 'm="1" s="-2"'),
     ("exponent no integer", "schema.invalid", 'm="1" s="-1"', 'm="1.5" s="-1"'),
     ("unit without name", "schema.invalid", '<Unit name="m/s2">', "<Unit>"),

@@ -61,6 +61,7 @@ REPLACEMENTS: list[tuple[str, str, str, str]] = [
     ("unit twice", "unit.name", '<Unit name="s"><BaseUnit s="1"/></Unit>',
      '<Unit name="s"><BaseUnit s="1"/></Unit><Unit name="s"><BaseUnit s="1"/></Unit>'),
     ("unit factor", "unit.factor", 'factor="1000"', 'factor="0"'),
+    ("display unit the wrong way round", "unit.conversion", 'factor="1000"', 'factor="0.001"'),
     ("unit exponents", "unit.exponents", '<BaseUnit kg="1" m="2" s="-2"/>', '<BaseUnit kg="1" m="2" s="-3"/>'),
     ("name twice", "variable.name-duplicate", 'name="damping"', 'name="stiffness"'),
     ("name not structured", "variable.name-structured", 'name="stiffness"', 'name="spring stiffness"'),

@@ -52,6 +52,7 @@ type.bounds | E | 2.2.3 | 2.4.4 | min is at most max | swap or correct them
 type.enumeration | E | 2.2.3 | 2.4.4 | names and values of items are unique | give each item its own name and value
 unit.name | E | 2.2.2 | 2.4.3 | units and their display units are unique | remove the repeated one
 unit.factor | E | 2.2.2 | 2.4.3 | no factor is zero | write the factor to SI
+unit.conversion | W | 2.2.2 | 2.4.3 | factors and offsets of units are those of their names | correct them: BaseUnit = factor * value + offset, DisplayUnit likewise from the value
 unit.exponents | W | 2.2.2 | * | the base exponents are those of the unit's name | correct the exponents of BaseUnit
 variable.name-duplicate | E | 2.2.7 | 2.4.7.5.1 | variable names are unique | rename one
 variable.name-structured | E | 2.2.9 | 2.4.7.5.1 | structured names follow the grammar | quote odd characters with '...' or use the flat convention

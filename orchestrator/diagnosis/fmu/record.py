@@ -12,7 +12,7 @@ from orchestrator.diagnosis.fmu.mapping import ColumnEntry, InputEntry, Map
 from orchestrator.diagnosis.settings import FmuSettings
 from orchestrator.errors import RecordError
 from orchestrator.master.protocol import Unit
-from orchestrator.master.units import conversion, resolve
+from orchestrator.master.units import contradiction, conversion, resolve
 from orchestrator.records.arrays import interpolate_missing, runs_of
 from orchestrator.records.tables import NamedColumns, Wanted, read_columns, read_unit
 from orchestrator.records.timing import interpolate
@@ -148,7 +148,7 @@ def _convert(
     if ratio is None:
         raise RecordError(
             f"{path}: column `{label}` must be in a unit that measures what {target.name} of `{name}` does, but "
-            f"is in {text!r}: {wanted.cure}"
+            f"is in {text!r}: {wanted.cure}{contradiction(target)}"
         )
     return ratio[0] * values + ratio[1]
 
