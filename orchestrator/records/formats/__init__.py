@@ -22,6 +22,7 @@ _MAGIC = (
     (512, b"\x89HDF\r\n\x1a\n", "hdf5"),
     (0, b"\x93NUMPY", "numpy_file"),
 )
+_CLASSIC = "is a netCDF file of the classic format: save it as netCDF-4 (`nccopy -k nc4 OLD NEW`)"
 # What is no record, and what to do then.
 _OTHERS = (
     (b"\x1f\x8b", "is compressed (gzip): unpack it first"),
@@ -33,6 +34,9 @@ _OTHERS = (
     (b"TDSm", "is a TDMS file: export it as CSV, Parquet or MDF4"),
     (b"%PDF", "is a PDF: export the data as CSV"),
     (b"SQLite format 3", "is a database: export the table as CSV"),
+    (b"CDF\x01", _CLASSIC),
+    (b"CDF\x02", _CLASSIC),
+    (b"CDF\x05", _CLASSIC),
     (b"ARROW1", "is an Arrow or Feather file: save it as Parquet"),
 )
 FORMATS = "CSV, Parquet, MDF4, MAT or NumPy"

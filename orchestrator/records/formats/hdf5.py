@@ -1,5 +1,6 @@
-"""Records in HDF5, of which MAT files of version 7.3 are one kind, by h5py."""
+"""Records in HDF5, by h5py: MAT files of version 7.3, netCDF-4 and tables of pandas are kinds of it."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,8 @@ import numpy as np
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.nested import DEEPEST, PassedOver, vectors_of
 from orchestrator.records.formats.numpy_file import ArraySource
+from orchestrator.records.formats.packing import unpack
+from orchestrator.records.formats.pandas_frames import frame_columns, is_frame
 from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, extra_error, in_a_line
 
 _NUMBERS = frozenset(b"double single logical int8 int16 int32 int64 uint8 uint16 uint32 uint64".split())
@@ -21,7 +24,8 @@ def open_file(path: Path) -> ArraySource:
         raise extra_error(path, "a MAT 7.3 or HDF5 file", "h5py", "hdf5") from None
     try:
         with h5py.File(path, "r") as file:
-            found = vectors_of(_Reader(path, file).group(file, 0))
+            reader = _Reader(path, file)
+            found = vectors_of(reader.group(file, 0))
     except RecordError:
         raise
     except Exception as error:  # h5py raises whatever a broken file makes it meet
@@ -31,7 +35,8 @@ def open_file(path: Path) -> ArraySource:
             f"{path}: must hold vectors of numbers, but holds none: save arrays, not timeseries or tables, or save as "
             "MAT version 7 (MATLAB: save('record.mat', '-v7', ...))"
         )
-    return ArraySource(path, found.arrays, found.describe("MAT 7.3 / HDF5 file"), found.units)
+    words = ", ".join([found.describe("MAT 7.3 / HDF5 file"), *reader.unpacked])
+    return ArraySource(path, found.arrays, words, found.units)
 
 
 class _Reader:
@@ -39,11 +44,14 @@ class _Reader:
 
     def __init__(self, path: Path, file: Any) -> None:
         self._path, self._file, self._room = path, file, MAXIMUM_BYTES
+        self.unpacked: list[str] = []
 
     def group(self, group: Any, depth: int) -> dict[str, Any]:
         """Return the members of a group, groups as mappings."""
         import h5py
 
+        if is_frame(group):
+            return self._frame(group)
         members: dict[str, Any] = {}
         for count, name in enumerate(group):
             if count > MAXIMUM_CHANNELS:
@@ -63,18 +71,54 @@ class _Reader:
         kind = item.attrs.get("MATLAB_class")
         if "MATLAB_object_decode" in item.attrs or (kind is not None and kind not in _NUMBERS | {b"char", b"struct"}):
             return PassedOver("object" if kind is None else _text(kind))
-        self._room -= int(item.size or 0) * item.dtype.itemsize
-        if self._room < 0:
-            raise RecordError(f"{self._path}: must unpack to at most {MAXIMUM_BYTES // 10**6} MB, but would to more")
+        if _text(item.attrs.get("NAME", "")).startswith("This is a netCDF dimension but not a netCDF variable"):
+            return PassedOver("dimension")
         if item.dtype == h5py.ref_dtype:
             return self._follow_references(item, depth)
-        values = np.squeeze(item[()]) if item.shape is not None else np.zeros(0)
+        values = self._read(item)
         if kind == b"char":
             return "".join(map(chr, np.ravel(values).tolist())) if values.dtype.kind in "ui" else ""
         if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiubV":
             return _text(values) if isinstance(values, str | bytes) else PassedOver("text")
+        values = self._unpack(item, values)
         unit = next((_text(value) for key, value in item.attrs.items() if key.lower() in ("unit", "units")), "")
+        since = re.fullmatch(r"(\S+)\s+since\s.*", unit)  # of netCDF: since an instant, which no record needs
+        unit = since[1] if since is not None else unit
         return {"values": values, "unit": unit} if unit else values
+
+    def _read(self, item: Any) -> Any:
+        """Return the values of a dataset, within what a file may unpack to."""
+        self._room -= int(item.size or 0) * item.dtype.itemsize
+        if self._room < 0:
+            raise RecordError(f"{self._path}: must unpack to at most {MAXIMUM_BYTES // 10**6} MB, but would to more")
+        return np.squeeze(item[()]) if item.shape is not None else np.zeros(0)
+
+    def _unpack(self, item: Any, values: Any) -> Any:
+        """Return physical values, and note what was done."""
+        import h5py
+
+        name = item.name.rpartition("/")[2]
+        is_set = item.id.get_create_plist().fill_value_defined() == h5py.h5d.FILL_VALUE_USER_DEFINED
+        # In netCDF a byte that was not written is no mark: all values of a byte are in use.
+        fill = item.fillvalue if is_set and item.dtype.kind in "fiu" and item.dtype.itemsize > 1 else None
+        try:
+            attributes = {key: value for key, value in item.attrs.items() if not isinstance(value, h5py.Empty)}
+            physical, said = unpack(values, attributes, fill)
+        except ValueError as error:
+            raise RecordError(f"{self._path}: column `{name}`: {error}: mend the attribute, or save as CSV") from None
+        if said:
+            self.unpacked.append(f"`{name}` {said}")
+        return physical
+
+    def _frame(self, group: Any) -> dict[str, Any]:
+        """Return the columns of a table of pandas."""
+        try:
+            return frame_columns(group, self._read_rows, _text)
+        except ValueError as error:
+            raise RecordError(f"{self._path}: table `{group.name}` of pandas: {error}") from None
+
+    def _read_rows(self, item: Any) -> Any:
+        return self._read(item).reshape(item.shape)
 
     def _follow_references(self, item: Any, depth: int) -> Any:
         """Return what a dataset of references points to: a field of each structure of an array."""
@@ -84,6 +128,8 @@ class _Reader:
 
 
 def _text(value: Any) -> str:
-    """Return an attribute or a text of the file, which may be bytes or an array of one."""
+    """Return an attribute or a text of the file, which may be bytes, an array of one, or empty."""
+    if getattr(value, "shape", ()) is None:
+        return ""
     plain = np.ravel(np.asarray(value, dtype=object))[0] if np.size(value) == 1 else ""
     return plain.decode("utf-8", "replace") if isinstance(plain, bytes) else str(plain)

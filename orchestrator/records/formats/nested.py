@@ -62,7 +62,7 @@ def _collect(name: str, value: Any, place: str, channels: Vectors, depth: int) -
     elif isinstance(value, Sequence) and not isinstance(value, str):
         for number, entry in enumerate(_columns(value), start=1):
             _collect_structure(f"{name}({number})", entry, channels, depth)
-    elif isinstance(value, np.ndarray) and (value.dtype.names or value.dtype.kind in "fiub"):
+    elif isinstance(value, np.ndarray) and (value.dtype.names or value.dtype.kind in "fiubM"):
         key = name if name not in channels.arrays else f"{place}.{name}"
         channels.arrays |= {k: v for k, v in columns_of(key, value).items() if k not in channels.arrays}
 
