@@ -22,8 +22,12 @@ from orchestrator.records.formats.source import (
     extra_error,
     in_a_line,
 )
+from orchestrator.records.units import parse_unit
+from orchestrator.records.words import TIME, words_of
 
 FORMULA_4, FORMULA_3 = 3, 10  # conversion types of the two versions
+# What the master of a group of version 4 may be besides a time.
+MASTERS = {2: "angle", 3: "distance", 4: "index"}
 
 
 class MdfSource(RecordSource):
@@ -35,8 +39,9 @@ class MdfSource(RecordSource):
         heads = []
         for number, group in enumerate(file.groups):
             master = file.masters_db.get(number)
-            heads.append(Head("time", "s", "number", number, "time" if number == 0 else f"time of group {number}"))
-            self._at.append((number, None))
+            if master is not None:
+                heads.append(_master_head(group.channels[master], number))
+                self._at.append((number, None))
             for index, channel in enumerate(group.channels):
                 if index == master:
                     continue
@@ -44,7 +49,8 @@ class MdfSource(RecordSource):
                 heads.append(head_of(channel.name, unit if isinstance(unit, str) else "", "number", number))
                 self._at.append((number, index))
         self.heads: Sequence[Head] = heads
-        self.dialect = f"MDF {file.version}, {len(file.groups)} groups, {len(heads) - len(file.groups)} channels"
+        channels = sum(index is not None for _, index in self._at)
+        self.dialect = f"MDF {file.version}, {len(file.groups)} groups, {channels} channels"
         self.rate = None
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
@@ -80,6 +86,21 @@ class MdfSource(RecordSource):
                 f"{self._path}: column `{self._file.groups[group].channels[index].name}` must have a linear "
                 "conversion, but has a formula: export it converted"
             )
+
+
+def _master_head(channel: Any, group: int) -> Head:
+    """Return the channel that a group's samples are taken over: a time, unless the file says that it is none."""
+    unit = channel.unit or getattr(channel.conversion, "unit", "") or ""
+    unit = unit if isinstance(unit, str) else ""
+    word = MASTERS.get(getattr(channel, "sync_type", 0))
+    known = parse_unit(unit, ("time",))
+    if word is None and known is not None and known.kind != "time":
+        word = "master"  # version 3 has no word for it
+    if word is None:
+        stated = unit if known is not None else "s"
+        return Head("time", stated, "number", group, "time" if group == 0 else f"time of group {group}")
+    name = word if not channel.name or set(words_of(channel.name)) & TIME else channel.name
+    return head_of(name, "" if word == "index" else unit, "number", group)
 
 
 def open_file(path: Path) -> MdfSource:

@@ -72,7 +72,7 @@ def _missing(raw: Array, attributes: Mapping[str, Any], fill: Any) -> NDArray[np
     missing = np.zeros(raw.shape, dtype=bool)
     raw = raw.astype(raw.dtype.newbyteorder("="), copy=False)
     size = 2 ** (8 * raw.dtype.itemsize)
-    for mark in np.concatenate(marks).tolist() if marks else ():
+    for mark in [number for several in marks for number in several.tolist()]:
         if raw.dtype.kind == "f":
             missing |= raw == raw.dtype.type(mark)
         elif np.isfinite(mark) and mark == int(mark) and -size // 2 <= mark < size:  # by its bits: either sign

@@ -67,9 +67,28 @@ def _head(field: Any) -> Head:
     meta = {key.lower(): value for key, value in (field.metadata or {}).items()}
     unit = next((meta[key].decode("utf-8", "replace") for key in (b"unit", b"units") if key in meta), "")
     stamp = pyarrow.types.is_timestamp(field.type)
-    number = stamp or pyarrow.types.is_integer(field.type) or pyarrow.types.is_floating(field.type)
-    head = head_of(field.name, unit)
-    return Head(head.name, head.unit, "stamp" if stamp else "number" if number else "text", 0, head.full)
+    kind = "stamp" if stamp else "number" if _is_number(field.type) else "text"
+    head = head_of(field.name, "s" if _second_fraction(field.type) else unit)
+    name = head.name if not _second_fraction(field.type) else head_of(field.name).name
+    return Head(name, head.unit, kind, 0, head.full)
+
+
+def _is_number(kind: Any) -> bool:
+    from pyarrow import types
+
+    if types.is_dictionary(kind):
+        return _is_number(kind.value_type)
+    plain = types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind) or types.is_boolean(kind)
+    return plain or _second_fraction(kind) != 0.0
+
+
+def _second_fraction(kind: Any) -> float:
+    """Return the unit of a duration or of a time of day [s]; 0.0 for other types."""
+    from pyarrow import types
+
+    if not (types.is_duration(kind) or types.is_time(kind)):
+        return 0.0
+    return {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[kind.unit]
 
 
 def _values(column: Any, name: str, path: Path) -> NDArray[Any]:
@@ -77,6 +96,17 @@ def _values(column: Any, name: str, path: Path) -> NDArray[Any]:
 
     if pyarrow.types.is_timestamp(column.type):
         return np.asarray(column.cast(pyarrow.timestamp("ns")).to_numpy())
-    if not (pyarrow.types.is_integer(column.type) or pyarrow.types.is_floating(column.type)):
-        raise RecordError(f"{path}: column `{name}` must hold numbers, but holds {column.type}")
-    return np.asarray(column.cast(pyarrow.float64()).to_numpy(), dtype=float)
+    if not _is_number(column.type):
+        raise RecordError(
+            f"{path}: column `{name}` must hold numbers, but holds {column.type}: save it as numbers, times in seconds"
+        )
+    if pyarrow.types.is_dictionary(column.type):
+        column = column.cast(column.type.value_type)
+    fraction = _second_fraction(column.type)
+    if fraction:
+        whole = pyarrow.int32() if column.type.bit_width == 32 else pyarrow.int64()
+        column = column.cast(whole)
+    if pyarrow.types.is_boolean(column.type):
+        column = column.cast(pyarrow.uint8())
+    values = np.asarray(column.cast(pyarrow.float64(), safe=False).to_numpy(), dtype=float)
+    return values * fraction if fraction else values
