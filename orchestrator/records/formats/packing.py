@@ -22,7 +22,7 @@ def unpack(values: Array, attributes: Mapping[str, Any], fill: Any = None) -> tu
 
     Args:
         values: of any shape.
-        attributes: of the variable.
+        attributes: by name, as the file has them.
         fill: what the file holds where nothing was written; None: that is not known.
 
     Raises:

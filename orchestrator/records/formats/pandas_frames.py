@@ -50,10 +50,11 @@ def _table(table: Any, read: Callable[[Any], Array], text: Callable[[Any], str])
             '`format="table", data_columns=True`'
         )
     rows = read(table)
-    kinds = {
-        name: text(table.attrs.get(f"{name}_dtype", table.attrs.get(f"{name}_kind", ""))) for name in rows.dtype.names
-    }
-    return {name: _as_dates(rows[name], kinds[name]) for name in rows.dtype.names}
+    found = {}
+    for name in rows.dtype.names or ():
+        kind = text(table.attrs.get(f"{name}_dtype", table.attrs.get(f"{name}_kind", "")))
+        found[name] = _as_dates(rows[name], kind)
+    return found
 
 
 def _dated(item: Any, read: Callable[[Any], Array], key: str, text: Callable[[Any], str]) -> Array:
