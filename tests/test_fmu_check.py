@@ -4,10 +4,7 @@ They need an index of packages, so they run where they are asked for: ``pytest -
 """
 
 import json
-import os
-import re
 import shlex
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -18,6 +15,7 @@ import yaml
 from lxml import etree
 
 from tests.support.c_fmu import build_c_fmu
+from tests.support.pipelines import commit, done_by_gitlab, done_by_runner, run
 from tests.support.schemas import json_schema, junit_schema
 
 pytestmark = [pytest.mark.network, pytest.mark.slow]
@@ -28,14 +26,6 @@ MOST_MEBIBYTES = 60
 HEAVY = {"fmpy", "matplotlib", "numba", "numpy", "rich", "scipy"}
 ACTION_SCHEMA = "https://json.schemastore.org/github-action.json"
 GITLAB_SCHEMA = "https://gitlab.com/gitlab-org/gitlab/-/raw/master/app/assets/javascripts/editor/schema/ci.json"
-
-
-def run(words, folder, **environment):
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("GITHUB_", "PYTHON"))}
-    words = [str(word) for word in words]
-    return subprocess.run(
-        words, cwd=folder, capture_output=True, text=True, check=False, env=clean | environment, timeout=600
-    )
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +46,6 @@ def user(tmp_path):
     build_c_fmu(folder / "fmus", "crash_step", name="bad")
     commit(folder)
     return folder
-
-
-def commit(folder):
-    who = ["-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "init.defaultBranch=main"]
-    for words in (["init", "-q"], ["add", "-A"], ["commit", "-qm", "all"]):
-        done = run(["git", *who, *words], folder)
-        assert done.returncode == 0, done.stderr
 
 
 def fmu_of_version_3(folder):
@@ -126,40 +109,13 @@ def test_the_action_runs_as_on_a_runner(repository, user):
     assert done_by_runner(action, {"fmus": "fmus/good.fmu"}, repository / PLACE, user) == 0
 
 
-def done_by_runner(action, given, place, folder):
-    """Do the steps of a composite action as GitHub's runner does; return the exit code."""
-    assert action["runs"]["using"] == "composite"
-    inputs = {name: given.get(name, entry.get("default", "")) for name, entry in action["inputs"].items()}
-    known = {f"inputs.{name}": value for name, value in inputs.items()} | {"github.action_path": str(place)}
-
-    def filled(text):
-        return re.sub(r"\$\{\{ *([\w.]+) *\}\}", lambda match: known[match[1]], text)
-
-    for step in action["runs"]["steps"]:
-        assert step["shell"] == "bash"
-        words = {name: filled(value) for name, value in step.get("env", {}).items()}
-        script = ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", filled(step["run"])]
-        done = run(script, folder, GITHUB_STEP_SUMMARY=str(folder / "summary.md"), GITHUB_ACTIONS="true", **words)
-        (folder / "said.txt").write_text(done.stdout, encoding="utf-8")
-        if done.returncode:
-            return done.returncode
-    return 0
-
-
 def test_the_template_for_gitlab_runs_as_in_a_job(repository, user, tmp_path):
-    text = (repository / PLACE / "gitlab.yml").read_text(encoding="utf-8")
-    header, body = yaml.safe_load_all(text)
-    given = {"fmus": "fmus/good.fmu fmus/bad.fmu", "repository": repository.as_uri(), "ref": "main"}
-    inputs = {name: given.get(name, (entry or {}).get("default")) for name, entry in header["spec"]["inputs"].items()}
-    assert None not in inputs.values()
-    filled = re.sub(r"\$\[\[ *inputs\.(\w+) *\]\]", lambda match: inputs[match[1]], text.split("---\n")[1])
-    (job,) = yaml.safe_load(filled).values()
-    done = run(["bash", "-eo", "pipefail", "-c", "\n".join(job["script"])], user, TMPDIR=str(tmp_path))
+    given = {"fmus": "fmus/good.fmu\nfmus/bad.fmu", "repository": repository.as_uri(), "ref": "main"}
+    done, job = done_by_gitlab(repository / PLACE, given, user, tmp_path)
     assert done.returncode == 1, done.stderr
     assert_reports(user / job["artifacts"]["reports"]["junit"], done.stdout)
     issues = json.loads((user / job["artifacts"]["reports"]["codequality"]).read_text(encoding="utf-8"))
     assert {i["check_name"] for i in issues if i["severity"] == "major"} == {"run.crash"}
-    assert list(body) == ["fmu-check"]
 
 
 def test_the_hook_runs_under_pre_commit(repository, user, tmp_path):
