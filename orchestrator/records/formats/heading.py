@@ -58,6 +58,11 @@ class Heading:
 
     def _misfit(self, line: str, what: str = "the header") -> RecordError:
         count = len(cells_of(line, self.separator))
+        if self.separator == " " and "," in line:
+            return RecordError(
+                f"{self.path}: cells must hold one value each, but below `{line.strip()[:60]}` some hold several with "
+                "blanks between them, as FMPy writes arrays: save the elements as columns of their own"
+            )
         return RecordError(
             f"{self.path}: {what} must have {self.width} names like the rows below it, but `{line.strip()[:60]}` has "
             f"{count}: say `header = LINE` (0: no names) in the model file (`model`)"
@@ -78,6 +83,8 @@ class Heading:
         cells = cells_of(line.lstrip("#%") if self.separator == " " else line, self.separator)
         if cells and cells[0].startswith("#"):
             cells[0] = cells[0].lstrip("# ")
+        if len(cells) > self.width and self.separator == ",":  # an index that nobody quoted: `y[1,2]`
+            cells = [cell.strip() for cell in re.split(r",(?![\d\s,:]*\])", line)]
         while len(cells) > self.width and (not cells[-1] or cells[-1].lower() in COMMENTS):
             cells.pop()
         if len(cells) == self.width - 1 and self.separator != " ":

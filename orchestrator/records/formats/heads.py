@@ -7,7 +7,8 @@ from orchestrator.records.formats.source import Head
 from orchestrator.records.words import CURRENT, TIME, TORQUE, describes, words_of
 from orchestrator.shared.units import is_unit
 
-_SQUARE = re.compile(r"(.*?)\s*\[\s*([^\[\]]*?)\s*\]\s*(.*)")
+_SQUARE = re.compile(r"\s*\[\s*([^\[\]]*?)\s*\]\s*")
+_INDEX = re.compile(r"[\d\s,:]*")  # of an element or a part of an array: `y[2]`, `y[1,2]`, `y[1:3]`
 _BRACKETS = re.compile(r"(.+?)\s*[({<]\s*([^(){}<>]*?(?:\([^()]*\))?)\s*[)}>]\s*")
 _APART = re.compile(r"(.+?)\s*(?:\s/\s*|/\s+|,\s+|\s+in\s+)(\S.*)")
 _FRACTION = re.compile(r"([^/]+)/(\S+)")
@@ -33,9 +34,9 @@ def head_of(text: str, unit: str = "", kind: str = "number", raster: int = 0) ->
 
 
 def _split(text: str) -> tuple[str, str]:
-    square = _SQUARE.fullmatch(text)
-    if square is not None and square[2] and not re.fullmatch(r"\d+|:", square[2]):
-        return f"{square[1]} {square[3]}".strip(), square[2]
+    for square in _SQUARE.finditer(text):
+        if not _INDEX.fullmatch(square[1]):
+            return f"{text[: square.start()]} {text[square.end() :]}".strip(), square[1]
     found = [f for pattern in (_APART, _BRACKETS) if (f := pattern.fullmatch(text)) is not None]
     for holds in (is_unit, _states):
         for match in found:
