@@ -13,7 +13,14 @@ from types import ModuleType
 import numpy as np
 
 from orchestrator.plants.compiled import compile_module
-from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, NAMES, PARAMETERS, with_values
+from pyfmu_sources.drivetrain_parameters import (
+    BACKLASH_MODELS,
+    DEFAULTS,
+    NAMES,
+    PARAMETERS,
+    DrivetrainParameters,
+    with_values,
+)
 
 STEPS = (1e-5, 2e-4, 1e-3, 5e-3, 1e-2, 2e-2)
 
@@ -56,10 +63,10 @@ def draw_machine(rng: np.random.Generator, model: int, names: list[str]) -> tupl
             plain[f"effects.coulomb_friction.{site}.torque"] = spread(2.0)
         if size is not None:
             plain[name] = spread(size)
-    return with_values(tuple(entry.default for entry in PARAMETERS), plain)
+    return with_values(DEFAULTS, plain)
 
 
-def draw_extreme(rng: np.random.Generator, model: int, names: list[str]) -> tuple[float, ...]:
+def draw_extreme(rng: np.random.Generator, model: int, names: list[str]) -> DrivetrainParameters:
     """Return a machine of which a few parameters are drawn from their whole legal range."""
     p = list(draw_machine(rng, model, names))
     for place in rng.choice(len(PARAMETERS), 3, replace=False):
@@ -68,7 +75,7 @@ def draw_extreme(rng: np.random.Generator, model: int, names: list[str]) -> tupl
             continue
         ends = [entry.minimum, entry.maximum, 10.0 ** rng.uniform(-9, 12)]
         p[place] = float(min(max(rng.choice(ends), entry.minimum), entry.maximum))
-    return tuple(p)
+    return DrivetrainParameters._make(p)
 
 
 def warm_up(plant: ModuleType) -> None:

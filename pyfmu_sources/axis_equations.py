@@ -28,47 +28,10 @@ from .effects import (
     sliding_friction,
     spring_torque,
 )
-from .servo_axis_parameters import (
-    P_B,
-    P_BREAKAWAY,
-    P_BRISTLE_C,
-    P_COULOMB,
-    P_DIRECTION,
-    P_DRAG,
-    P_FILTER,
-    P_GRAVITY,
-    P_GRAVITY_PHASE,
-    P_J,
-    P_J_WAVE,
-    P_J_WAVE_N,
-    P_J_WAVE_PHASE,
-    P_LOAD_TORQUE,
-    P_PRESLIDING,
-    P_RATE,
-    P_RIPPLE,
-    P_RIPPLE_2,
-    P_RIPPLE_2_PHASE,
-    P_RIPPLE_3,
-    P_RIPPLE_3_PHASE,
-    P_RIPPLE_N,
-    P_RIPPLE_PHASE,
-    P_SPRING,
-    P_SPRING_ANGLE,
-    P_SPRING_CUBIC,
-    P_STOP_D,
-    P_STOP_K,
-    P_STOP_LOWER,
-    P_STOP_UPPER,
-    P_STRIBECK,
-    P_STRIBECK_SPEED,
-    P_TAU,
-    P_WAVY,
-    P_WAVY_N,
-    P_WAVY_PHASE,
-)
+from .servo_axis_parameters import AxisParameters
 
 State = tuple[float, float, float, float, float]
-Parameters = tuple[float, ...]
+Parameters = AxisParameters
 
 
 def start(position: float, speed: float, drive: float, p: Parameters) -> State:
@@ -87,47 +50,79 @@ def start(position: float, speed: float, drive: float, p: Parameters) -> State:
 
 def friction(x: State, p: Parameters) -> float:
     """Return the magnitude of dry friction [N.m] at the axis's speed and position."""
-    level = sliding_friction(x[1], p[P_COULOMB], p[P_STRIBECK], p[P_BREAKAWAY], p[P_STRIBECK_SPEED])
-    if p[P_WAVY] == 0.0:
+    level = sliding_friction(
+        x[1],
+        p.coulomb_friction_motor_torque,
+        p.stribeck_friction_motor_coulomb,
+        p.stribeck_friction_motor_breakaway,
+        p.stribeck_friction_motor_stribeck_speed,
+    )
+    if p.periodic_friction_motor_amplitude == 0.0:
         return level
-    return dependent_friction(level, 0.0, 0.0, x[0], p[P_WAVY], p[P_WAVY_N], p[P_WAVY_PHASE])
+    return dependent_friction(
+        level,
+        0.0,
+        0.0,
+        x[0],
+        p.periodic_friction_motor_amplitude,
+        p.periodic_friction_motor_cycles_per_rev,
+        p.periodic_friction_motor_phase,
+    )
 
 
 def filtered(p: Parameters) -> bool:
     """Tell whether the request is filtered or limited in rate."""
-    return p[P_FILTER] > 0.0 or p[P_RATE] < BIG
+    return p.drive_filter_time_constant > 0.0 or p.rate_limit_rate < BIG
 
 
 def drive_torque(x: State, p: Parameters, u: float) -> float:
     """Return the drive's torque [N.m]: the state behind the lag, or the (filtered) request itself without one."""
-    if p[P_TAU] > 0.0:
+    if p.tau > 0.0:
         return x[2]
     return x[4] if filtered(p) and x[4] != UNASKED else u
 
 
 def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
     """Return the torque on the axis [N.m] of all but dry friction."""
-    torque = drive_torque(x, p, u) + periodic(x[0], p[P_RIPPLE], p[P_RIPPLE_N], p[P_RIPPLE_PHASE])
-    if p[P_RIPPLE_2] != 0.0 or p[P_RIPPLE_3] != 0.0:
-        torque += periodic(x[0], p[P_RIPPLE_2], 2.0 * p[P_RIPPLE_N], p[P_RIPPLE_2_PHASE])
-        torque += periodic(x[0], p[P_RIPPLE_3], 3.0 * p[P_RIPPLE_N], p[P_RIPPLE_3_PHASE])
-    torque -= p[P_B] * x[1] + quadratic_drag(x[1], p[P_DRAG]) + p[P_LOAD_TORQUE] + T_l
-    torque -= directional_friction(x[1], p[P_DIRECTION])
-    torque -= periodic(x[0], p[P_GRAVITY], 1.0, p[P_GRAVITY_PHASE])
-    if p[P_SPRING] != 0.0 or p[P_SPRING_CUBIC] != 0.0:
-        torque -= spring_torque(x[0], p[P_SPRING], p[P_SPRING_CUBIC], p[P_SPRING_ANGLE])
-    if x[0] > p[P_STOP_UPPER] or x[0] < p[P_STOP_LOWER]:
-        torque -= end_stop_torque(x[0], x[1], p[P_STOP_LOWER], p[P_STOP_UPPER], p[P_STOP_K], p[P_STOP_D])
-    if p[P_J_WAVE] != 0.0:
-        torque -= 0.5 * periodic_slope(x[0], p[P_J_WAVE], p[P_J_WAVE_N], p[P_J_WAVE_PHASE]) * x[1] * x[1]
+    torque = drive_torque(x, p, u) + periodic(
+        x[0], p.torque_ripple_amplitude, p.torque_ripple_cycles_per_rev, p.torque_ripple_phase
+    )
+    if p.torque_ripple_second_amplitude != 0.0 or p.torque_ripple_third_amplitude != 0.0:
+        torque += periodic(
+            x[0], p.torque_ripple_second_amplitude, 2.0 * p.torque_ripple_cycles_per_rev, p.torque_ripple_second_phase
+        )
+        torque += periodic(
+            x[0], p.torque_ripple_third_amplitude, 3.0 * p.torque_ripple_cycles_per_rev, p.torque_ripple_third_phase
+        )
+    torque -= p.b * x[1] + quadratic_drag(x[1], p.quadratic_drag_coefficient) + p.load_torque_torque + T_l
+    torque -= directional_friction(x[1], p.directional_friction_motor_difference)
+    torque -= periodic(x[0], p.gravity_load_amplitude, 1.0, p.gravity_load_phase)
+    if p.spring_load_stiffness != 0.0 or p.spring_load_cubic != 0.0:
+        torque -= spring_torque(x[0], p.spring_load_stiffness, p.spring_load_cubic, p.spring_load_angle)
+    if x[0] > p.end_stop_upper or x[0] < p.end_stop_lower:
+        torque -= end_stop_torque(
+            x[0], x[1], p.end_stop_lower, p.end_stop_upper, p.end_stop_stiffness, p.end_stop_dissipation
+        )
+    if p.varying_inertia_amplitude != 0.0:
+        torque -= (
+            0.5
+            * periodic_slope(
+                x[0], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
+            )
+            * x[1]
+            * x[1]
+        )
     return torque
 
 
 def inertia(x: State, p: Parameters) -> float:
     """Return the inertia [kg.m2] at a position; a wave larger than it leaves a thousandth of it."""
-    if p[P_J_WAVE] == 0.0:
-        return p[P_J]
-    return max(1e-3 * p[P_J], p[P_J] + periodic(x[0], p[P_J_WAVE], p[P_J_WAVE_N], p[P_J_WAVE_PHASE]))
+    if p.varying_inertia_amplitude == 0.0:
+        return p.J
+    return max(
+        1e-3 * p.J,
+        p.J + periodic(x[0], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase),
+    )
 
 
 def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
@@ -140,42 +135,54 @@ def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
     follows = 0.0
     if filtered(p):
         asked = x[4]
-        follows = request_rate(x[4], u, p[P_FILTER], p[P_RATE])
-    lag = (asked - x[2]) / p[P_TAU] if p[P_TAU] > 0.0 else 0.0
+        follows = request_rate(x[4], u, p.drive_filter_time_constant, p.rate_limit_rate)
+    lag = (asked - x[2]) / p.tau if p.tau > 0.0 else 0.0
     accelerated = (sliding_torque(x, p, u, T_l) - sign * friction(x, p)) / inertia(x, p)
     return (x[1], accelerated, lag, 0.0, follows)
 
 
 def rest(p: Parameters) -> float:
     """Return the breakaway torque [N.m] without what depends on the position."""
-    return p[P_COULOMB] + max(p[P_STRIBECK], p[P_BREAKAWAY])
+    return p.coulomb_friction_motor_torque + max(p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway)
 
 
 def capacity(x: State, p: Parameters) -> float:
     """Return the breakaway torque [N.m] below which an axis that stands still keeps standing."""
-    if p[P_WAVY] == 0.0:
+    if p.periodic_friction_motor_amplitude == 0.0:
         return rest(p)
-    return dependent_friction(rest(p), 0.0, 0.0, x[0], p[P_WAVY], p[P_WAVY_N], p[P_WAVY_PHASE])
+    return dependent_friction(
+        rest(p),
+        0.0,
+        0.0,
+        x[0],
+        p.periodic_friction_motor_amplitude,
+        p.periodic_friction_motor_cycles_per_rev,
+        p.periodic_friction_motor_phase,
+    )
 
 
 def builds_up(p: Parameters) -> bool:
     """Tell whether friction builds up over a distance."""
-    return p[P_PRESLIDING] > 0.0 and rest(p) > 0.0
+    return p.presliding_motor_distance > 0.0 and rest(p) > 0.0
 
 
 def reach(x: State, p: Parameters) -> float:
     """Return the bending [rad] at which the bristle slides at its speed."""
-    return p[P_PRESLIDING] * friction(x, p) / rest(p)
+    return p.presliding_motor_distance * friction(x, p) / rest(p)
 
 
 def falls(p: Parameters) -> bool:
     """Tell whether friction depends on the speed."""
-    return p[P_STRIBECK] != p[P_BREAKAWAY]
+    return p.stribeck_friction_motor_coulomb != p.stribeck_friction_motor_breakaway
 
 
 def leaves_sliding(p: Parameters) -> float:
     """Return the speed [rad/s] below which the bristle of an axis that slides must be followed."""
-    return leaving_speed(p[P_PRESLIDING], falls(p), p[P_STRIBECK_SPEED]) if builds_up(p) else 0.0
+    return (
+        leaving_speed(p.presliding_motor_distance, falls(p), p.stribeck_friction_motor_stribeck_speed)
+        if builds_up(p)
+        else 0.0
+    )
 
 
 def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> State:
@@ -185,7 +192,9 @@ def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> Stat
     if builds_up(p):
         far = reach(x, p)
         bends = bristle_rate(x[3], x[1], far)
-        r = rates(x, bent_sign(x[3], bends, far, rest(p) / p[P_PRESLIDING], p[P_BRISTLE_C]), p, u, T_l)
+        r = rates(
+            x, bent_sign(x[3], bends, far, rest(p) / p.presliding_motor_distance, p.presliding_motor_damping), p, u, T_l
+        )
         return (r[0], r[1], r[2], bends, r[4])
     r = rates(x, 0.0, p, u, T_l)
     return (0.0, 0.0, r[2], 0.0, r[4])
@@ -219,4 +228,4 @@ def settled(x: State, p: Parameters) -> int:
 
 def past_stop(x: State, p: Parameters) -> int:
     """Return the end stop at which the axis is: -1, 0 (none) or 1."""
-    return 1 if x[0] > p[P_STOP_UPPER] else -1 if x[0] < p[P_STOP_LOWER] else 0
+    return 1 if x[0] > p.end_stop_upper else -1 if x[0] < p.end_stop_lower else 0

@@ -19,32 +19,6 @@ from .axis_equations import (
     slip_at_rest,
 )
 from .drivetrain_parameters import BIG, TINY
-from .servo_axis_parameters import (
-    P_B,
-    P_BREAKAWAY,
-    P_BRISTLE_C,
-    P_DIRECTION,
-    P_DRAG,
-    P_FILTER,
-    P_J,
-    P_J_WAVE,
-    P_J_WAVE_N,
-    P_PRESLIDING,
-    P_RIPPLE,
-    P_RIPPLE_2,
-    P_RIPPLE_3,
-    P_RIPPLE_N,
-    P_SPRING,
-    P_SPRING_ANGLE,
-    P_SPRING_CUBIC,
-    P_STOP_D,
-    P_STOP_K,
-    P_STRIBECK,
-    P_STRIBECK_SPEED,
-    P_TAU,
-    P_WAVY,
-    P_WAVY_N,
-)
 
 SHARE = 0.05  # of the time in which the fastest rate acts: a step
 AHEAD = 0.05  # of the time in which a sliding axis would stop: a step that comes no nearer to where friction falls
@@ -53,11 +27,15 @@ THERE = 1e-14  # of the torque: a drive that is no farther from its request has 
 
 def longest_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> float:
     """Return a step [s] that resolves all rates well (a Runge-Kutta step errs by its 5th power)."""
-    rate = (p[P_B] + abs(p[P_DIRECTION]) + 2.0 * p[P_DRAG] * abs(x[1])) / p[P_J]
-    if p[P_RIPPLE] != 0.0:
-        rate = max(rate, p[P_RIPPLE_N] * (abs(x[1]) + sqrt(abs(p[P_RIPPLE]) / (p[P_RIPPLE_N] * p[P_J] + TINY))))
+    rate = (p.b + abs(p.directional_friction_motor_difference) + 2.0 * p.quadratic_drag_coefficient * abs(x[1])) / p.J
+    if p.torque_ripple_amplitude != 0.0:
+        rate = max(
+            rate,
+            p.torque_ripple_cycles_per_rev
+            * (abs(x[1]) + sqrt(abs(p.torque_ripple_amplitude) / (p.torque_ripple_cycles_per_rev * p.J + TINY))),
+        )
     step = min(h, SHARE / (max(rate, further_rate(x, mode, p)) + TINY))
-    if p[P_TAU] > 0.0:
+    if p.tau > 0.0:
         step = min(step, step_of_lag(x, p, u))
     if falls(p):
         step = step_of_fall(x, mode, p, u, T_l, step)
@@ -67,12 +45,12 @@ def longest_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: fl
 def step_of_lag(x: State, p: Parameters, u: float) -> float:
     """Return a step [s] that resolves the drive's lag: one that has come close to its request asks for no short one."""
     if filtered(p):
-        return SHARE * p[P_TAU]
+        return SHARE * p.tau
     torque = abs(x[2]) + abs(u)
     behind = abs(x[2] - u)
     if behind <= THERE * torque:
         return BIG
-    return 0.5 * SHARE * p[P_TAU] * (torque / behind) ** 0.2
+    return 0.5 * SHARE * p.tau * (torque / behind) ** 0.2
 
 
 def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float, most: float) -> float:
@@ -83,16 +61,16 @@ def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float, most:
     Args:
         most: step that everything else allows [s].
     """
-    fall = abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / p[P_J]
-    short = SHARE * p[P_STRIBECK_SPEED] / (fall + TINY)
+    fall = abs(p.stribeck_friction_motor_breakaway - p.stribeck_friction_motor_coulomb) / p.J
+    short = SHARE * p.stribeck_friction_motor_stribeck_speed / (fall + TINY)
     if short >= most:
         return most
     speed = abs(x[1])
     acceleration = abs(mode_rates(x, mode, p, u, T_l)[1])
     # Near rest friction is flat: it falls by no more than twice the speed that is reached, over the square of its own.
-    reached = 0.5 * short * p[P_STRIBECK_SPEED]
+    reached = 0.5 * short * p.stribeck_friction_motor_stribeck_speed
     near = 2.0 * reached / (speed + sqrt(speed * speed + 4.0 * acceleration * reached) + TINY * TINY)
-    ratio = 0.5 * speed / p[P_STRIBECK_SPEED]
+    ratio = 0.5 * speed / p.stribeck_friction_motor_stribeck_speed
     if ratio < 1.0:
         return min(most, max(short, near))
     ahead = AHEAD * speed / (acceleration + TINY)
@@ -103,22 +81,36 @@ def further_rate(x: State, mode: int, p: Parameters) -> float:
     """Return the fastest rate [1/s] of bristle, filter, harmonics, spring, end stops and varying inertia."""
     rate = 0.0
     if mode == 0 and builds_up(p):
-        stiffness = rest(p) / p[P_PRESLIDING]
-        rate = max(sqrt(stiffness / p[P_J]), p[P_BRISTLE_C] / p[P_J]) + abs(x[1]) / (reach(x, p) + TINY)
-    if p[P_FILTER] > 0.0:
-        rate = max(rate, 1.0 / p[P_FILTER])
-    if p[P_RIPPLE_2] != 0.0 or p[P_RIPPLE_3] != 0.0:
-        torque = abs(p[P_RIPPLE_2]) + abs(p[P_RIPPLE_3])
-        rate = max(rate, 3.0 * p[P_RIPPLE_N] * (abs(x[1]) + sqrt(torque / (p[P_RIPPLE_N] * p[P_J] + TINY))))
-    if p[P_SPRING] != 0.0 or p[P_SPRING_CUBIC] != 0.0:
-        way = x[0] - p[P_SPRING_ANGLE]
-        rate = max(rate, sqrt((abs(p[P_SPRING]) + 3.0 * abs(p[P_SPRING_CUBIC]) * way * way) / p[P_J]))
+        stiffness = rest(p) / p.presliding_motor_distance
+        rate = max(sqrt(stiffness / p.J), p.presliding_motor_damping / p.J) + abs(x[1]) / (reach(x, p) + TINY)
+    if p.drive_filter_time_constant > 0.0:
+        rate = max(rate, 1.0 / p.drive_filter_time_constant)
+    if p.torque_ripple_second_amplitude != 0.0 or p.torque_ripple_third_amplitude != 0.0:
+        torque = abs(p.torque_ripple_second_amplitude) + abs(p.torque_ripple_third_amplitude)
+        rate = max(
+            rate,
+            3.0
+            * p.torque_ripple_cycles_per_rev
+            * (abs(x[1]) + sqrt(torque / (p.torque_ripple_cycles_per_rev * p.J + TINY))),
+        )
+    if p.spring_load_stiffness != 0.0 or p.spring_load_cubic != 0.0:
+        way = x[0] - p.spring_load_angle
+        rate = max(rate, sqrt((abs(p.spring_load_stiffness) + 3.0 * abs(p.spring_load_cubic) * way * way) / p.J))
     if past_stop(x, p) != 0:
-        rate = max(rate, sqrt(p[P_STOP_K] * (1.0 + p[P_STOP_D] * abs(x[1])) / p[P_J]))
-    if p[P_J_WAVE] != 0.0:
-        rate = max(rate, p[P_J_WAVE_N] * abs(x[1]))
-    if p[P_WAVY] != 0.0:
-        rate = max(rate, p[P_WAVY_N] * (abs(x[1]) + sqrt(abs(p[P_WAVY]) / (p[P_WAVY_N] * p[P_J] + TINY))))
+        rate = max(rate, sqrt(p.end_stop_stiffness * (1.0 + p.end_stop_dissipation * abs(x[1])) / p.J))
+    if p.varying_inertia_amplitude != 0.0:
+        rate = max(rate, p.varying_inertia_cycles_per_rev * abs(x[1]))
+    if p.periodic_friction_motor_amplitude != 0.0:
+        rate = max(
+            rate,
+            p.periodic_friction_motor_cycles_per_rev
+            * (
+                abs(x[1])
+                + sqrt(
+                    abs(p.periodic_friction_motor_amplitude) / (p.periodic_friction_motor_cycles_per_rev * p.J + TINY)
+                )
+            ),
+        )
     return rate
 
 
@@ -129,9 +121,9 @@ def along(x: State, h: float, r: State) -> State:
 
 def driven(x: State, after: State, p: Parameters, u: float, h: float) -> State:
     """Return the state ``after``, ``h`` [s] later, with the drive's torque then: ``u + (drive - u) exp(-h / tau)``."""
-    if p[P_TAU] <= 0.0 or filtered(p):
+    if p.tau <= 0.0 or filtered(p):
         return after
-    return (after[0], after[1], u + (x[2] - u) * exp(-h / p[P_TAU]), after[3], after[4])
+    return (after[0], after[1], u + (x[2] - u) * exp(-h / p.tau), after[3], after[4])
 
 
 def smooth_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> State:

@@ -12,28 +12,6 @@ In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where bot
 ``bristle``: its bending [rad]; ``reach``: bending at which it slides [rad].
 """
 
-from .drivetrain_parameters import (
-    P_BREAKAWAY_L,
-    P_BREAKAWAY_M,
-    P_BRISTLE_C_L,
-    P_BRISTLE_C_M,
-    P_COULOMB_L,
-    P_COULOMB_M,
-    P_LOADED_L,
-    P_LOADED_M,
-    P_PRESLIDING_L,
-    P_PRESLIDING_M,
-    P_STRIBECK_L,
-    P_STRIBECK_M,
-    P_STRIBECK_SPEED_L,
-    P_STRIBECK_SPEED_M,
-    P_WAVY_L,
-    P_WAVY_M,
-    P_WAVY_N_L,
-    P_WAVY_N_M,
-    P_WAVY_PHASE_L,
-    P_WAVY_PHASE_M,
-)
 from .effects import bristle_rate, dependent_friction
 from .equations import Mode, Parameters, State, elastic_torque, friction_l, friction_m, is_rigid, lever_arm
 
@@ -62,72 +40,106 @@ def breakaway(coulomb: float, sliding: float, static: float) -> float:
 
 def unloaded_m(p: Parameters) -> float:
     """Return the motor's breakaway torque [N.m] without what depends on the shaft's torque and the position."""
-    return breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
+    return breakaway(
+        p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway
+    )
 
 
 def unloaded_l(p: Parameters) -> float:
     """Return the load's breakaway torque [N.m] without what depends on the shaft's torque and the position."""
-    return breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
+    return breakaway(
+        p.coulomb_friction_load_torque, p.stribeck_friction_load_coulomb, p.stribeck_friction_load_breakaway
+    )
 
 
 def has_friction_m(p: Parameters) -> bool:
     """Tell whether the motor has dry friction."""
-    return p[P_COULOMB_M] + p[P_STRIBECK_M] + p[P_BREAKAWAY_M] + p[P_LOADED_M] + abs(p[P_WAVY_M]) > 0.0
+    return (
+        p.coulomb_friction_motor_torque
+        + p.stribeck_friction_motor_coulomb
+        + p.stribeck_friction_motor_breakaway
+        + p.load_dependent_friction_motor_coefficient
+        + abs(p.periodic_friction_motor_amplitude)
+        > 0.0
+    )
 
 
 def has_friction_l(p: Parameters) -> bool:
     """Tell whether the load has dry friction."""
-    return p[P_COULOMB_L] + p[P_STRIBECK_L] + p[P_BREAKAWAY_L] + p[P_LOADED_L] + abs(p[P_WAVY_L]) > 0.0
+    return (
+        p.coulomb_friction_load_torque
+        + p.stribeck_friction_load_coulomb
+        + p.stribeck_friction_load_breakaway
+        + p.load_dependent_friction_load_coefficient
+        + abs(p.periodic_friction_load_amplitude)
+        > 0.0
+    )
 
 
 def capacity_m(x: State, contact: int, p: Parameters) -> float:
     """Return the breakaway torque [N.m] of the motor."""
     level = unloaded_m(p)
-    if p[P_LOADED_M] == 0.0 and p[P_WAVY_M] == 0.0:
+    if p.load_dependent_friction_motor_coefficient == 0.0 and p.periodic_friction_motor_amplitude == 0.0:
         return level
     return dependent_friction(
-        level, carried_m(x, contact, p), p[P_LOADED_M], x[0], p[P_WAVY_M], p[P_WAVY_N_M], p[P_WAVY_PHASE_M]
+        level,
+        carried_m(x, contact, p),
+        p.load_dependent_friction_motor_coefficient,
+        x[0],
+        p.periodic_friction_motor_amplitude,
+        p.periodic_friction_motor_cycles_per_rev,
+        p.periodic_friction_motor_phase,
     )
 
 
 def capacity_l(x: State, contact: int, p: Parameters) -> float:
     """Return the breakaway torque [N.m] of the load."""
     level = unloaded_l(p)
-    if p[P_LOADED_L] == 0.0 and p[P_WAVY_L] == 0.0:
+    if p.load_dependent_friction_load_coefficient == 0.0 and p.periodic_friction_load_amplitude == 0.0:
         return level
     return dependent_friction(
-        level, carried_l(x, contact, p), p[P_LOADED_L], x[2], p[P_WAVY_L], p[P_WAVY_N_L], p[P_WAVY_PHASE_L]
+        level,
+        carried_l(x, contact, p),
+        p.load_dependent_friction_load_coefficient,
+        x[2],
+        p.periodic_friction_load_amplitude,
+        p.periodic_friction_load_cycles_per_rev,
+        p.periodic_friction_load_phase,
     )
 
 
 def carried_m(x: State, contact: int, p: Parameters) -> float:
     """Return the shaft's torque on the motor [N.m] that its friction depends on; rigid teeth leave it out."""
-    return 0.0 if is_rigid(p) or p[P_LOADED_M] == 0.0 else elastic_torque(x, contact, p) * lever_arm(x, p)
+    return (
+        0.0
+        if is_rigid(p) or p.load_dependent_friction_motor_coefficient == 0.0
+        else elastic_torque(x, contact, p) * lever_arm(x, p)
+    )
 
 
 def carried_l(x: State, contact: int, p: Parameters) -> float:
     """Return the shaft's torque on the load [N.m] that its friction depends on; rigid teeth leave it out."""
-    return 0.0 if is_rigid(p) or p[P_LOADED_L] == 0.0 else elastic_torque(x, contact, p)
+    return 0.0 if is_rigid(p) or p.load_dependent_friction_load_coefficient == 0.0 else elastic_torque(x, contact, p)
 
 
 def rest_m(p: Parameters) -> float:
     """Return the motor's breakaway torque [N.m] at 1 N.m of the shaft's on it, without what depends on the position."""
-    return unloaded_m(p) + p[P_LOADED_M]
+    return unloaded_m(p) + p.load_dependent_friction_motor_coefficient
 
 
 def rest_l(p: Parameters) -> float:
     """Return the load's breakaway torque [N.m] at 1 N.m of the shaft's on it, without what depends on the position."""
-    return unloaded_l(p) + p[P_LOADED_L]
+    return unloaded_l(p) + p.load_dependent_friction_load_coefficient
 
 
 def builds_up_m(p: Parameters) -> bool:
     """Tell whether the motor's friction builds up over a distance; what only the shaft's torque makes is set-valued."""
-    return p[P_PRESLIDING_M] > 0.0 and unloaded_m(p) > 0.0 and not is_rigid(p)
+    return p.presliding_motor_distance > 0.0 and unloaded_m(p) > 0.0 and not is_rigid(p)
 
 
 def builds_up_l(p: Parameters) -> bool:
     """Tell whether the load's friction builds up over a distance; what only the shaft's torque makes is set-valued."""
-    return p[P_PRESLIDING_L] > 0.0 and unloaded_l(p) > 0.0 and not is_rigid(p)
+    return p.presliding_load_distance > 0.0 and unloaded_l(p) > 0.0 and not is_rigid(p)
 
 
 def leaving_speed(distance: float, falls: bool, stribeck_speed: float) -> float:
@@ -142,22 +154,30 @@ def leaving_speed(distance: float, falls: bool, stribeck_speed: float) -> float:
 
 def leaving_speed_m(p: Parameters) -> float:
     """Return :func:`leaving_speed` of the motor [rad/s]."""
-    return leaving_speed(p[P_PRESLIDING_M], p[P_STRIBECK_M] != p[P_BREAKAWAY_M], p[P_STRIBECK_SPEED_M])
+    return leaving_speed(
+        p.presliding_motor_distance,
+        p.stribeck_friction_motor_coulomb != p.stribeck_friction_motor_breakaway,
+        p.stribeck_friction_motor_stribeck_speed,
+    )
 
 
 def leaving_speed_l(p: Parameters) -> float:
     """Return :func:`leaving_speed` of the load [rad/s]."""
-    return leaving_speed(p[P_PRESLIDING_L], p[P_STRIBECK_L] != p[P_BREAKAWAY_L], p[P_STRIBECK_SPEED_L])
+    return leaving_speed(
+        p.presliding_load_distance,
+        p.stribeck_friction_load_coulomb != p.stribeck_friction_load_breakaway,
+        p.stribeck_friction_load_stribeck_speed,
+    )
 
 
 def reach_m(x: State, contact: int, p: Parameters) -> float:
     """Return the bending [rad] at which the motor's bristle slides at its speed."""
-    return p[P_PRESLIDING_M] * friction_m(x, carried_m(x, contact, p), p) / rest_m(p)
+    return p.presliding_motor_distance * friction_m(x, carried_m(x, contact, p), p) / rest_m(p)
 
 
 def reach_l(x: State, contact: int, p: Parameters) -> float:
     """Return the bending [rad] at which the load's bristle slides at its speed."""
-    return p[P_PRESLIDING_L] * friction_l(x, carried_l(x, contact, p), p) / rest_l(p)
+    return p.presliding_load_distance * friction_l(x, carried_l(x, contact, p), p) / rest_l(p)
 
 
 def bent_sign(bristle: float, rate: float, reach: float, stiffness: float, damping: float) -> float:
@@ -212,11 +232,11 @@ def turned_signs(x: State, mode: Mode, p: Parameters) -> tuple[float, float, flo
     if slip_m == 0 and builds_up_m(p):
         reach = reach_m(x, contact, p)
         rate_m = bristle_rate(x[8], x[1], reach)
-        sign_m = bent_sign(x[8], rate_m, reach, rest_m(p) / p[P_PRESLIDING_M], p[P_BRISTLE_C_M])
+        sign_m = bent_sign(x[8], rate_m, reach, rest_m(p) / p.presliding_motor_distance, p.presliding_motor_damping)
     if slip_l == 0 and builds_up_l(p):
         reach = reach_l(x, contact, p)
         rate_l = bristle_rate(x[9], x[3], reach)
-        sign_l = bent_sign(x[9], rate_l, reach, rest_l(p) / p[P_PRESLIDING_L], p[P_BRISTLE_C_L])
+        sign_l = bent_sign(x[9], rate_l, reach, rest_l(p) / p.presliding_load_distance, p.presliding_load_damping)
     return (sign_m, sign_l, rate_m, rate_l)
 
 
@@ -224,11 +244,11 @@ def settled_slips(x: State, mode: Mode, p: Parameters) -> Mode:
     """Return the mode with parts whose bristles have settled sliding."""
     contact, slip_m, slip_l = mode
     if slip_m == 0 and builds_up_m(p):
-        falls = p[P_STRIBECK_M] != p[P_BREAKAWAY_M]
+        falls = p.stribeck_friction_motor_coulomb != p.stribeck_friction_motor_breakaway
         if has_settled(x[8], x[1], reach_m(x, contact, p), leaving_speed_m(p), falls):
             slip_m = 1 if x[1] > 0.0 else -1
     if slip_l == 0 and builds_up_l(p):
-        falls = p[P_STRIBECK_L] != p[P_BREAKAWAY_L]
+        falls = p.stribeck_friction_load_coulomb != p.stribeck_friction_load_breakaway
         if has_settled(x[9], x[3], reach_l(x, contact, p), leaving_speed_l(p), falls):
             slip_l = 1 if x[3] > 0.0 else -1
     return (contact, slip_m, slip_l)

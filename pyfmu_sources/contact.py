@@ -8,7 +8,7 @@ that holds a motor at rest [N.m]; ``held``: dry friction, load side, that holds 
 from .backlash_models import BOUNCING, HELD, RIGID
 from .bristles import resting_bristles
 from .drive_request import UNASKED
-from .drivetrain_parameters import NONE, P_ALPHA, P_J_M, P_MODEL, P_RESTITUTION
+from .drivetrain_parameters import NONE
 from .equations import (
     Parameters,
     State,
@@ -42,15 +42,15 @@ def parted_twist(x: State, contact: int, p: Parameters) -> float:
     damping = shaft_damping(p)
     if damping == 0.0 or shaft_stiffness(p) > 1e7 * damping:
         return 0.0
-    return twist(x, p) - contact * p[P_ALPHA]
+    return twist(x, p) - contact * p.alpha
 
 
 def collide(x: State, restitution: float, p: Parameters) -> State:
     """Return the state after motor and load hit each other (eqs. 2.3 and 2.4): momentum is kept."""
     i = gear(x, p)
-    mobility = 1.0 / (p[P_J_M] * i * i) + 1.0 / load_inertia(x, p)
+    mobility = 1.0 / (p.J_m * i * i) + 1.0 / load_inertia(x, p)
     impulse = (1.0 + restitution) * (x[1] / i - x[3]) / mobility
-    omega_m = x[1] - impulse / (i * p[P_J_M])
+    omega_m = x[1] - impulse / (i * p.J_m)
     omega_l = x[3] + impulse / load_inertia(x, p)
     if restitution == 0.0:
         omega_l = omega_m / i
@@ -59,13 +59,13 @@ def collide(x: State, restitution: float, p: Parameters) -> State:
 
 def on_flank(x: State, side: int, p: Parameters) -> State:
     """Return the state with the load moved to the flank ``side`` of rigid teeth and both at one speed."""
-    theta_l = x[2] + twist(x, p) - side * p[P_ALPHA]
+    theta_l = x[2] + twist(x, p) - side * p.alpha
     return collide((x[0], x[1], theta_l, x[3], x[4], x[5], x[6], 0.0, x[8], x[9], x[10], x[11]), 0.0, p)
 
 
 def joined(x: State, side: int, p: Parameters) -> State:
     """Return a state of rigid teeth in contact as it must be: at the flank and at one speed; mostly ``x`` itself."""
-    apart = abs(twist(x, p) - side * p[P_ALPHA])
+    apart = abs(twist(x, p) - side * p.alpha)
     sliding = abs(twist_rate(x, p))
     if apart <= NOT_JOINED * (1.0 + abs(x[2])) and sliding <= NOT_JOINED * (1.0 + abs(x[3])):
         return x
@@ -94,15 +94,15 @@ def after_event(
     held: float,
 ) -> tuple[State, int]:
     """Return state and contact after the guard ``which`` of ``contact`` has turned negative."""
-    model = int(p[P_MODEL])
+    model = int(p.backlash_model)
     if contact == 0:
         flank = 1 if which == 0 else -1
         if model in HELD:
             return play_engaged(x, flank, push_m, push, p, held_m, held)
         if model in BOUNCING:
             closing = abs(x[1] / gear(x, p) - x[3])
-            if closing > RESTING_SPEED and events < MAX_BOUNCES and p[P_RESTITUTION] > 0.0:
-                return (collide(x, p[P_RESTITUTION], p), 0)
+            if closing > RESTING_SPEED and events < MAX_BOUNCES and p.restitution > 0.0:
+                return (collide(x, p.restitution, p), 0)
             return (collide(x, 0.0, p), flank)
         return (parted(x, 0.0), flank)
     if contact in (-2, 2):
@@ -133,14 +133,14 @@ def play_reversed(x: State, flank: int, push_m: float, push: float, held_m: floa
 
 def initial_contact(x: State, p: Parameters) -> int:
     """Return the flank at which a simulation starts."""
-    if backlash_model(p) == NONE or (is_rigid(p) and p[P_ALPHA] == 0.0):
+    if backlash_model(p) == NONE or (is_rigid(p) and p.alpha == 0.0):
         return 1
-    contact = contact_of(twist(x, p), p[P_ALPHA])
+    contact = contact_of(twist(x, p), p.alpha)
     if contact != 0 and is_rigid(p):
         # Rigid teeth that close or open are an event of the first step.
         return contact if x[1] == x[3] * gear(x, p) else 0
     if contact != 0 and teeth_never_pull(p):
-        wound = twist(x, p) - contact * p[P_ALPHA]
+        wound = twist(x, p) - contact * p.alpha
         if contact * (shaft_stiffness(p) * wound + shaft_damping(p) * twist_rate(x, p)) < 0.0:
             return 0
     return contact
@@ -153,8 +153,8 @@ def consistent_start(start: Start, p: Parameters) -> State:
     still inside the gap. Teeth that never pull may part at once and then leave the shaft its twist. What is not part of
     the first eight entries (bristles, hysteresis, filter of the drive) starts at rest, so that they may be left out.
     """
-    model = int(p[P_MODEL])
-    half = p[P_ALPHA]
+    model = int(p.backlash_model)
+    half = p.alpha
     x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7], 0.0, 0.0, 0.0, UNASKED)
     wound = twist(x, p)
     if model in RIGID:

@@ -10,7 +10,7 @@ length of the step [s].
 from math import exp, sqrt
 
 from .bristles import builds_up_l, builds_up_m, turned_signs
-from .drivetrain_parameters import BIG, P_FILTER, P_RATE, P_TAU
+from .drivetrain_parameters import BIG
 from .equations import Mode, Parameters, State, rates
 
 RELATIVE_TOLERANCE = 1e-11
@@ -53,14 +53,14 @@ def combine(a: float, k: State, b: float, m: State) -> State:
 
 def is_quick(p: Parameters, h: float) -> bool:
     """Tell whether a drive moves within a step, and follows the request itself: not a filtered or limited one."""
-    return h > SLOW * p[P_TAU] and p[P_FILTER] <= 0.0 and p[P_RATE] >= BIG
+    return h > SLOW * p.tau and p.drive_filter_time_constant <= 0.0 and p.rate_limit_rate >= BIG
 
 
 def driven(x: State, after: State, quick: bool, p: Parameters, u: float, h: float) -> State:
     """Return ``after``, ``h`` [s] later, with the torque of a quick drive then: ``u + (T_m - u) exp(-h / tau)``."""
     if not quick:
         return after
-    torque = u + (x[4] - u) * exp(-h / p[P_TAU])
+    torque = u + (x[4] - u) * exp(-h / p.tau)
     return (
         after[0], after[1], after[2], after[3], torque, after[5], after[6], after[7], after[8], after[9], after[10],
         after[11],

@@ -11,7 +11,7 @@ from math import exp
 
 from .contact import consistent_start, initial_contact
 from .drive_request import UNASKED, ramp_end, ramp_target, ramp_time
-from .drivetrain_parameters import BIG, DEFAULTS, NONE, NONLINEAR, P_FILTER, P_LOAD_TORQUE, P_RATE
+from .drivetrain_parameters import BIG, DEFAULTS, NONE, NONLINEAR
 from .dry_friction import shaft_torque, slips
 from .equations import Mode, Parameters, State, backlash_model, contact_of, is_rigid, rates, twist, twist_rate
 from .event_numbers import NO_EVENT, TOO_MUCH
@@ -22,8 +22,8 @@ from .transition import relaxation_rate, transition
 
 __all__ = [
     "Mode", "Parameters", "State", "Table", "advance", "advance_to_event", "consistent_start", "contact_of",
-    "has_nonlinear_effect", "initial_mode", "prepare", "rates", "reported_contact", "shaft_torque", "twist",
-    "twist_rate",
+    "has_nonlinear_effect", "initial_mode", "prepare", "rates", "reported_contact", "shaft_torque", "step_table",
+    "twist", "twist_rate",
 ]  # fmt: skip
 
 
@@ -37,8 +37,12 @@ def has_nonlinear_effect(p: Parameters) -> bool:
 
 def prepare(p: Parameters, h: float) -> Table:
     """Return what steps of ``h`` [s] need again and again: the transition matrices and the relaxation."""
+    return step_table(p, h, has_nonlinear_effect(p))
+
+
+def step_table(p: Parameters, h: float, nonlinear: bool) -> Table:
+    """Return :func:`prepare` where it is known whether an effect is on that the linear solution cannot carry."""
     kappa = relaxation_rate(p)
-    nonlinear = has_nonlinear_effect(p)
     if nonlinear or is_rigid(p):
         row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         none = (row, row, row, row, row)
@@ -65,27 +69,29 @@ def reported_contact(x: State, mode: Mode, p: Parameters) -> int:
 def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, table: Table) -> tuple[State, Mode]:
     """Return state and mode after ``h`` [s], positive, with the inputs held."""
     if table[4]:
-        if x[11] == UNASKED and (p[P_FILTER] > 0.0 or p[P_RATE] < BIG):
+        if x[11] == UNASKED and (p.drive_filter_time_constant > 0.0 or p.rate_limit_rate < BIG):
             x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
-        if p[P_RATE] < BIG:
+        if p.rate_limit_rate < BIG:
             return advance_ramp(x, mode, p, u, T_l, h)
         return advance_smooth(x, mode, p, u, T_l, h)
     if not is_rigid(p):
-        moved, clear = leap(x, mode[0], p, u, T_l + p[P_LOAD_TORQUE], h, table)
+        moved, clear = leap(x, mode[0], p, u, T_l + p.load_torque_torque, h, table)
         if clear:
             return (moved, mode)
-    return advance_linear(x, mode, p, u, T_l + p[P_LOAD_TORQUE], h, table[2])
+    return advance_linear(x, mode, p, u, T_l + p.load_torque_torque, h, table[2])
 
 
 def advance_ramp(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, Mode]:
     """Return state and mode after ``h`` [s] of a drive limited in its rate; the end of a ramp is met exactly."""
     before = x[11]
-    ramp = min(h, ramp_time(before, u, p[P_FILTER], p[P_RATE]))
+    ramp = min(h, ramp_time(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
     if ramp > 0.0:
-        x, mode = advance_smooth(x, mode, p, ramp_target(before, u, p[P_FILTER], p[P_RATE], ramp), T_l, ramp)
+        x, mode = advance_smooth(
+            x, mode, p, ramp_target(before, u, p.drive_filter_time_constant, p.rate_limit_rate, ramp), T_l, ramp
+        )
     if ramp < h:
         if ramp > 0.0:
-            end = ramp_end(before, u, p[P_FILTER], p[P_RATE])
+            end = ramp_end(before, u, p.drive_filter_time_constant, p.rate_limit_rate)
             x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], end)
         x, mode = advance_smooth(x, mode, p, u, T_l, h - ramp)
     return (x, mode)
@@ -103,16 +109,16 @@ def advance_to_event(
         State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
     """
     if table[4]:
-        if x[11] == UNASKED and (p[P_FILTER] > 0.0 or p[P_RATE] < BIG):
+        if x[11] == UNASKED and (p.drive_filter_time_constant > 0.0 or p.rate_limit_rate < BIG):
             x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
-        if p[P_RATE] < BIG:
+        if p.rate_limit_rate < BIG:
             return ramp_to_event(x, mode, p, u, T_l, h)
         return advance_smooth_to_event(x, mode, p, u, T_l, h)
     if not is_rigid(p):
-        moved, clear = leap(x, mode[0], p, u, T_l + p[P_LOAD_TORQUE], h, table)
+        moved, clear = leap(x, mode[0], p, u, T_l + p.load_torque_torque, h, table)
         if clear:
             return (moved, mode, h, NO_EVENT)
-    x, elapsed, _, which = linear_to_event(x, mode[0], p, u, T_l + p[P_LOAD_TORQUE], h, table[2], 0.0, 0)
+    x, elapsed, _, which = linear_to_event(x, mode[0], p, u, T_l + p.load_torque_torque, h, table[2], 0.0, 0)
     return (refused(x) if which == TOO_MUCH else x, mode, elapsed, which)
 
 
@@ -125,13 +131,13 @@ def ramp_to_event(
         State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
     """
     before = x[11]
-    ramp = min(h, ramp_time(before, u, p[P_FILTER], p[P_RATE]))
+    ramp = min(h, ramp_time(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
     if ramp > 0.0:
-        target = ramp_target(before, u, p[P_FILTER], p[P_RATE], ramp)
+        target = ramp_target(before, u, p.drive_filter_time_constant, p.rate_limit_rate, ramp)
         x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, target, T_l, ramp)
         if which != NO_EVENT or ramp >= h:
             return (x, mode, elapsed, which)
-        end = ramp_end(before, u, p[P_FILTER], p[P_RATE])
+        end = ramp_end(before, u, p.drive_filter_time_constant, p.rate_limit_rate)
         x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], end)
     x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, u, T_l, h - ramp)
     return (x, mode, ramp + elapsed, which)

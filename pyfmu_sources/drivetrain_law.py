@@ -8,8 +8,8 @@ from typing import ClassVar
 from . import drivetrain
 from .drive_request import UNASKED
 from .drivetrain import Mode, State
-from .drivetrain_parameters import P_COULOMB_L, P_COULOMB_M, P_I, P_J_L, P_J_M, PARAMETERS, Parameter
-from .drivetrain_slave import T_L, T_SHAFT, Drivetrain, Values
+from .drivetrain_parameters import PARAMETERS, Parameter
+from .drivetrain_slave import T_L, T_SHAFT, Drivetrain, Parameters
 from .learned_law import L_DRY, LOAD_SPEED, TWIST, Motion, kind_of
 from .learned_plant import LawValues, Pushes, WithLaw
 
@@ -22,37 +22,41 @@ class DrivetrainWithLaw(WithLaw, Drivetrain):
 
     plant_parameters: ClassVar[tuple[Parameter, ...]] = PARAMETERS
 
-    _rubbing: Values
+    _rubbing: Parameters
     _law: LawValues
     _now: float
     _piece: float
 
-    def _begin_with(self, p: Values) -> None:
+    def _begin_with(self, p: Parameters) -> None:
         """Start at the initial state with other parameters."""
         x = self._x
         self._p = p
         self._x = drivetrain.consistent_start((x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7]), p)
         self._mode = drivetrain.initial_mode(self._x, p)
 
-    def _rubbed(self, p: Values) -> Values:
+    def _rubbed(self, p: Parameters) -> Parameters:
         """Return parameters with the law's dry friction added to the body's own."""
-        place = P_COULOMB_L if kind_of(self._law) == LOAD_SPEED else P_COULOMB_M
-        return (*p[:place], p[place] + self._law[L_DRY], *p[place + 1 :])
+        dry = self._law[L_DRY]
+        if kind_of(self._law) == LOAD_SPEED:
+            return p._replace(coulomb_friction_load_torque=p.coulomb_friction_load_torque + dry)
+        return p._replace(coulomb_friction_motor_torque=p.coulomb_friction_motor_torque + dry)
 
     def _inertias(self) -> tuple[float, float, float]:
         """Return the inertias of motor and load [kg.m2] and the ratio of the gear."""
-        return (self._p[P_J_M], self._p[P_J_L], self._p[P_I])
+        return (self._p.J_m, self._p.J_l, self._p.i)
 
     def _motion(self, x: State, u: float) -> Motion:
         """Return what a law is a function of."""
-        return (x[1], x[3], x[2], x[0] / self._p[P_I] - x[2], x[4])
+        return (x[1], x[3], x[2], x[0] / self._p.i - x[2], x[4])
 
-    def _mode_of(self, x: State, mode: Mode, p: Values, u: float) -> Mode:
+    def _mode_of(self, x: State, mode: Mode, p: Parameters, u: float) -> Mode:
         """Return the mode in which friction that sets in finds the plant."""
         _, slip_m, slip_l = drivetrain.initial_mode(x, p)
         return (mode[0], slip_m, slip_l)
 
-    def _pushed(self, x: State, mode: Mode, p: Values, u: float, against: Pushes, step: float) -> tuple[State, Mode]:
+    def _pushed(
+        self, x: State, mode: Mode, p: Parameters, u: float, against: Pushes, step: float
+    ) -> tuple[State, Mode]:
         """Return state and mode after a piece of a step with torques held against motor and load.
 
         A torque against the motor is a drive that gives so much less: its lag and its filter are linear.

@@ -7,7 +7,6 @@ In all functions: ``u``: requested torque [N.m], delayed and saturated already; 
 
 from .dormand_prince import mode_rates
 from .drive_request import saturated
-from .drivetrain_parameters import P_LIMIT, P_OFFSET_L, P_OFFSET_M, P_RES_J
 from .dry_friction import NEVER, shaft_torque
 from .equations import Mode, Parameters, State
 from .event_numbers import NO_EVENT
@@ -28,7 +27,7 @@ LITTLE = 1e-6
 def state_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
     """Return the time derivative of ``x`` in ``mode``; the states of an extra inertia that is not there stand still."""
     r = mode_rates(x, mode, p, u, T_l)
-    if p[P_RES_J] > 0.0:
+    if p.extra_resonance_inertia > 0.0:
         return r
     return (r[0], r[1], r[2], r[3], r[4], 0.0, 0.0, r[7], r[8], r[9], r[10], r[11])
 
@@ -36,8 +35,8 @@ def state_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> St
 def rates_and_outputs(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> tuple[State, Outputs]:
     """Return the derivatives, and the outputs theta_m, theta_l, omega_m, omega_l, T_m and T_shaft; limits ``u``."""
     shaft = shaft_torque(x, mode, p, T_l)
-    outputs = (x[0] + p[P_OFFSET_M], x[2] + p[P_OFFSET_L], x[1], x[3], x[4], shaft)
-    return (state_rates(x, mode, p, saturated(u, p[P_LIMIT]), T_l), outputs)
+    outputs = (x[0] + p.sensor_offset_motor_offset, x[2] + p.sensor_offset_load_offset, x[1], x[3], x[4], shaft)
+    return (state_rates(x, mode, p, saturated(u, p.torque_saturation_limit), T_l), outputs)
 
 
 def indicator(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: float) -> float:

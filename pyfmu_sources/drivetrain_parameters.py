@@ -1,9 +1,6 @@
-"""The drivetrain's parameters, in the one order in which every function takes them as a flat tuple ``p``.
+"""The drivetrain's parameters: the rows that describe them, and the named tuple ``p`` in which functions take them."""
 
-The index constants ``P_*`` are plain module integers, so that numba compiles ``p[P_K]`` to a constant offset.
-"""
-
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .backlash_models import MODELS
 
@@ -24,6 +21,11 @@ class Parameter(NamedTuple):
     maximum: float
     description: str
     linear: bool = False
+
+
+def field_name(name: str) -> str:
+    """Return what the equations call a parameter: ``effects.load_torque.torque`` is ``p.load_torque_torque``."""
+    return name.removeprefix("effects.").replace(".", "_")
 
 
 def mark_linear(*rows: Parameter) -> tuple[Parameter, ...]:
@@ -176,33 +178,25 @@ SHAFT = (
 PARAMETERS = (*_FIRST, *friction_details("motor"), *friction_details("load"), *DRIVE, *BODY, *SHAFT)
 
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
-DEFAULTS = tuple(parameter.default for parameter in PARAMETERS)
 COUNT = len(PARAMETERS)
 NONLINEAR = tuple(n for n, parameter in enumerate(PARAMETERS) if not parameter.linear)
 
-(
-    P_J_M, P_J_L, P_K, P_C, P_B_M, P_B_L, P_I, P_TAU, P_ALPHA, P_MODEL, P_RESTITUTION, P_CONTACT_K, P_CONTACT_C,
-    P_DELAY, P_LIMIT, P_RIPPLE, P_RIPPLE_N, P_RIPPLE_PHASE, P_COULOMB_M, P_COULOMB_L, P_STRIBECK_M, P_BREAKAWAY_M,
-    P_STRIBECK_SPEED_M, P_STRIBECK_L, P_BREAKAWAY_L, P_STRIBECK_SPEED_L, P_CUBIC, P_ECC, P_ECC_N, P_ECC_PHASE,
-    P_LOAD_TORQUE, P_GRAVITY, P_GRAVITY_PHASE, P_RES_J, P_RES_W, P_RES_ZETA, P_DRAG, P_OFFSET_M, P_OFFSET_L,
-    P_PRESLIDING_M, P_BRISTLE_C_M, P_DIRECTION_M, P_LOADED_M, P_WAVY_M, P_WAVY_N_M, P_WAVY_PHASE_M, P_PRESLIDING_L,
-    P_BRISTLE_C_L, P_DIRECTION_L, P_LOADED_L, P_WAVY_L, P_WAVY_N_L, P_WAVY_PHASE_L, P_FILTER, P_RATE, P_RIPPLE_2,
-    P_RIPPLE_2_PHASE, P_RIPPLE_3, P_RIPPLE_3_PHASE, P_SPRING, P_SPRING_CUBIC, P_SPRING_ANGLE, P_STOP_LOWER,
-    P_STOP_UPPER, P_STOP_K, P_STOP_D, P_J_WAVE, P_J_WAVE_N, P_J_WAVE_PHASE, P_K_WAVE, P_K_WAVE_N, P_K_WAVE_PHASE,
-    P_HYSTERESIS, P_HYSTERESIS_TWIST, P_ONSET, P_ECC_LEVER, P_SHARPNESS,
-) = range(COUNT)  # fmt: skip
+if TYPE_CHECKING:
+    DrivetrainParameters = Any
+else:
+    DrivetrainParameters = NamedTuple("DrivetrainParameters", [(field_name(name), float) for name in NAMES])
+
+DEFAULTS = DrivetrainParameters(*(parameter.default for parameter in PARAMETERS))
 
 
-def parameters(**values: float) -> tuple[float, ...]:
-    """Return ``p`` with the defaults replaced by ``values``; dots in names are written as two underscores."""
+def parameters(**values: float) -> DrivetrainParameters:
+    """Return the defaults with ``values`` in their places; dots in names are written as two underscores."""
     return with_values(DEFAULTS, {name.replace("__", "."): value for name, value in values.items()})
 
 
-def with_values(p: tuple[float, ...], values: dict[str, float]) -> tuple[float, ...]:
-    """Return ``p`` with the parameters named in ``values`` (names as in the FMU) replaced."""
-    changed = list(p)
-    for name, value in values.items():
-        if name not in NAMES:
+def with_values(p: Any, values: dict[str, float]) -> Any:
+    """Return parameters, of any plant, with those named in ``values`` (names as in the FMU) replaced."""
+    for name in values:
+        if field_name(name) not in p._fields:
             raise KeyError(name)
-        changed[NAMES.index(name)] = float(value)
-    return tuple(changed)
+    return p._replace(**{field_name(name): float(value) for name, value in values.items()})

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 from . import drivetrain
 from .drive_request import saturated
-from .drivetrain import Mode, State, Table
+from .drivetrain import Mode, Parameters, State, Table
 from .drivetrain_modes import (
     QUIET,
     Indicators,
@@ -20,18 +20,7 @@ from .drivetrain_modes import (
     rates_and_outputs,
     state_rates,
 )
-from .drivetrain_parameters import (
-    BIG,
-    COUNT,
-    P_DELAY,
-    P_LIMIT,
-    P_MODEL,
-    P_OFFSET_L,
-    P_OFFSET_M,
-    P_RATE,
-    PARAMETERS,
-    Parameter,
-)
+from .drivetrain_parameters import BIG, NAMES, PARAMETERS, Parameter
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .plant_slave import PlantSlave
@@ -40,7 +29,7 @@ from .slave_base import TOO_STIFF, StepRefusedError
 U, T_L, THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(9)
 FIRST_PARAMETER = CONTACT + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
-MODEL = FIRST_PARAMETER + P_MODEL
+MODEL = FIRST_PARAMETER + NAMES.index("backlash_model")
 KNOWN_STEPS = 16
 # The work of a step grows with its length; a host that asks for more than this has mistaken the unit.
 LONGEST_STEP = 100.0
@@ -51,11 +40,9 @@ TOO_FAR = (
     "or the initial speed smaller, the inertias larger or the run shorter"
 )
 
-Values = Annotated[tuple[float, ...], COUNT]
 KnownStep = tuple[float, Table]
 KnownSteps = Annotated[list[KnownStep], KNOWN_STEPS]
 
-_NAMES = tuple(parameter.name for parameter in PARAMETERS)
 _STARTS = (
     ("theta_m_start", "rad", "Initial motor angle"),
     ("omega_m_start", "rad/s", "Initial motor speed"),
@@ -64,7 +51,7 @@ _STARTS = (
     ("T_m_start", "N.m", "Initial motor torque"),
 )
 _START_NAMES = tuple(name for name, _, _ in _STARTS)
-_SHAFT = (*(name for name in _NAMES if not name.startswith(("effects.input", "effects.sensor"))), *_START_NAMES)
+_SHAFT = (*(name for name in NAMES if not name.startswith(("effects.input", "effects.sensor"))), *_START_NAMES)
 # Rigid models move a load that would be wound beyond its gap to the flank, so its angle depends on these as well.
 _LOAD = ("alpha", "i", "backlash_model", "theta_m_start", "theta_l_start", "effects.sensor_offset.load.offset")
 _GEAR = ("J_m", "J_l", "i", "alpha", "backlash_model", "theta_m_start", "theta_l_start", "omega_m_start")
@@ -133,7 +120,7 @@ class Drivetrain(PlantSlave):
 
     _x: State
     _mode: Mode
-    _p: Values
+    _p: Parameters
     _events: int
     _event_time: float
     _known: KnownSteps
@@ -163,8 +150,8 @@ class Drivetrain(PlantSlave):
     def initialise(self) -> None:
         """Read the parameters and start at the initial state."""
         real = self.real
-        self._p = tuple(
-            float(self.integer[MODEL] - 1) if n == P_MODEL else real[FIRST_PARAMETER + n] for n in range(COUNT)
+        self._p = Parameters._make(
+            float(self.integer[n] - 1) if n == MODEL else real[n] for n in range(FIRST_PARAMETER, FIRST_START)
         )
         theta_l, omega_l = real[FIRST_START + 2], real[FIRST_START + 3]
         x = (real[FIRST_START], real[FIRST_START + 1], theta_l, omega_l, real[FIRST_START + 4], theta_l, omega_l, 0.0)
@@ -178,11 +165,11 @@ class Drivetrain(PlantSlave):
 
     def _request(self) -> float:
         """Return the requested torque within its limit [N.m]."""
-        return saturated(self.real[U], self._p[P_LIMIT])
+        return saturated(self.real[U], self._p.torque_saturation_limit)
 
     def _dead_time(self) -> float:
         """Return how late a request acts [s]."""
-        return self._p[P_DELAY]
+        return self._p.input_delay_delay
 
     def _moved(self, x: State, mode: Mode, u: float, time: float, step: float) -> tuple[State, Mode]:
         """Return state and mode after a piece of a step."""
@@ -265,9 +252,9 @@ class Drivetrain(PlantSlave):
 
     def begin_exchange(self) -> None:
         """Settle the drive at what is asked first; effects that need time events are refused in model exchange."""
-        if self._p[P_DELAY] > 0.0:
+        if self._p.input_delay_delay > 0.0:
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
-        if self._p[P_RATE] < BIG:
+        if self._p.rate_limit_rate < BIG:
             raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
         self._x = asked_first(self._x, self._request())
 
@@ -278,8 +265,8 @@ class Drivetrain(PlantSlave):
     def _write(self) -> None:
         real = self.real
         x = self._x
-        real[THETA_M] = x[0] + self._p[P_OFFSET_M]
-        real[THETA_L] = x[2] + self._p[P_OFFSET_L]
+        real[THETA_M] = x[0] + self._p.sensor_offset_motor_offset
+        real[THETA_L] = x[2] + self._p.sensor_offset_load_offset
         real[OMEGA_M] = x[1]
         real[OMEGA_L] = x[3]
         real[T_M] = x[4]

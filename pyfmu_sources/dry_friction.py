@@ -19,7 +19,6 @@ from .bristles import (
     leaving_speed_l,
     leaving_speed_m,
 )
-from .drivetrain_parameters import P_ALPHA, P_MODEL
 from .equations import (
     Mode,
     Parameters,
@@ -97,9 +96,9 @@ def slips(x: State, contact: int, p: Parameters, T_l: float) -> tuple[int, int]:
 def friction_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> float:
     """Return the guard of the dry friction of motor (2) or load (3); negative ends the mode."""
     contact = mode[0]
-    play = int(p[P_MODEL]) in HELD
+    play = int(p.backlash_model) in HELD
     if is_rigid(p) and contact != 0:
-        if which == LOAD or (play and p[P_ALPHA] > 0.0) or contact in (-2, 2):
+        if which == LOAD or (play and p.alpha > 0.0) or contact in (-2, 2):
             return NEVER
         if not (has_friction_m(p) or has_friction_l(p)):
             return NEVER

@@ -34,6 +34,8 @@ def shaped(value: Any, kind: Any) -> Any:
     base = getattr(kind, "__origin__", kind)  # Annotated[list[T], N] leads to list[T], that to list
     if hasattr(kind, "__metadata__"):
         return shaped(value, base)
+    if hasattr(kind, "_fields"):  # a NamedTuple of numbers
+        return kind._make(value)
     kinds: tuple[Any, ...] = getattr(kind, "__args__", ())
     if base is list:
         return [shaped(item, kinds[0]) for item in value]

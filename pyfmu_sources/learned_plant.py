@@ -148,7 +148,7 @@ class WithLaw(_Base):
         for n, place in self._changed:
             entry = self.plant_parameters[n]
             p[n] = min(max(p[n] + self.real[place], entry.minimum), entry.maximum)
-        self._begin_with(tuple(p))
+        self._begin_with(self._p._make(p))
         self._rubbing = self._rubbed(self._p) if self._law[L_DRY] > 0.0 else self._p
         if not begins_late(self._law):
             self._begin_with(self._rubbing)

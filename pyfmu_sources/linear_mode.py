@@ -16,7 +16,7 @@ from math import sqrt
 from typing import Annotated
 
 from .backlash_models import BOUNCING, HELD
-from .drivetrain_parameters import NONE, P_ALPHA, P_B_L, P_B_M, P_I, P_J_L, P_J_M, P_MODEL, P_TAU
+from .drivetrain_parameters import NONE
 from .equations import Parameters, backlash_model, is_rigid, shaft_damping, shaft_stiffness, teeth_never_pull
 
 State6 = tuple[float, float, float, float, float, float]
@@ -43,30 +43,30 @@ def law_of(contact: int, p: Parameters) -> Law:
         if contact in (-2, 2):
             return (AT_REST, 0.0, 0.0, 0.0)
         if contact != 0:
-            return (COUPLED, 0.0, 0.0, contact * p[P_ALPHA])
-        kind = LOAD_HELD if int(p[P_MODEL]) in HELD else ELASTIC
+            return (COUPLED, 0.0, 0.0, contact * p.alpha)
+        kind = LOAD_HELD if int(p.backlash_model) in HELD else ELASTIC
         return (kind, 0.0, 0.0, 0.0)
     if contact == 0:
         return (ELASTIC, 0.0, 0.0, 0.0)
-    offset = 0.0 if backlash_model(p) == NONE else contact * p[P_ALPHA]
+    offset = 0.0 if backlash_model(p) == NONE else contact * p.alpha
     return (ELASTIC, shaft_stiffness(p), shaft_damping(p), offset)
 
 
 def linear_rates(x: State6, constant: float, law: Law, p: Parameters, u: float, T_l: float) -> State6:
     """Return ``x'`` for ``constant`` = 1 and its linear part for ``constant`` = 0 (``s`` left to its decay)."""
     kind, stiffness, damping, offset = law
-    i = p[P_I]
-    lag = (constant * u - x[4]) / p[P_TAU]
-    motor = x[4] - p[P_B_M] * x[1]
-    load = -constant * T_l - p[P_B_L] * x[3]
+    i = p.i
+    lag = (constant * u - x[4]) / p.tau
+    motor = x[4] - p.b_m * x[1]
+    load = -constant * T_l - p.b_l * x[3]
     if kind == ELASTIC:
         shaft = stiffness * (x[0] / i - x[2] - constant * offset) + damping * (x[1] / i - x[3])
-        return (x[1], (motor - shaft / i) / p[P_J_M], x[3], (load + shaft) / p[P_J_L], lag, 0.0)
+        return (x[1], (motor - shaft / i) / p.J_m, x[3], (load + shaft) / p.J_l, lag, 0.0)
     if kind == COUPLED:
-        together = (i * motor + load) / (p[P_J_M] * i * i + p[P_J_L])
+        together = (i * motor + load) / (p.J_m * i * i + p.J_l)
         return (x[1], i * together, x[3], together, lag, 0.0)
     if kind == LOAD_HELD:
-        return (x[1], motor / p[P_J_M], x[3], 0.0, lag, 0.0)
+        return (x[1], motor / p.J_m, x[3], 0.0, lag, 0.0)
     return (x[1], 0.0, x[3], 0.0, lag, 0.0)
 
 
@@ -103,7 +103,7 @@ def evaluate(coefficients: Coefficients, time: float) -> State6:
 
 def guard_count(contact: int, p: Parameters) -> int:
     """Return how many ways (0, 1 or 2) the mode ``contact`` can end."""
-    if backlash_model(p) == NONE or (is_rigid(p) and p[P_ALPHA] == 0.0):
+    if backlash_model(p) == NONE or (is_rigid(p) and p.alpha == 0.0):
         return 0
     return 2 if contact in (0, -2, 2) else 1
 
@@ -113,12 +113,12 @@ def guard(x: State6, constant: float, contact: int, which: int, p: Parameters, u
 
     Guards are affine in the state; ``constant`` = 0 asks for their linear part.
     """
-    model = int(p[P_MODEL])
-    i = p[P_I]
+    model = int(p.backlash_model)
+    i = p.i
     wound = x[0] / i - x[2]
     if contact == 0:
         side = 1.0 if which == 0 else -1.0
-        return constant * p[P_ALPHA] - side * (wound - x[5])
+        return constant * p.alpha - side * (wound - x[5])
     side = 1.0 if contact > 0 else -1.0
     if contact in (-2, 2):
         if which == 0:
@@ -128,20 +128,20 @@ def guard(x: State6, constant: float, contact: int, which: int, p: Parameters, u
         return side * x[1]
     if model in BOUNCING:
         rate = linear_rates(x, constant, (COUPLED, 0.0, 0.0, 0.0), p, u, T_l)
-        return side * (p[P_J_L] * rate[3] + p[P_B_L] * x[3] + constant * T_l)
+        return side * (p.J_l * rate[3] + p.b_l * x[3] + constant * T_l)
     if teeth_never_pull(p):
         law = law_of(contact, p)
         return side * (law[1] * (wound - constant * law[3]) + law[2] * (x[1] / i - x[3]))
-    return side * wound - constant * p[P_ALPHA]
+    return side * wound - constant * p.alpha
 
 
 def guard_tolerance(x: State6, contact: int, p: Parameters) -> float:
     """Return how far below zero rounding alone can take a guard."""
-    angles = GUARD_ROUNDINGS * EPSILON * (1.0 + abs(x[0] / p[P_I]) + abs(x[2]) + p[P_ALPHA])
+    angles = GUARD_ROUNDINGS * EPSILON * (1.0 + abs(x[0] / p.i) + abs(x[2]) + p.alpha)
     if contact != 0 and teeth_never_pull(p):
         return angles * max(1.0, shaft_stiffness(p))
     if contact != 0 and is_rigid(p):
-        return GUARD_ROUNDINGS * EPSILON * (1.0 + abs(x[1]) + abs(x[4]) * (1.0 + p[P_I]))
+        return GUARD_ROUNDINGS * EPSILON * (1.0 + abs(x[1]) + abs(x[4]) * (1.0 + p.i))
     return angles
 
 

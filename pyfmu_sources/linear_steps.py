@@ -7,7 +7,7 @@ In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where bot
 
 from .backlash_models import NEVER_PULLING
 from .contact import after_event
-from .drivetrain_parameters import NONE, P_ALPHA, P_B_L, P_B_M, P_I
+from .drivetrain_parameters import NONE
 from .equations import Mode, Parameters, State, backlash_model, shaft_damping, shaft_stiffness
 from .event_numbers import NO_EVENT, TOO_MUCH
 from .linear_mode import Transition, evaluate, first_event, law_of, taylor
@@ -32,9 +32,9 @@ def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, 
     Args:
         table: ``prepare(p, h)`` of the same ``p`` and ``h``.
     """
-    i = p[P_I]
+    i = p.i
     model = backlash_model(p)
-    offset = 0.0 if model == NONE else contact * p[P_ALPHA]
+    offset = 0.0 if model == NONE else contact * p.alpha
     rows = table[1] if contact == 0 else table[0]
     theta_m, omega_m, theta_l, omega_l, T_m = x[0], x[1], x[2], x[3], x[4]
     wound = theta_m / i - theta_l - offset
@@ -71,7 +71,7 @@ def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, 
     speed_next = next_m / i - next_l
     reach = h * (abs(speed) + abs(speed_next))
     if contact == 0:
-        room = p[P_ALPHA] - max(abs(wound), abs(wound_next))
+        room = p.alpha - max(abs(wound), abs(wound_next))
         return (moved, room > reach + 2.0 * abs(x[7]))
     if model not in NEVER_PULLING:
         return (moved, min(contact * wound, contact * wound_next) > reach)
@@ -95,8 +95,8 @@ def advance_linear(
         x, elapsed, pieces, which = linear_to_event(x, contact, p, u, T_l, h, kappa, elapsed, pieces)
         if which < 0:
             return (refused(x) if which == TOO_MUCH else x, (contact, mode[1], mode[2]))
-        push_m = x[4] - p[P_B_M] * x[1]
-        push = p[P_I] * push_m - p[P_B_L] * x[3] - T_l
+        push_m = x[4] - p.b_m * x[1]
+        push = p.i * push_m - p.b_l * x[3] - T_l
         x, contact = after_event(x, contact, which, events, push_m, push, p, 0.0, 0.0)
         events += 1
         if events >= MAX_EVENTS and elapsed < h:

@@ -6,23 +6,35 @@
 The motor's motion over a step is a polynomial, so that the solution within one contact is a power series, and the next
 contact event a root of a power series, found as in :mod:`linear_mode`.
 
-In all functions: ``p``: inertia, stiffness, damping, friction, gear ratio and half-gap; ``theta_m``: motor angle
+In all functions: ``theta_m``: motor angle
 [rad]; ``contact``: flank that touches: -1, 0 or 1; ``omega_m``: motor speed [rad/s]; ``T_l``: load torque [N.m];
 ``begin``: in the motion's time [s]; ``end``: in the motion's time [s].
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 from .event_numbers import NO_EVENT
 from .linear_mode import EPSILON, GUARD_ROUNDINGS, TERMS, Series, first_root
 
-Parameters = tuple[float, float, float, float, float, float]
+
+class LoadParameters(NamedTuple):
+    """Inertia [kg.m2], stiffness [N.m/rad], damping, friction [N.m.s/rad], gear ratio and half-gap [rad]."""
+
+    J_l: float
+    k: float
+    c: float
+    b_l: float
+    i: float
+    alpha: float
+
+
+Parameters = LoadParameters
 State = tuple[float, float]
 Outputs = tuple[float, float, float]
 # Coefficients by powers of time: angle (four) and speed (three) of the motor.
 Motion = tuple[float, float, float, float, float, float, float]
 
-P_J, P_K, P_C, P_B, P_I, P_ALPHA = range(6)
 MOST_EVENTS = 5000
 LOOSE = 1e-9  # of the half-gap and 1 rad
 
@@ -66,21 +78,21 @@ def settled(x: State, contact: int, p: Parameters, theta_m: float, speed: float)
     Returns:
         -1, 0 or 1.
     """
-    if p[P_ALPHA] == 0.0:
+    if p.alpha == 0.0:
         return 1
-    d = theta_m / p[P_I] - x[0]
+    d = theta_m / p.i - x[0]
     side = contact if contact != 0 else 1 if d > 0.0 else -1
-    beyond = side * d - p[P_ALPHA]
+    beyond = side * d - p.alpha
     inwards = side * speed
     if contact != 0:
         beyond = -beyond
         inwards = -inwards
     room = rounding(x, p, theta_m)
-    if beyond <= room or (beyond <= LOOSE * (1.0 + p[P_ALPHA]) and inwards <= 0.0):
+    if beyond <= room or (beyond <= LOOSE * (1.0 + p.alpha) and inwards <= 0.0):
         return contact
     if contact == 0:
         return side
-    return -contact if -contact * d > p[P_ALPHA] else 0
+    return -contact if -contact * d > p.alpha else 0
 
 
 def change(contact: int, follows: int) -> int:
@@ -92,15 +104,15 @@ def change(contact: int, follows: int) -> int:
 
 def rounding(x: State, p: Parameters, theta_m: float) -> float:
     """Return how far off a twist may be by rounding [rad]."""
-    return GUARD_ROUNDINGS * EPSILON * (1.0 + abs(theta_m / p[P_I]) + abs(x[0]) + p[P_ALPHA])
+    return GUARD_ROUNDINGS * EPSILON * (1.0 + abs(theta_m / p.i) + abs(x[0]) + p.alpha)
 
 
 def shaft_torque(x: State, contact: int, p: Parameters, theta_m: float, omega_m: float) -> float:
     """Return the torque of the shaft on the load [N.m]."""
     if contact == 0:
         return 0.0
-    wound = theta_m / p[P_I] - x[0] - contact * p[P_ALPHA]
-    return p[P_K] * wound + p[P_C] * (omega_m / p[P_I] - x[1])
+    wound = theta_m / p.i - x[0] - contact * p.alpha
+    return p.k * wound + p.c * (omega_m / p.i - x[1])
 
 
 def rates_and_outputs(
@@ -108,17 +120,17 @@ def rates_and_outputs(
 ) -> tuple[State, Outputs]:
     """Return the derivatives, and the outputs theta_l, omega_l and T_shaft."""
     torque = shaft_torque(x, contact, p, theta_m, omega_m)
-    return ((x[1], (torque - T_l - p[P_B] * x[1]) / p[P_J]), (x[0], x[1], torque))
+    return ((x[1], (torque - T_l - p.b_l * x[1]) / p.J_l), (x[0], x[1], torque))
 
 
 def guards(x: State, contact: int, p: Parameters, theta_m: float) -> tuple[float, float]:
     """Return how far the contact is from its end at either flank [rad]; 1 for a guard that is not in use."""
-    if p[P_ALPHA] == 0.0:
+    if p.alpha == 0.0:
         return (1.0, 1.0)
-    d = theta_m / p[P_I] - x[0]
+    d = theta_m / p.i - x[0]
     if contact == 0:
-        return (p[P_ALPHA] - d, p[P_ALPHA] + d)
-    return (contact * d - p[P_ALPHA], 1.0)
+        return (p.alpha - d, p.alpha + d)
+    return (contact * d - p.alpha, 1.0)
 
 
 def after(contact: int, which: int) -> int:
@@ -133,7 +145,7 @@ def solution(
 ) -> tuple[State, float, int]:
     """Return the state at the first event within a short ``step`` [s], at what share of it, and the guard."""
     touches = 1.0 if contact != 0 else 0.0
-    k, c, i = touches * p[P_K], touches * p[P_C], p[P_I]
+    k, c, i = touches * p.k, touches * p.c, p.i
     theta: Series = [x[0]]
     omega: Series = [x[1]]
     driver: Series = [motion[0] / i]
@@ -143,20 +155,20 @@ def solution(
         speed = motion[4 + n] if n < 3 else 0.0
         push = scale * (k * angle + c * speed) / i
         if n == 0:
-            push -= T_l + k * contact * p[P_ALPHA]
+            push -= T_l + k * contact * p.alpha
         f = step / (n + 1)
         a, b = theta[n], omega[n]
         theta.append(f * b)
-        omega.append(f * (push - k * a - (c + p[P_B]) * b) / p[P_J])
+        omega.append(f * (push - k * a - (c + p.b_l) * b) / p.J_l)
         scale *= step
         driver.append(scale * motion[n + 1] / i if n < 3 else 0.0)
     share = 1.0
     which = NO_EVENT
-    if p[P_ALPHA] > 0.0:
+    if p.alpha > 0.0:
         tolerance = rounding(x, p, motion[0])
         for candidate in range(1 if contact != 0 else 2):
             side = 1.0 if contact > 0 or (contact == 0 and candidate == 1) else -1.0
-            offset = -p[P_ALPHA] if contact != 0 else p[P_ALPHA]
+            offset = -p.alpha if contact != 0 else p.alpha
             room: Series = [offset + tolerance + side * (driver[0] - theta[0])]
             for n in range(1, TERMS + 1):
                 room.append(side * (driver[n] - theta[n]))
@@ -177,7 +189,7 @@ def value(series: Series, time: float) -> float:
 
 def fastest(p: Parameters) -> float:
     """Return a rate [1/s] that none of the motion exceeds."""
-    return sqrt(p[P_K] / p[P_J]) + (p[P_C] + p[P_B]) / p[P_J]
+    return sqrt(p.k / p.J_l) + (p.c + p.b_l) / p.J_l
 
 
 def advance_to_event(
@@ -187,7 +199,7 @@ def advance_to_event(
     longest = 1.0 / fastest(p)
     time = begin
     there = moved(motion, begin)
-    which = change(contact, settled(x, contact, p, there[0], there[1] / p[P_I] - x[1]))
+    which = change(contact, settled(x, contact, p, there[0], there[1] / p.i - x[1]))
     if which != NO_EVENT:
         return (x, begin, which)
     while time < end:

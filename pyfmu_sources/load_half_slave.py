@@ -81,7 +81,7 @@ class LoadHalf(SlaveBase):
         """Read the parameters and start at the initial state."""
         real = self.real
         n = FIRST_PARAMETER
-        self._p = (real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5])
+        self._p = Parameters(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5])
         self._x = (real[FIRST_START], real[FIRST_START + 1])
         self._contact = self._settled(0)
         self._event = NO_EVENT
@@ -155,7 +155,7 @@ class LoadHalf(SlaveBase):
     def _settled(self, contact: int) -> int:
         """Return the flank that touches at the inputs of the moment."""
         theta_m, omega_m = self.real[THETA_M], self.real[OMEGA_M]
-        return load_half.settled(self._x, contact, self._p, theta_m, omega_m / self._p[4] - self._x[1])
+        return load_half.settled(self._x, contact, self._p, theta_m, omega_m / self._p.i - self._x[1])
 
     def _check(self, step: float) -> None:
         """Refuse a step that is far too long."""
@@ -185,7 +185,7 @@ class LoadHalf(SlaveBase):
         """
         r = self.derivatives()
         p = self._p
-        rate = p[1] * (self.real[OMEGA_M] / p[4] - self._x[1]) - p[2] * r[1] if self._contact != 0 else 0.0
+        rate = p.k * (self.real[OMEGA_M] / p.i - self._x[1]) - p.c * r[1] if self._contact != 0 else 0.0
         return (r[0], r[1], rate)
 
     def indicators(self) -> tuple[float, float]:

@@ -59,7 +59,7 @@ class MotorHalf(SlaveBase):
         """Read the parameters and start at the initial state."""
         real = self.real
         n = FIRST_PARAMETER
-        self._p = (real[n], real[n + 1], real[n + 2], real[n + 3])
+        self._p = Parameters(real[n], real[n + 1], real[n + 2], real[n + 3])
         self._x = (real[FIRST_START], real[FIRST_START + 1], real[FIRST_START + 2])
         self._event = NO_EVENT
         self._write()
@@ -67,7 +67,7 @@ class MotorHalf(SlaveBase):
     def advance(self, time: float, step: float) -> None:
         """Move on with the inputs held."""
         p = self._p
-        if step * (p[1] / p[0] + 1.0 / p[3]) > MOST_PIECES:
+        if step * (p.b_m / p.J_m + 1.0 / p.tau) > MOST_PIECES:
             raise StepRefusedError(f"a step must take at most {MOST_PIECES!r} pieces, but is {step!r} s long")
         x = motor_half.advance(self._x, p, self.real[U], self.real[T_SHAFT], step)
         if not -LARGEST <= x[0] + x[1] + x[2] <= LARGEST:

@@ -29,7 +29,6 @@ from .axis_equations import (
 from .axis_steps import breaking_time, held, longest_step, slowing_time, smooth_step, stop_time
 from .drive_request import UNASKED, ramp_end, ramp_target, ramp_time
 from .drivetrain_parameters import BIG
-from .servo_axis_parameters import P_FILTER, P_RATE, P_WAVY
 
 __all__ = [
     "State", "advance", "advance_to_event", "drive_torque", "friction", "inertia", "initial_mode", "mode_rates",
@@ -51,15 +50,17 @@ def advance(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) 
     """
     if x[4] == UNASKED and filtered(p):
         x = (x[0], x[1], x[2], x[3], u)
-    if p[P_RATE] >= BIG:
+    if p.rate_limit_rate >= BIG:
         return advance_request(x, mode, p, u, T_l, h)
     before = x[4]
-    ramp = min(h, ramp_time(before, u, p[P_FILTER], p[P_RATE]))
+    ramp = min(h, ramp_time(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
     if ramp > 0.0:
-        x, mode = advance_request(x, mode, p, ramp_target(before, u, p[P_FILTER], p[P_RATE], ramp), T_l, ramp)
+        x, mode = advance_request(
+            x, mode, p, ramp_target(before, u, p.drive_filter_time_constant, p.rate_limit_rate, ramp), T_l, ramp
+        )
     if ramp < h:
         if ramp > 0.0:
-            x = (x[0], x[1], x[2], x[3], ramp_end(before, u, p[P_FILTER], p[P_RATE]))
+            x = (x[0], x[1], x[2], x[3], ramp_end(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
         x, mode = advance_request(x, mode, p, u, T_l, h - ramp)
     return (x, mode)
 
@@ -88,15 +89,15 @@ def advance_to_event(
     if x[4] == UNASKED and filtered(p):
         x = (x[0], x[1], x[2], x[3], u)
     ramp = 0.0
-    if p[P_RATE] < BIG:
+    if p.rate_limit_rate < BIG:
         before = x[4]
-        ramp = min(h, ramp_time(before, u, p[P_FILTER], p[P_RATE]))
+        ramp = min(h, ramp_time(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
         if ramp > 0.0:
-            target = ramp_target(before, u, p[P_FILTER], p[P_RATE], ramp)
+            target = ramp_target(before, u, p.drive_filter_time_constant, p.rate_limit_rate, ramp)
             x, mode, elapsed, _, event = request_to_event(x, mode, p, target, T_l, ramp, 0.0, 0)
             if event or ramp >= h:
                 return (x, mode, elapsed, event)
-            x = (x[0], x[1], x[2], x[3], ramp_end(before, u, p[P_FILTER], p[P_RATE]))
+            x = (x[0], x[1], x[2], x[3], ramp_end(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
     x, mode, elapsed, _, event = request_to_event(x, mode, p, u, T_l, h - ramp, 0.0, 0)
     return (x, mode, ramp + elapsed, event)
 
@@ -113,7 +114,7 @@ def request_to_event(
         elapsed: time since the beginning of the step at which ``x`` is [s].
     """
     bends = builds_up(p)
-    dry = rest(p) + abs(p[P_WAVY]) > 0.0
+    dry = rest(p) + abs(p.periodic_friction_motor_amplitude) > 0.0
     least = leaves_sliding(p)
     if mode == 0 and not dry:
         mode = 1

@@ -10,8 +10,8 @@ from .learned_law import L_DRY, Motion
 from .learned_plant import LawValues, Pushes, WithLaw
 from .servo_axis import State
 from .servo_axis_modes import UNDECIDED
-from .servo_axis_parameters import P_COULOMB, P_J, PARAMETERS
-from .servo_axis_slave import FIRST_START, T_L, ServoAxis, Values
+from .servo_axis_parameters import PARAMETERS, AxisParameters
+from .servo_axis_slave import FIRST_START, T_L, ServoAxis
 
 
 class ServoAxisWithLaw(WithLaw, ServoAxis):
@@ -19,35 +19,37 @@ class ServoAxisWithLaw(WithLaw, ServoAxis):
 
     plant_parameters: ClassVar[tuple[Parameter, ...]] = PARAMETERS
 
-    _rubbing: Values
+    _rubbing: AxisParameters
     _law: LawValues
     _now: float
     _piece: float
 
-    def _begin_with(self, p: Values) -> None:
+    def _begin_with(self, p: AxisParameters) -> None:
         """Start at the initial state with other parameters."""
         real = self.real
         self._p = p
         self._x = servo_axis.start(real[FIRST_START], real[FIRST_START + 1], real[FIRST_START + 2], p)
         self._mode = UNDECIDED
 
-    def _rubbed(self, p: Values) -> Values:
+    def _rubbed(self, p: AxisParameters) -> AxisParameters:
         """Return parameters with the law's dry friction added to the body's own."""
-        return (*p[:P_COULOMB], p[P_COULOMB] + self._law[L_DRY], *p[P_COULOMB + 1 :])
+        return p._replace(coulomb_friction_motor_torque=p.coulomb_friction_motor_torque + self._law[L_DRY])
 
     def _inertias(self) -> tuple[float, float, float]:
         """Return the inertia [kg.m2], as that of motor and of load, and the ratio of no gear."""
-        return (self._p[P_J], self._p[P_J], 1.0)
+        return (self._p.J, self._p.J, 1.0)
 
     def _motion(self, x: State, u: float) -> Motion:
         """Return what a law is a function of."""
         return (x[1], x[1], x[0], 0.0, servo_axis.drive_torque(x, self._p, u))
 
-    def _mode_of(self, x: State, mode: int, p: Values, u: float) -> int:
+    def _mode_of(self, x: State, mode: int, p: AxisParameters, u: float) -> int:
         """Return the mode in which friction that sets in finds the axis."""
         return servo_axis.initial_mode(x, p, u)
 
-    def _pushed(self, x: State, mode: int, p: Values, u: float, against: Pushes, step: float) -> tuple[State, int]:
+    def _pushed(
+        self, x: State, mode: int, p: AxisParameters, u: float, against: Pushes, step: float
+    ) -> tuple[State, int]:
         """Return state and mode after a piece of a step with torques held against the one body."""
         T_l = self.real[T_L] + against[0] + against[1]
         if mode == UNDECIDED:

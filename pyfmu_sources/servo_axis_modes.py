@@ -24,7 +24,6 @@ from .axis_equations import (
 )
 from .drive_request import saturated
 from .drivetrain_parameters import BIG
-from .servo_axis_parameters import P_LIMIT, P_OFFSET, P_STOP_LOWER, P_STOP_UPPER, P_WAVY
 
 Indicators = tuple[float, float]
 Outputs = tuple[float, float, float]
@@ -45,13 +44,13 @@ def decided(x: State, mode: int, p: Parameters, u: float) -> int:
 
 def is_dry(p: Parameters) -> bool:
     """Tell whether the axis has dry friction."""
-    return rest(p) + abs(p[P_WAVY]) > 0.0
+    return rest(p) + abs(p.periodic_friction_motor_amplitude) > 0.0
 
 
 def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) -> tuple[State, Outputs]:
     """Return the derivatives, and the outputs theta_m, omega_m and T_m; limits ``u``."""
-    asked = saturated(u, p[P_LIMIT])
-    outputs = (x[0] + p[P_OFFSET], x[1], drive_torque(x, p, asked))
+    asked = saturated(u, p.torque_saturation_limit)
+    outputs = (x[0] + p.sensor_offset_motor_offset, x[1], drive_torque(x, p, asked))
     return (mode_rates(x, mode, p, asked, T_l), outputs)
 
 
@@ -80,13 +79,13 @@ def stop_room(x: State) -> float:
 
 def to_stop(x: State, stop: int, p: Parameters) -> float:
     """Return how far [rad] the axis is from an end stop or, with ``stop`` -1 or 1, from leaving that one."""
-    if p[P_STOP_UPPER] >= BIG and p[P_STOP_LOWER] <= -BIG:
+    if p.end_stop_upper >= BIG and p.end_stop_lower <= -BIG:
         return 1.0
     if stop == 1:
-        return x[0] - p[P_STOP_UPPER]
+        return x[0] - p.end_stop_upper
     if stop == -1:
-        return p[P_STOP_LOWER] - x[0]
-    return min(p[P_STOP_UPPER] - x[0], x[0] - p[P_STOP_LOWER])
+        return p.end_stop_lower - x[0]
+    return min(p.end_stop_upper - x[0], x[0] - p.end_stop_lower)
 
 
 def indicators(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: float) -> Indicators:

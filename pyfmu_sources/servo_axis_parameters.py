@@ -1,6 +1,8 @@
-"""The single axis's parameters, in the one order in which every function takes them as a flat tuple ``p``."""
+"""The single axis's parameters: the rows that describe them, and the named tuple ``p`` in which functions take them."""
 
-from .drivetrain_parameters import BIG, BODY, DRIVE, TINY, Parameter, mark_linear, wave
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .drivetrain_parameters import BIG, BODY, DRIVE, TINY, Parameter, field_name, mark_linear, wave
 
 PARAMETERS = (
     *mark_linear(
@@ -50,13 +52,11 @@ PARAMETERS = (
 )
 
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
-DEFAULTS = tuple(parameter.default for parameter in PARAMETERS)
 COUNT = len(PARAMETERS)
 
-(
-    P_J, P_B, P_TAU, P_DELAY, P_LIMIT, P_RIPPLE, P_RIPPLE_N, P_RIPPLE_PHASE, P_COULOMB, P_STRIBECK, P_BREAKAWAY,
-    P_STRIBECK_SPEED, P_LOAD_TORQUE, P_GRAVITY, P_GRAVITY_PHASE, P_DRAG, P_DIRECTION, P_OFFSET,
-    P_PRESLIDING, P_BRISTLE_C, P_WAVY, P_WAVY_N, P_WAVY_PHASE, P_FILTER, P_RATE, P_RIPPLE_2, P_RIPPLE_2_PHASE,
-    P_RIPPLE_3, P_RIPPLE_3_PHASE, P_SPRING, P_SPRING_CUBIC, P_SPRING_ANGLE, P_STOP_LOWER, P_STOP_UPPER, P_STOP_K,
-    P_STOP_D, P_J_WAVE, P_J_WAVE_N, P_J_WAVE_PHASE,
-) = range(COUNT)  # fmt: skip
+if TYPE_CHECKING:
+    AxisParameters = Any
+else:
+    AxisParameters = NamedTuple("AxisParameters", [(field_name(name), float) for name in NAMES])
+
+DEFAULTS = AxisParameters(*(parameter.default for parameter in PARAMETERS))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 from . import servo_axis
 from .drive_request import saturated
@@ -13,14 +13,12 @@ from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .plant_slave import PlantSlave
 from .servo_axis import State
 from .servo_axis_modes import UNDECIDED, Indicators, Outputs, after_events, decided, indicators, rates_and_outputs
-from .servo_axis_parameters import COUNT, P_DELAY, P_LIMIT, P_OFFSET, P_RATE, P_TAU, PARAMETERS
+from .servo_axis_parameters import PARAMETERS, AxisParameters
 from .slave_base import TOO_STIFF, StepRefusedError
 
 U, T_L, THETA_M, OMEGA_M, T_M = range(5)
 FIRST_PARAMETER = T_M + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
-
-Values = Annotated[tuple[float, ...], COUNT]
 
 _OFFSET = "effects.sensor_offset.motor.offset"
 
@@ -47,7 +45,7 @@ class ServoAxis(PlantSlave):
 
     _x: State
     _mode: int
-    _p: Values
+    _p: AxisParameters
     _end_stop: int
 
     # The hidden attribute that model exchange integrates, and its items: name, unit, nominal value, meaning.
@@ -69,7 +67,7 @@ class ServoAxis(PlantSlave):
 
     def initialise(self) -> None:
         """Read the parameters and start at the initial state."""
-        self._p = tuple(self.real[FIRST_PARAMETER + n] for n in range(COUNT))
+        self._p = AxisParameters._make(self.real[n] for n in range(FIRST_PARAMETER, FIRST_START))
         real = self.real
         self._x = servo_axis.start(real[FIRST_START], real[FIRST_START + 1], real[FIRST_START + 2], self._p)
         self._mode = UNDECIDED
@@ -79,11 +77,11 @@ class ServoAxis(PlantSlave):
 
     def _request(self) -> float:
         """Return the requested torque within its limit [N.m]."""
-        return saturated(self.real[U], self._p[P_LIMIT])
+        return saturated(self.real[U], self._p.torque_saturation_limit)
 
     def _dead_time(self) -> float:
         """Return how late a request acts [s]."""
-        return self._p[P_DELAY]
+        return self._p.input_delay_delay
 
     def _moved(self, x: State, mode: int, u: float, time: float, step: float) -> tuple[State, int]:
         """Return state and direction of sliding after a piece of a step."""
@@ -122,7 +120,7 @@ class ServoAxis(PlantSlave):
             The derivatives, SI units per second; a drive without a lag holds its torque.
         """
         r = self.derivatives()
-        return (r[0], r[1], r[2] if self._p[P_TAU] > 0.0 else 0.0)
+        return (r[0], r[1], r[2] if self._p.tau > 0.0 else 0.0)
 
     def indicators(self) -> Indicators:
         """Return the event indicators, for model exchange."""
@@ -141,9 +139,9 @@ class ServoAxis(PlantSlave):
 
     def begin_exchange(self) -> None:
         """Settle the drive at what is asked first; effects that need time events are refused in model exchange."""
-        if self._p[P_DELAY] > 0.0:
+        if self._p.input_delay_delay > 0.0:
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
-        if self._p[P_RATE] < BIG:
+        if self._p.rate_limit_rate < BIG:
             raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
         x = self._x
         self._x = (x[0], x[1], x[2], x[3], self._request())
@@ -154,6 +152,6 @@ class ServoAxis(PlantSlave):
         self._write()
 
     def _write(self) -> None:
-        self.real[THETA_M] = self._x[0] + self._p[P_OFFSET]
+        self.real[THETA_M] = self._x[0] + self._p.sensor_offset_motor_offset
         self.real[OMEGA_M] = self._x[1]
         self.real[T_M] = servo_axis.drive_torque(self._x, self._p, self._acting)

@@ -9,7 +9,7 @@ In all functions: ``u``: requested torque [N.m], delayed and saturated already; 
 from .backlash_models import BOUNCING, HELD
 from .bristles import bent, builds_up_l, builds_up_m, capacity_l, capacity_m, reach_l, reach_m
 from .contact import after_event, joined, on_flank, stopped
-from .drivetrain_parameters import NONE, P_ALPHA, P_I, P_MODEL
+from .drivetrain_parameters import NONE
 from .dry_friction import (
     LOAD,
     MOTOR,
@@ -54,11 +54,11 @@ def contact_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -
     """Return the guard of the contact; the same conditions as in the linear solution."""
     contact = mode[0]
     model = backlash_model(p)
-    if model == NONE or (is_rigid(p) and p[P_ALPHA] == 0.0) or (which == 1 and contact in (-1, 1)):
+    if model == NONE or (is_rigid(p) and p.alpha == 0.0) or (which == 1 and contact in (-1, 1)):
         return NEVER
     if contact == 0:
         sign = 1.0 if which == 0 else -1.0
-        room = p[P_ALPHA] - sign * (twist(x, p) - x[7])
+        room = p.alpha - sign * (twist(x, p) - x[7])
         if room < 0.0 and model in BOUNCING and sign * twist_rate(x, p) < 0.0:
             return NEVER  # just after an impact rounding leaves the teeth inside each other, but they part already
         return room
@@ -77,7 +77,7 @@ def contact_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -
         return side * shaft_torque(x, mode, p, T_l)
     if teeth_never_pull(p):
         return side * shaft_torque(x, mode, p, T_l)
-    return side * twist(x, p) - p[P_ALPHA]
+    return side * twist(x, p) - p.alpha
 
 
 def guard_room(x: State, mode: Mode, which: int, p: Parameters) -> float:
@@ -86,7 +86,7 @@ def guard_room(x: State, mode: Mode, which: int, p: Parameters) -> float:
         standing = mode[1] == 0 if which == 2 else mode[2] == 0
         return 1e-12 * (1.0 + abs(x[4])) if standing else 1e-14
     if mode[0] == 0 or not (teeth_never_pull(p) or is_rigid(p)):
-        return 4e-15 * (1.0 + abs(x[0] / p[P_I]) + abs(x[2]) + p[P_ALPHA])
+        return 4e-15 * (1.0 + abs(x[0] / p.i) + abs(x[2]) + p.alpha)
     return 1e-11 * (1.0 + abs(x[4]))
 
 
@@ -134,7 +134,7 @@ def switched(x: State, mode: Mode, which: int, events: int, p: Parameters, u: fl
     if (contact == 0) != (follows == 0):
         x = on_flank(x, direction(follows if contact == 0 else contact), p)
     slip_m, slip_l = slips(x, follows, p, T_l)
-    if follows == 0 and int(p[P_MODEL]) in HELD:
+    if follows == 0 and int(p.backlash_model) in HELD:
         x = (x[0], x[1], x[2], 0.0, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
     return (x, (follows, slip_m, slip_l))
 

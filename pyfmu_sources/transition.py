@@ -5,7 +5,6 @@ In all functions: ``h``: length of the step [s].
 
 from math import ceil, sqrt
 
-from .drivetrain_parameters import P_B_L, P_B_M, P_I, P_J_L, P_J_M, P_TAU
 from .equations import Parameters, shaft_damping, shaft_stiffness, teeth_never_pull
 from .linear_mode import Law, Row, State6, Transition, evaluate, taylor
 
@@ -16,8 +15,8 @@ MOST_DOUBLINGS = 200
 
 def fastest_rate(law: Law, p: Parameters) -> float:
     """Return a bound [1/s] on the rates of the linear law, by which Taylor steps are scaled."""
-    mobility = 1.0 / p[P_J_L] + 1.0 / (p[P_J_M] * p[P_I] * p[P_I])
-    friction = p[P_B_M] / p[P_J_M] + p[P_B_L] / p[P_J_L] + 1.0 / p[P_TAU]
+    mobility = 1.0 / p.J_l + 1.0 / (p.J_m * p.i * p.i)
+    friction = p.b_m / p.J_m + p.b_l / p.J_l + 1.0 / p.tau
     return sqrt(law[1] * mobility) + law[2] * mobility + friction
 
 
@@ -74,7 +73,7 @@ def transition(law: Law, p: Parameters, h: float) -> Transition:
         (a[4], b[4], c[4], d[4], e[4], f[4]),
     )
     for _ in range(doublings):
-        rows = doubled(rows, p[P_I])
+        rows = doubled(rows, p.i)
     return rows
 
 

@@ -13,7 +13,6 @@ from orchestrator.estimation.profile import profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import GapVerdictSettings
 from orchestrator.shared.inference.normal import NORMAL_95
-from pyfmu_sources.drivetrain_parameters import P_I
 
 
 def describe(fit: GapFit) -> Estimate:
@@ -61,7 +60,7 @@ def describe(fit: GapFit) -> Estimate:
         visible, alpha, error, low, high = False, math.nan, math.inf, 0.0, math.inf
     drive = float(np.sqrt(np.mean(kept.states[:, 4] ** 2)))
     lacking = _model_warning(
-        diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I], problem.record.size, settings
+        diagnostics, drive, likelihood.parameters(fit.point.theta).i, problem.record.size, settings
     )
     diagnostics["lacking"] = lacking
     message = "; ".join(text for text in (message, lacking) if text)

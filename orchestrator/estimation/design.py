@@ -22,7 +22,7 @@ from orchestrator.estimation.innovations import Array, affine_model, simulate
 from orchestrator.estimation.problem import make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import MINIMUM_ROWS, Record
-from pyfmu_sources.drivetrain_parameters import P_ALPHA
+from pyfmu_sources.drivetrain_parameters import DrivetrainParameters
 
 TORQUE_NOISE = 1e-2  # N.m.s^0.5
 DEFAULT_NOISE = (3.5e-4, 1.75e-4)  # rad
@@ -189,9 +189,7 @@ def _multisine(time: Array, top: float) -> Array:
 
 
 def _judge(name: str, shape: Array, task: _Task) -> Excitation:
-    values = list(task.model.values)
-    values[P_ALPHA] = task.alpha
-    plant = affine_model(tuple(values))
+    plant = affine_model(DrivetrainParameters._make(task.model.values)._replace(alpha=task.alpha))
     step = float(task.time[1] - task.time[0])
     scale = task.limits.torque / float(np.max(np.abs(shape)))
     states = simulate(plant, scale * shape, step, np.zeros(5))
@@ -220,9 +218,8 @@ def error_bound_of_excitation(
         alpha: half-gap [rad].
         noise: standard deviation of each encoder [rad].
     """
-    values = list(model.values)
-    values[P_ALPHA] = alpha
-    states = simulate(affine_model(tuple(values)), u, float(time[1] - time[0]), np.zeros(5))
+    plant = affine_model(DrivetrainParameters._make(model.values)._replace(alpha=alpha))
+    states = simulate(plant, u, float(time[1] - time[0]), np.zeros(5))
     if not np.all(np.isfinite(states)):
         return math.inf
     record = Record(time, u, states[:, 0].copy(), None if motor_only else states[:, 2].copy(), "simulated")

@@ -8,13 +8,14 @@ is the likelihood in innovation form, in which an imperfect model does not drift
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.kernel import run_filter, run_free, transition
-from pyfmu_sources.drivetrain_parameters import BIG, DEAD_ZONE, P_ALPHA, P_FILTER, P_I, P_J_L, P_J_M, P_MODEL, P_RATE
+from pyfmu_sources.drivetrain_parameters import BIG, DEAD_ZONE, DrivetrainParameters
 from pyfmu_sources.equations import State, rates
 
 Array = NDArray[np.float64]
@@ -45,17 +46,16 @@ class AffineModel:
     jump: Array
 
 
-def affine_model(p: tuple[float, ...], impulse: float = 0.0) -> AffineModel:
-    """Return the smooth modes of the dead-zone plant with parameters ``p``; nonlinear effects are not seen.
+def affine_model(values: Sequence[float], impulse: float = 0.0) -> AffineModel:
+    """Return the smooth modes of the dead-zone plant with parameters ``values``; nonlinear effects are not seen.
 
     ``impulse`` [N.m.s] is what the shaft lacks at the load when the teeth touch, and has too much when they part,
     beside a damper ``c`` that acts from the first moment of contact on: half of ``c`` times the depth within which a
     real contact's damping sets in (Hunt and Crossley 1975). It fades with the gap: without one, nothing touches.
     """
-    chosen = list(p)
-    chosen[P_MODEL] = float(DEAD_ZONE)
-    chosen[P_FILTER], chosen[P_RATE] = 0.0, BIG
-    p = tuple(chosen)
+    p = DrivetrainParameters._make(values)._replace(
+        backlash_model=float(DEAD_ZONE), drive_filter_time_constant=0.0, rate_limit_rate=BIG
+    )
     matrices = np.zeros((3, STATES, STATES))
     constants = np.zeros((3, STATES))
     zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -69,11 +69,11 @@ def affine_model(p: tuple[float, ...], impulse: float = 0.0) -> AffineModel:
             matrices[flank + 1, :, n] = [moved[m] - base[m] for m in range(STATES)]
         moved = rates(zero, flank, 0.0, 0.0, p, 1.0, 0.0)
         inputs = np.array([moved[m] - base[m] for m in range(STATES)])
-    normal = np.array([1.0 / p[P_I], 0.0, -1.0, 0.0, 0.0])
-    mobility = np.array([1.0 / p[P_J_M], 1.0 / p[P_J_L]])
-    faded = impulse * p[P_ALPHA] / math.hypot(p[P_ALPHA], FADING)
-    jump = faded * np.array([0.0, mobility[0] / p[P_I], 0.0, -mobility[1], 0.0])
-    return AffineModel(matrices, inputs, constants, normal, p[P_ALPHA], mobility, jump)
+    normal = np.array([1.0 / p.i, 0.0, -1.0, 0.0, 0.0])
+    mobility = np.array([1.0 / p.J_m, 1.0 / p.J_l])
+    faded = impulse * p.alpha / math.hypot(p.alpha, FADING)
+    jump = faded * np.array([0.0, mobility[0] / p.i, 0.0, -mobility[1], 0.0])
+    return AffineModel(matrices, inputs, constants, normal, p.alpha, mobility, jump)
 
 
 def _unit(n: int) -> State:

@@ -23,7 +23,7 @@ from orchestrator.estimation.problem import IMPULSE, OFFSET, SCALE, STATE_NAMES,
 from orchestrator.estimation.protocol import TimeLimitError
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.shared.inference.inverse import pseudo_inverse
-from pyfmu_sources.drivetrain_parameters import NAMES
+from pyfmu_sources.drivetrain_parameters import NAMES, DrivetrainParameters
 
 JUMP = 100.0
 START_DAMPING = 1e-6
@@ -123,12 +123,12 @@ class Likelihood:
         """Return the damping with which a fit starts."""
         return 1e-3 if self.soft else START_DAMPING
 
-    def parameters(self, theta: Array) -> tuple[float, ...]:
-        """Return the parameter tuple ``p`` of a vector."""
+    def parameters(self, theta: Array) -> DrivetrainParameters:
+        """Return the parameters ``p`` of a vector."""
         p = list(self.problem.base)
         for place, name in self._places:
             p[name] = float(theta[place])
-        return tuple(p)
+        return DrivetrainParameters._make(p)
 
     def noise(self, theta: Array) -> NoiseLevels:
         """Return the noise levels of a vector."""

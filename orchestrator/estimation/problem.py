@@ -9,10 +9,9 @@ from orchestrator.estimation.innovations import Array, NoiseLevels
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import rms_behind_lag, robust_noise
-from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
-ALPHA = NAMES[P_ALPHA]
+ALPHA = "alpha"
 SCALE = "u_scale"
 OFFSET = "effects.sensor_offset.load.offset"
 IMPULSE = "contact_impulse"

@@ -10,6 +10,7 @@ import math
 from functools import cache
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba import njit
 
 from orchestrator.plants.description import CompiledEquations, Plant
@@ -208,6 +209,27 @@ def parameters_of(plant: Plant, usual: bool) -> Any:
     entries = (repr(float(plant.entry(n).default)) if n in fixed else f"p[{n}]" for n in range(len(plant.names)))
     # A tuple of a hundred entries, some of them constants, has no other form that the compiler knows.
     return njit(error_model="numpy", forceinline=True, **ALGEBRA)(eval(f"lambda p: ({', '.join(entries)},)"))
+
+
+@cache_once
+def named_of(kind: Any) -> Any:
+    """Return ``named(p)``, compiled: the parameters of a plant by name, of a tuple or array that begins with them.
+
+    Args:
+        kind: the plant's named tuple, in which its equations take them.
+    """
+    entries = ", ".join(f"p[{n}]" for n in range(len(kind._fields)))
+    return njit(error_model="numpy", forceinline=True, **ALGEBRA)(eval(f"lambda p: kind({entries})", {"kind": kind}))
+
+
+def record_of(kind: Any, p: Any) -> Any:
+    """Return the parameters of a plant by name, in one place: compiled code hands them on by their address.
+
+    Args:
+        kind: the plant's named tuple, in which its equations take them.
+        p: array (n,) that begins with them.
+    """
+    return np.array(p[: len(kind._fields)], dtype=float).view([(name, float) for name in kind._fields])[0]
 
 
 def is_usual(plant: Plant, p: Any) -> bool:

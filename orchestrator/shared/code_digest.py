@@ -68,6 +68,8 @@ class _Walk:
             self._add(type(value).__name__, repr(value))
         elif isinstance(value, type) and value.__module__ == "builtins":  # float, int, range
             self._add("type", value.__name__)
+        elif isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
+            self._add("named tuple", value.__module__, value.__qualname__, *value._fields)
         else:
             raise TypeError(value)
 

@@ -12,6 +12,7 @@ from fmpy.fmi2 import FMU2Model
 
 from orchestrator.building.compilers import find_compiler
 from pyfmu_sources import servo_axis
+from pyfmu_sources.drivetrain_parameters import with_values
 from pyfmu_sources.servo_axis_parameters import DEFAULTS, NAMES
 from tests.support.model_exchange import END, STEP, event_times, first_time, request, stepped_and_exchanged
 
@@ -61,7 +62,7 @@ def test_the_motion_is_that_of_the_cosimulation(axis: Path, name: str) -> None:
 @pytest.mark.parametrize(("start", "kind"), [(COULOMB, "turns"), (COULOMB, "breaks away"), (STOPS, "stop")])
 def test_events_are_met_at_their_time(axis: Path, start: dict[str, float], kind: str) -> None:
     """The first of a kind, against the time found by halving a step of the co-simulated axis."""
-    p = tuple(start.get(name, default) for name, default in zip(NAMES, DEFAULTS, strict=True))
+    p = with_values(DEFAULTS, {name: value for name, value in start.items() if name in NAMES})
     x = servo_axis.start(0.0, 0.0, 0.0, p)
     mode = servo_axis.initial_mode(x, p, request(0))
 

@@ -186,7 +186,7 @@ def test_two_versions_of_one_model_in_one_process(tmp_path: Path, fmus: dict[str
         shutil.copytree(build.ROOT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
     equations = copy / "pyfmu_sources" / "drivetrain_slave.py"
     text = equations.read_text(encoding="utf-8")
-    assert "real[THETA_M] = x[0] + self._p[P_OFFSET_M]" in text
+    assert "real[THETA_M] = x[0] + self._p.sensor_offset_motor_offset" in text
     equations.write_text(text.replace("real[THETA_M] = x[0] +", "real[THETA_M] = 2.0 * x[0] +"), encoding="utf-8")
     subprocess.run(
         [sys.executable, "-c", BUILD_HERE], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(copy)}, check=True

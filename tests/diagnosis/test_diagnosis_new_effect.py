@@ -16,8 +16,7 @@ from orchestrator.records.model_file import read_model
 from pyfmu_sources import servo_axis_parameters as axis
 from tests.support.axis_record import axis_record
 
-p = list(axis.DEFAULTS)
-p[axis.P_J], p[axis.P_B], p[axis.P_FAN] = 1.04, 1.95, 0.2
+p = axis.DEFAULTS._replace(J=1.04, b=1.95, fan_coefficient=0.2)
 found = diagnose(axis_record(p, 3, "fan"), read_model(Path("model.toml")))
 effect = found.effects[0]
 off = abs(effect.parameters["coefficient"].value - 0.2)
@@ -44,7 +43,7 @@ def test_worked_example_adds_an_effect(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "extending.md").read_text()
     start, stop = page.index("## Adding an effect"), page.index("## Adding a plant")
     edits = re.findall(r"```python\n(.*?)```", page[start:stop], re.DOTALL)
-    assert len(edits) == 7
+    assert len(edits) == 5
     assert len({apply(edit, tmp_path) for edit in edits}) == 3
     (tmp_path / "model.toml").write_text(axis_record.MODEL)
     assert run_in_copy(PROGRAM, tmp_path).split() == ["effects", "fan", "True", "1"]

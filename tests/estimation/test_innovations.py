@@ -79,7 +79,7 @@ def test_without_noise_in_the_torque_errors_are_those_of_the_exact_plant() -> No
     assert np.allclose(found.errors, [[1e-4, -2e-4]], atol=1e-9)
     assert np.allclose(found.variances, 1e-6, atol=1e-15)
     assert np.allclose(found.states, exact[:, :5], atol=1e-7)
-    twist = exact[:, 0] / p[dt.P_I] - exact[:, 2]
+    twist = exact[:, 0] / p.i - exact[:, 2]
     clear = np.abs(np.abs(twist) - 0.004) > 1e-6
     flank = np.where(twist > 0.004, 1, np.where(twist < -0.004, -1, 0))
     assert np.array_equal(found.contacts[clear], flank[clear])

@@ -180,7 +180,7 @@ def test_a_sharp_hardening_adds_the_fifth_power(model: int) -> None:
         eq.elastic_torque(x, 1, p_of(model, hardening_stiffness__cubic=1e6, hardening_stiffness__sharpness=q))
         for q in (0.0, 1.2)
     )
-    k = K if model == dt.DEAD_ZONE else p_of()[dt.P_CONTACT_K]
+    k = K if model == dt.DEAD_ZONE else p_of().contact_stiffness
     wound = 0.02 - ALPHA
     assert sharp - plain == pytest.approx(1.2 * 1e12 / k * wound**5)
 

@@ -122,16 +122,42 @@ def test_friction_that_builds_up_over_no_distance_is_the_set_valued_one() -> Non
 
 
 AXIS = {
-    "spring": ({"P_SPRING": 6.0, "P_SPRING_CUBIC": 2.0, "P_SPRING_ANGLE": 0.1}, 1e-7),
-    "end stops": ({"P_STOP_LOWER": -0.2, "P_STOP_UPPER": 0.3, "P_STOP_K": 500.0}, 1e-5),
-    "harmonics": ({"P_RIPPLE": 0.5, "P_RIPPLE_2": 0.3, "P_RIPPLE_3": 0.2, "P_RIPPLE_3_PHASE": 0.4}, 1e-6),
-    "varying inertia": ({"P_J_WAVE": 0.3, "P_J_WAVE_N": 2.0}, 1e-7),
-    "presliding": ({"P_COULOMB": 1.0, "P_PRESLIDING": 2e-3, "P_BRISTLE_C": 1.0}, 1e-6),
+    "spring": ({"spring_load_stiffness": 6.0, "spring_load_cubic": 2.0, "spring_load_angle": 0.1}, 1e-7),
+    "end stops": ({"end_stop_lower": -0.2, "end_stop_upper": 0.3, "end_stop_stiffness": 500.0}, 1e-5),
+    "harmonics": (
+        {
+            "torque_ripple_amplitude": 0.5,
+            "torque_ripple_second_amplitude": 0.3,
+            "torque_ripple_third_amplitude": 0.2,
+            "torque_ripple_third_phase": 0.4,
+        },
+        1e-6,
+    ),
+    "varying inertia": ({"varying_inertia_amplitude": 0.3, "varying_inertia_cycles_per_rev": 2.0}, 1e-7),
+    "presliding": (
+        {"coulomb_friction_motor_torque": 1.0, "presliding_motor_distance": 2e-3, "presliding_motor_damping": 1.0},
+        1e-6,
+    ),
     "presliding, falling": (
-        {"P_STRIBECK": 0.8, "P_BREAKAWAY": 1.4, "P_STRIBECK_SPEED": 0.3, "P_PRESLIDING": 1e-3}, 1e-5),
-    "second lag": ({"P_TAU": 0.03, "P_FILTER": 0.05}, 1e-6),
-    "position-dependent": ({"P_COULOMB": 1.0, "P_PRESLIDING": 2e-3, "P_WAVY": 0.5, "P_WAVY_N": 4.0}, 2e-4),
-}  # fmt: skip
+        {
+            "stribeck_friction_motor_coulomb": 0.8,
+            "stribeck_friction_motor_breakaway": 1.4,
+            "stribeck_friction_motor_stribeck_speed": 0.3,
+            "presliding_motor_distance": 1e-3,
+        },
+        1e-5,
+    ),
+    "second lag": ({"tau": 0.03, "drive_filter_time_constant": 0.05}, 1e-6),
+    "position-dependent": (
+        {
+            "coulomb_friction_motor_torque": 1.0,
+            "presliding_motor_distance": 2e-3,
+            "periodic_friction_motor_amplitude": 0.5,
+            "periodic_friction_motor_cycles_per_rev": 4.0,
+        },
+        2e-4,
+    ),
+}
 
 
 def textbook(v: dict[str, float], u: np.ndarray, h: float) -> np.ndarray:
@@ -140,29 +166,42 @@ def textbook(v: dict[str, float], u: np.ndarray, h: float) -> np.ndarray:
 
     def rates(_: float, y: np.ndarray, asked: float) -> list[float]:
         x, w, drive, z, request = y
-        tau, tau2 = v.get("P_TAU", 0.0), v.get("P_FILTER", 0.0)
+        tau, tau2 = v.get("tau", 0.0), v.get("drive_filter_time_constant", 0.0)
         torque = drive if tau > 0.0 else asked
-        cycles = v.get("P_RIPPLE_N", 6.0)
-        torque += v.get("P_RIPPLE", 0.0) * np.sin(cycles * x) + v.get("P_RIPPLE_2", 0.0) * np.sin(2 * cycles * x)
-        torque += v.get("P_RIPPLE_3", 0.0) * np.sin(3 * cycles * x + v.get("P_RIPPLE_3_PHASE", 0.0))
-        way = x - v.get("P_SPRING_ANGLE", 0.0)
-        torque -= 1.0 * w + v.get("P_SPRING", 0.0) * way + v.get("P_SPRING_CUBIC", 0.0) * way**3
-        if "P_STOP_K" in v and (x > v["P_STOP_UPPER"] or x < v["P_STOP_LOWER"]):
-            side, edge = (1.0, v["P_STOP_UPPER"]) if x > v["P_STOP_UPPER"] else (-1.0, v["P_STOP_LOWER"])
-            torque -= side * max(0.0, v["P_STOP_K"] * side * (x - edge) * (1.0 + 0.1 * side * w))
+        cycles = v.get("torque_ripple_cycles_per_rev", 6.0)
+        torque += v.get("torque_ripple_amplitude", 0.0) * np.sin(cycles * x) + v.get(
+            "torque_ripple_second_amplitude", 0.0
+        ) * np.sin(2 * cycles * x)
+        torque += v.get("torque_ripple_third_amplitude", 0.0) * np.sin(
+            3 * cycles * x + v.get("torque_ripple_third_phase", 0.0)
+        )
+        way = x - v.get("spring_load_angle", 0.0)
+        torque -= 1.0 * w + v.get("spring_load_stiffness", 0.0) * way + v.get("spring_load_cubic", 0.0) * way**3
+        if "end_stop_stiffness" in v and (x > v["end_stop_upper"] or x < v["end_stop_lower"]):
+            side, edge = (1.0, v["end_stop_upper"]) if x > v["end_stop_upper"] else (-1.0, v["end_stop_lower"])
+            torque -= side * max(0.0, v["end_stop_stiffness"] * side * (x - edge) * (1.0 + 0.1 * side * w))
         bend = 0.0
-        if "P_PRESLIDING" in v:
-            rest = v.get("P_COULOMB", 0.0) + max(v.get("P_STRIBECK", 0.0), v.get("P_BREAKAWAY", 0.0))
-            slope = np.exp(-((w / v.get("P_STRIBECK_SPEED", 1.0)) ** 2))
-            level = v.get("P_COULOMB", 0.0) + v.get("P_STRIBECK", 0.0)
-            level += (v.get("P_BREAKAWAY", 0.0) - v.get("P_STRIBECK", 0.0)) * slope
-            level = max(0.0, level + v.get("P_WAVY", 0.0) * np.sin(v.get("P_WAVY_N", 1.0) * x))
-            stiffness = rest / v["P_PRESLIDING"]
+        if "presliding_motor_distance" in v:
+            rest = v.get("coulomb_friction_motor_torque", 0.0) + max(
+                v.get("stribeck_friction_motor_coulomb", 0.0), v.get("stribeck_friction_motor_breakaway", 0.0)
+            )
+            slope = np.exp(-((w / v.get("stribeck_friction_motor_stribeck_speed", 1.0)) ** 2))
+            level = v.get("coulomb_friction_motor_torque", 0.0) + v.get("stribeck_friction_motor_coulomb", 0.0)
+            level += (
+                v.get("stribeck_friction_motor_breakaway", 0.0) - v.get("stribeck_friction_motor_coulomb", 0.0)
+            ) * slope
+            level = max(
+                0.0,
+                level
+                + v.get("periodic_friction_motor_amplitude", 0.0)
+                * np.sin(v.get("periodic_friction_motor_cycles_per_rev", 1.0) * x),
+            )
+            stiffness = rest / v["presliding_motor_distance"]
             bend = w - abs(w) * z * stiffness / level
-            torque -= stiffness * z + v.get("P_BRISTLE_C", 0.0) * bend
-        cycles = v.get("P_J_WAVE_N", 1.0)
-        inertia = 1.0 + v.get("P_J_WAVE", 0.0) * np.sin(cycles * x)
-        torque -= 0.5 * v.get("P_J_WAVE", 0.0) * cycles * np.cos(cycles * x) * w * w
+            torque -= stiffness * z + v.get("presliding_motor_damping", 0.0) * bend
+        cycles = v.get("varying_inertia_cycles_per_rev", 1.0)
+        inertia = 1.0 + v.get("varying_inertia_amplitude", 0.0) * np.sin(cycles * x)
+        torque -= 0.5 * v.get("varying_inertia_amplitude", 0.0) * cycles * np.cos(cycles * x) * w * w
         follows = (asked - request) / tau2 if tau2 > 0.0 else 0.0
         lag = ((request if tau2 > 0.0 else asked) - drive) / tau if tau > 0.0 else 0.0
         return [w, torque / inertia, lag, bend, follows]
@@ -179,15 +218,13 @@ def textbook(v: dict[str, float], u: np.ndarray, h: float) -> np.ndarray:
 def test_axis_agrees_with_its_equations_written_out(law: str) -> None:
     values, tolerance = AXIS[law]
     source, h = compile_module("servo_axis"), 0.01
-    p = list(servo_axis_parameters.DEFAULTS)
-    for name, value in values.items():
-        p[getattr(servo_axis_parameters, name)] = value
+    p = servo_axis_parameters.DEFAULTS._replace(**values)
     u = 4.0 * np.cos(2.0 * np.pi * 0.7 * h * np.arange(300)) + 0.5
-    x = source.start(0.0, 0.0, 0.0, tuple(p))
-    mode, angles = source.initial_mode(x, tuple(p), float(u[0])), []
+    x = source.start(0.0, 0.0, 0.0, p)
+    mode, angles = source.initial_mode(x, p, float(u[0])), []
     for asked in u:
         angles.append(x[0])
-        x, mode = source.advance(x, mode, tuple(p), float(asked), 0.0, h)
+        x, mode = source.advance(x, mode, p, float(asked), 0.0, h)
     expected = textbook(values, u, h)
     assert np.ptp(expected) > 0.05
     assert np.abs(np.array(angles) - expected).max() < tolerance

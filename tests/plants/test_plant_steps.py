@@ -152,7 +152,6 @@ def test_a_stiff_shaft_without_effects_has_a_result():
 
 
 def test_a_single_axis_that_no_step_resolves_is_refused():
-    p = list(servo_axis_parameters.DEFAULTS)
-    p[servo_axis_parameters.P_J], p[servo_axis_parameters.P_B] = 1e-9, 1e12
-    x, _ = compile_module("servo_axis").advance((0.0, 1.0, 0.0, 0.0, 0.0), 1, tuple(p), 1.0, 0.0, 1e-3)
+    p = servo_axis_parameters.DEFAULTS._replace(J=1e-9, b=1e12)
+    x, _ = compile_module("servo_axis").advance((0.0, 1.0, 0.0, 0.0, 0.0), 1, p, 1.0, 0.0, 1e-3)
     assert np.isnan(x).all()

@@ -11,9 +11,7 @@ from pyfmu_sources.drivetrain_parameters import NAMES, parameters, with_values
 
 
 def axis(values: dict[str, float]) -> tuple[float, ...]:
-    known = servo_axis_parameters.PARAMETERS
-    assert values.keys() <= {entry.name for entry in known}
-    return tuple(values.get(entry.name, entry.default) for entry in known)
+    return with_values(servo_axis_parameters.DEFAULTS, values)
 
 
 @pytest.mark.parametrize("tau", [1e-6, 1e-3, 0.5])

@@ -6,6 +6,7 @@ import numpy as np
 
 from orchestrator.records.record import Record, record_from_columns
 from pyfmu_sources import servo_axis as axis
+from pyfmu_sources.servo_axis_parameters import AxisParameters
 
 MODEL = """
 fmu = "ServoAxis"
@@ -20,11 +21,11 @@ relative_uncertainty = 0.1
 
 def axis_record(p: Sequence[float], seed: int, name: str) -> Record:
     """Return 8 s at 200 Hz of an axis with parameters ``p``, its encoder with a noise of 0.1 mrad."""
-    rng = np.random.default_rng(seed)
+    rng, values = np.random.default_rng(seed), AxisParameters._make(p)
     u = np.repeat(rng.uniform(-8.0, 8.0, 100), 16)
-    x, mode, y = axis.start(0.0, 0.0, 0.0, tuple(p)), 0, []
+    x, mode, y = axis.start(0.0, 0.0, 0.0, values), 0, []
     for value in u:
         y.append(x[0])
-        x, mode = axis.advance(x, mode, tuple(p), float(value), 0.0, 0.005)
+        x, mode = axis.advance(x, mode, values, float(value), 0.0, 0.005)
     angle = np.array(y) + 1e-4 * rng.standard_normal(len(y))
     return record_from_columns({"time": 0.005 * np.arange(len(u)), "u": u, "theta_m": angle}, name)

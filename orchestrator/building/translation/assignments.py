@@ -6,7 +6,7 @@ import ast
 
 from orchestrator.building.translation.building_tuples import list_lines
 from orchestrator.building.translation.kinds import NOTHING, REAL, WHOLE, Items, Kind, Store, Tuple, describe, size_of
-from orchestrator.building.translation.scope import PRIMARY, UNARY, Code, Scope, address_of, convert, item_of
+from orchestrator.building.translation.scope import PRIMARY, UNARY, Code, Scope, address_of, convert, part_of
 
 # Larger tuples that are parts of fixed parameters are not copied.
 LARGEST_COPIED = 12
@@ -147,7 +147,7 @@ def _unpack(scope: Scope, node: ast.Assign, target: ast.Tuple) -> list[str]:
             scope.refuse(node, f"{len(target.elts)} names must be given as many items, but get {describe(code.kind)}")
         if not code.place or used & stored:
             code = scope.hoist(node, code, "result")
-        codes = [item_of(code, n) for n in range(len(target.elts))]
+        codes = [part_of(scope, code, n) for n in range(len(target.elts))]
     lines = scope.check_faults(before)
     for part, code in zip(target.elts, codes, strict=True):
         lines += _part(scope, node, part, code)

@@ -19,6 +19,7 @@ from orchestrator.building.translation.scope import (
     address_of,
     as_real,
     compound,
+    convert,
     member,
     truth,
     value_of,
@@ -39,6 +40,9 @@ def call(scope: Scope, node: ast.Call, wanted: Kind | None) -> Code:
     if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name) and node.func.value.id == "self":
         return _method(scope, node, node.func.attr)
     target = _target(scope, node.func)
+    if getattr(target, "__name__", "") == "_make" and hasattr(target.__self__, "_fields"):
+        kind = kind_of(target.__self__)
+        return convert(scope, node, tuple_built(scope, node, kind), kind)
     name = getattr(target, "__name__", "")
     if target is getattr(math, name, None):
         return _math(scope, node, name)
@@ -183,6 +187,8 @@ def _length(scope: Scope, code: Code) -> Code | None:
 def _construct(scope: Scope, node: ast.Call, target: Any) -> Code:
     kind = kind_of(target)
     assert isinstance(kind, Tuple)
+    if scope.program.paired:
+        scope.refuse(node, "a NamedTuple must not be made where derivatives are taken: it holds none")
     given: dict[str, ast.expr] = dict(zip(kind.names, node.args, strict=False))
     given |= {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg}
     if set(given) != set(kind.names):

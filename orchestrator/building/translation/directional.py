@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestrator.building.translation.definitions import Function, Owner
 from orchestrator.building.translation.functions import translate
-from orchestrator.building.translation.kinds import REAL, WHOLE, Kind, Tuple, Values
+from orchestrator.building.translation.kinds import REAL, WHOLE, Kind, Tuple
 from orchestrator.building.translation.program import Program
 from orchestrator.errors import FmuError
 
@@ -25,7 +25,6 @@ def directional(plain: Program, owner: Owner) -> Directional:
     cls = owner.cls
     program = Program(translate, taken=frozenset({cls.__name__}), neighbours=plain)
     function = program.function(None, None, cls.response)
-    program.check_lengths()
     states, outputs = len(cls.continuous_states), cls.response_outputs
     if function.returns != Tuple((Tuple((REAL,) * states), Tuple((REAL,) * len(outputs)))):
         raise FmuError(f"`{cls.__name__}.response` must return {states} derivatives and {len(outputs)} outputs")
@@ -62,16 +61,16 @@ def _argument(program: Program, owner: Owner, name: str, kind: Kind, first_state
             raise FmuError(f"`{name}` of `{cls.__name__}.response` must be a hidden attribute or a Real input")
         place = inputs.index(name)
         return [f"const Pair {local} = {{self->real[{place}], seeds[{place}]}};"]
-    if isinstance(own, Tuple) and own.items == (REAL,) * len(own.items):
+    if isinstance(own, Tuple) and not own.names and own.items == (REAL,) * len(own.items):
         count = len(own.items)
-        if isinstance(kind, Values):
-            return [f"const double *const {local} = {attribute}.v;"]
         seed = f"seeds[{first_state} + n]" if f"_{name}" == cls.state_attribute else "0.0"
         return [
             f"{program.names.c(kind)} {local};",
             f"for (int n = 0; n < {count}; n++)",
             f"    {local}.v[n] = (Pair){{{attribute}.v[n], {seed}}};",
         ]
+    if own == kind and isinstance(kind, Tuple) and kind.names:
+        return [f"const {program.names.c(kind)} *const {local} = &{attribute};"]
     if own == kind == WHOLE:
         return [f"const {program.names.c(kind)} {local} = {attribute};"]
     if own == kind and isinstance(kind, Tuple) and REAL not in kind.items:
@@ -80,4 +79,7 @@ def _argument(program: Program, owner: Owner, name: str, kind: Kind, first_state
 
 
 def _pass_argument(function: Function, name: str) -> str:
+    kind = dict(function.parameters)[name]
+    if isinstance(kind, Tuple) and kind.names:  # a pointer already
+        return name if name in function.by_address else f"*{name}"
     return f"&{name}" if name in function.by_address else name

@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.building.translation.calls import call
 from orchestrator.building.translation.constants import constant_value, interval
-from orchestrator.building.translation.kinds import REAL, TRUTH, WHOLE, Items, Kind, Store, Tuple, Values, describe
+from orchestrator.building.translation.kinds import REAL, TRUTH, WHOLE, Items, Kind, Store, Tuple, describe
 from orchestrator.building.translation.scope import (
     AND,
     EQUALITY,
@@ -28,9 +28,9 @@ from orchestrator.building.translation.scope import (
     compound,
     constant_pair,
     convert,
-    item_of,
     join_kinds,
     member,
+    part_of,
     value_of,
 )
 
@@ -99,7 +99,7 @@ def _attribute(scope: Scope, node: ast.Attribute, wanted: Kind | None) -> Code:
         return constant(scope, value, node, node.attr)
     base = scope.expression(node.value)
     if isinstance(base.kind, Tuple) and node.attr in base.kind.names:
-        return item_of(base, base.kind.names.index(node.attr))
+        return part_of(scope, base, base.kind.names.index(node.attr))
     return scope.refuse(node, f"`{ast.unparse(node)}` has no value here")
 
 
@@ -277,19 +277,12 @@ def _subscript(scope: Scope, node: ast.Subscript, wanted: Kind | None) -> Code:
         n = interval(scope, node.slice)
         if n is None or n[0] != n[1] or not -len(kind.items) <= n[0] < len(kind.items):
             scope.refuse(node, "an item of a mixed tuple must be taken by a constant index")
-        return item_of(base, n[0] % len(kind.items))
+        return part_of(scope, base, n[0] % len(kind.items))
     if isinstance(kind, Tuple):
         return Code(f"{member(base)}v[{_index(scope, node, len(kind.items))}]", kind.items[0], place=True)
     if isinstance(kind, Items):
         length = f"{member(base)}n"
         return Code(f"{member(base)}v[{_index(scope, node, kind.capacity, length)}]", kind.item, place=True)
-    if isinstance(kind, Values):
-        n = interval(scope, node.slice)
-        if n is None or n[0] < 0:
-            scope.refuse(node, "an item of tuple[float, ...] must be taken by a constant index")
-        scope.program.note_index(n[1])
-        text = f"{base.within(PRIMARY)}[{scope.expression(node.slice).text}]"
-        return constant_pair(text) if scope.program.paired else Code(text, REAL, place=True)
     if isinstance(kind, Store):
         item = REAL if kind.attribute == "real" else WHOLE
         return Code(f"{base.within(PRIMARY)}[{_index(scope, node, kind.length)}]", item, place=True)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from orchestrator.building.translation.definitions import Function, Owner
 from orchestrator.building.translation.expressions import expression
-from orchestrator.building.translation.kinds import NOTHING, REAL, TRUTH, WHOLE, Items, Kind, Tuple, Values, size_of
+from orchestrator.building.translation.kinds import NOTHING, REAL, TRUTH, WHOLE, Items, Kind, Tuple, size_of
 from orchestrator.building.translation.program import Program
 from orchestrator.building.translation.scope import Scope
 from orchestrator.building.translation.source import ModuleSource, docstring
@@ -62,8 +62,6 @@ def _signature(source: ModuleSource, node: ast.FunctionDef, c_name: str, owner: 
         zip([a.arg for a in names][len(names) - len(arguments.defaults) :], arguments.defaults, strict=True)
     )
     returns = source.annotation(node.returns, node)
-    if isinstance(returns, Values):
-        source.refuse(node, f"`{node.name}` must return a tuple of fixed length")
     return Function(
         node.name,
         c_name,
@@ -78,11 +76,14 @@ def _signature(source: ModuleSource, node: ast.FunctionDef, c_name: str, owner: 
 
 
 def _by_address(function: Function, node: ast.FunctionDef) -> set[str]:
-    """Return the parameters that are large tuples, never assigned, of a function without lists and ``self``."""
-    if function.owned or any(isinstance(kind, Items) for _, kind in function.parameters):
+    """Return the parameters, never assigned, that are NamedTuples, or large tuples of a function without lists."""
+    if function.owned:
         return set()
     stored = {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-    return {n for n, kind in function.parameters if size_of(kind) > LARGEST_BY_VALUE and n not in stored}
+    lists = any(isinstance(kind, Items) for _, kind in function.parameters)
+    least = float("inf") if lists else LARGEST_BY_VALUE
+    large = {n for n, kind in function.parameters if size_of(kind) > least or (isinstance(kind, Tuple) and kind.names)}
+    return large - stored
 
 
 def _head(program: Program, function: Function) -> str:

@@ -24,10 +24,11 @@ NOTHING = Scalar("void", "None")
 
 @dataclass(frozen=True)
 class Tuple:
-    """A tuple of fixed length; ``names`` are the fields of a NamedTuple."""
+    """A tuple of fixed length; a NamedTuple has a title and names: it holds parameters, which have no derivative."""
 
     items: tuple[Kind, ...]
     names: tuple[str, ...] = ()
+    title: str = ""
 
     @property
     def uniform(self) -> bool:
@@ -44,11 +45,6 @@ class Items:
 
 
 @dataclass(frozen=True)
-class Values:
-    """``tuple[float, ...]``: a flat tuple of floats that is only read, of a length that the caller knows."""
-
-
-@dataclass(frozen=True)
 class Store:
     """``self.real`` or ``self.integer`` of a slave: values by value reference."""
 
@@ -56,8 +52,14 @@ class Store:
     length: int
 
 
-Kind = Scalar | Tuple | Items | Values | Store
+Kind = Scalar | Tuple | Items | Store
 _SCALARS: dict[Any, Scalar] = {float: REAL, int: WHOLE, bool: TRUTH, None: NOTHING, type(None): NOTHING}
+_KEYWORDS = (
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true "
+    "false"
+)
+KEYWORDS = frozenset(_KEYWORDS.split())
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 
 
@@ -75,14 +77,16 @@ def kind_of(annotation: Any) -> Kind:
         return _SCALARS[annotation]
     if isinstance(annotation, type) and issubclass(annotation, tuple) and hasattr(annotation, "_fields"):
         hints = typing.get_type_hints(annotation)
-        return Tuple(tuple(kind_of(hints[name]) for name in annotation._fields), tuple(annotation._fields))
+        return Tuple(
+            tuple(kind_of(hints[name]) for name in annotation._fields), tuple(annotation._fields), annotation.__name__
+        )
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _with_capacity(arguments[0], arguments[1])
     if origin is tuple and arguments and arguments[-1] is Ellipsis:
-        if arguments[0] is float:
-            return Values()
-        raise KindError("a tuple of any length must be of floats")
+        raise KindError(
+            "a tuple must have a length: tuple[float, float], Annotated[tuple[float, ...], N] or a NamedTuple"
+        )
     if origin is tuple and arguments:
         return Tuple(tuple(kind_of(argument) for argument in arguments))
     if origin is list or annotation is list:
@@ -117,8 +121,6 @@ def describe(kind: Kind) -> str:
             return f"tuple[{', '.join(describe(item) for item in kind.items)}]"
         case Items():
             return f"list[{describe(kind.item)}] of at most {kind.capacity}"
-        case Values():
-            return "tuple[float, ...]"
         case Store():
             return f"self.{kind.attribute}"
 
@@ -137,18 +139,19 @@ class KindNames:
     """The names of tuples and lists in C: those of the source's aliases, else made from the items.
 
     Args:
-        paired: floats are pairs of a value and its derivative.
+        plain: the names of plain numbers in the same file; floats are pairs of a value and its derivative here.
     """
 
-    def __init__(self, taken: frozenset[str] = frozenset(), paired: bool = False) -> None:
+    def __init__(self, taken: frozenset[str] = frozenset(), plain: KindNames | None = None) -> None:
         self._taken = taken
-        self._paired = paired
+        self._plain = plain
+        self._paired = plain is not None
         self._names: dict[Kind, str] = {}
         self._order: list[Kind] = []
 
     def suggest(self, kind: Kind, name: str) -> None:
         """Let ``kind`` be called ``name`` unless it has a name or the name is taken."""
-        name = self._unique_name(name)
+        name = kind.title if isinstance(kind, Tuple) and kind.title else self._unique_name(name)
         free = name not in self._names.values() and name not in self._taken
         if isinstance(kind, Tuple | Items) and kind not in self._names and free:
             self._names[kind] = name
@@ -158,10 +161,10 @@ class KindNames:
         match kind:
             case Scalar():
                 return PAIR if self._paired and kind == REAL else kind.c
-            case Values():
-                return "const double *"  # of parameters, which have no derivative
             case Store():
                 return "double *" if kind.attribute == "real" else "int *"
+        if self._plain is not None and isinstance(kind, Tuple) and kind.names:
+            return self._plain.c(kind)
         if kind not in self._order:
             for item in kind.items if isinstance(kind, Tuple) else (kind.item,):
                 self.c(item)
@@ -176,6 +179,8 @@ class KindNames:
     def _make(self, kind: Tuple | Items) -> str:
         if isinstance(kind, Items):
             return f"List_of_{kind.capacity}_{self.c(kind.item)}"
+        if kind.title:
+            return kind.title
         names = [self.c(item) for item in kind.items]
         if kind.uniform:
             return f"{names[0]}_x{len(names)}"
@@ -199,5 +204,5 @@ class KindNames:
 def field_name(kind: Tuple, n: int) -> str:
     """Return the name of the field ``n``, from 0, of a tuple that is not uniform."""
     if kind.names:
-        return kind.names[n]
+        return f"{kind.names[n]}_" if kind.names[n] in KEYWORDS else kind.names[n]
     return ORDINALS[n] if n < len(ORDINALS) else f"item{n + 1}"

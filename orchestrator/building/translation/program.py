@@ -7,15 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from orchestrator.building.translation.definitions import Function, Owner, comment_of
-from orchestrator.building.translation.kinds import KindNames
+from orchestrator.building.translation.kinds import KEYWORDS, KindNames
 from orchestrator.building.translation.source import ModuleSource, docstring, read_source
 from orchestrator.errors import FmuError
 
-_KEYWORDS = (
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true "
-    "false self fault"
-)
 # Names that the headers of the C library take at file scope.
 _TAKEN = (
     "abs acos asin atan atan2 ceil copysign cos cosh div erf erfc exit exp fabs floor fmax fmin fmod free frexp gamma "
@@ -23,7 +18,7 @@ _TAKEN = (
     "remainder remove rename rint round sin sinh sqrt system tan tanh tgamma time trunc y0 y1 yn clock signal index "
     "EOF NULL NAN INFINITY DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE"
 )
-RESERVED = frozenset(_KEYWORDS.split())
+RESERVED = KEYWORDS | {"self", "fault"}
 TAKEN = RESERVED | frozenset(_TAKEN.split())
 
 Translator = Callable[["Program", ModuleSource, ast.FunctionDef, str, Owner | None], Function]
@@ -50,7 +45,7 @@ class Program:
         self._translate = translate
         self._taken = TAKEN | taken
         self.paired = neighbours is not None
-        self.names = KindNames(self._taken, self.paired)
+        self.names: KindNames = KindNames(self._taken, None if neighbours is None else neighbours.names)
         self.owner = owner
         self.owner_name = owner.cls.__name__ if owner is not None else ""
         self._functions: dict[tuple[str, str], Function] = {}
@@ -58,7 +53,6 @@ class Program:
         self._constants: dict[str, float | int] = {} if neighbours is None else dict(neighbours._constants)
         self._shared = frozenset(self._constants)
         self._sources: dict[str, ModuleSource] = {}
-        self._largest_index = -1
 
     # Names --------------------------------------------------------------------------------------------------
 
@@ -143,21 +137,6 @@ class Program:
             for name, kind in source.aliases():
                 self.names.suggest(kind, name)
         return source
-
-    # Lengths of `tuple[float, ...]` -----------------------------------------------------------------------------
-
-    def note_index(self, index: int) -> None:
-        """Note that an item of a flat tuple of unknown length is read, by its index from 0."""
-        self._largest_index = max(self._largest_index, index)
-
-    def note_values(self, length: int) -> None:
-        """Note that a tuple of this length is handed on as one of unknown length."""
-        self._shortest = min(getattr(self, "_shortest", length), length)
-
-    def check_lengths(self) -> None:
-        """Refuse a program that could read beyond a flat tuple."""
-        if self._largest_index >= getattr(self, "_shortest", self._largest_index + 1):
-            raise FmuError(f"item {self._largest_index} of a tuple of {self._shortest} floats must not be read, but is")
 
     # Text -----------------------------------------------------------------------------------------------------
 

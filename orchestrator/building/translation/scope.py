@@ -16,7 +16,6 @@ from orchestrator.building.translation.kinds import (
     Items,
     Kind,
     Tuple,
-    Values,
     describe,
     field_name,
 )
@@ -166,11 +165,6 @@ def convert(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
         return code
     if kind == REAL and code.kind == WHOLE:
         return as_real(scope, code)
-    if kind == Values() and isinstance(code.kind, Tuple) and code.kind.uniform and code.kind.items[0] == REAL:
-        scope.program.note_values(len(code.kind.items))
-        if not code.place:
-            code = scope.hoist(node, code, "values")
-        return Code(f"{member(code)}v", kind)
     if isinstance(kind, Tuple) and isinstance(code.kind, Tuple) and code.kind.items == kind.items:
         return code if code.kind.uniform == kind.uniform else _rename_tuple(scope, node, code, kind)
     return scope.refuse(node, f"a value must be {describe(kind)}, but is {describe(code.kind)}")
@@ -199,6 +193,8 @@ def _rename_tuple(scope: Scope, node: ast.AST, code: Code, kind: Tuple) -> Code:
     assert isinstance(code.kind, Tuple)
     if not code.place:
         code = scope.hoist(node, code, "pair")
+    if scope.program.paired:
+        scope.refuse(node, "a NamedTuple must not be made where derivatives are taken: it holds none")
     parts = ", ".join(item_of(code, n).text for n in range(len(kind.items)))
     return compound(scope, kind, parts)
 
@@ -215,6 +211,13 @@ def item_of(code: Code, n: int) -> Code:
     assert isinstance(code.kind, Tuple)
     field = f"v[{n}]" if code.kind.uniform else field_name(code.kind, n)
     return Code(member(code) + field, code.kind.items[n], place=True)
+
+
+def part_of(scope: Scope, code: Code, n: int) -> Code:
+    """Return :func:`item_of`; one of parameters has no derivative."""
+    item = item_of(code, n)
+    paired = scope.program.paired and isinstance(code.kind, Tuple) and code.kind.names and item.kind == REAL
+    return constant_pair(item.text) if paired else item
 
 
 def member(base: Code) -> str:

@@ -57,7 +57,6 @@ def translate_slave(cls: Any, taken: frozenset[str] = frozenset(), fmi: int = 2)
     if has_states(cls):
         further = _EVENTS | (_FOLLOWING if getattr(cls, "follows_inputs", False) else {})
         hooks.append(_continuous(program, cls, _CONTINUOUS | (further if fmi == 3 else {})))
-    program.check_lengths()
     pairs = directional(program, owner) if hasattr(cls, "response") else None
     struct = _struct(program, owner)
     tables = "\n\n".join((variable_table(cls), _lists(program, owner), _settings(cls, owner, sampled, program), *hooks))

@@ -12,7 +12,7 @@ from orchestrator.building.translation.building_tuples import with_loop
 from orchestrator.building.translation.calls import message
 from orchestrator.building.translation.constants import constant_value, interval
 from orchestrator.building.translation.kinds import NOTHING, WHOLE, Items, Tuple, describe
-from orchestrator.building.translation.scope import PRIMARY, SUM, Code, Scope, item_of, member
+from orchestrator.building.translation.scope import PRIMARY, SUM, Code, Scope, member, part_of
 
 REFUSALS = {"StepRefusedError": "STEP_REFUSED", "ValueError": "VALUE_ERROR"}
 
@@ -252,7 +252,7 @@ class _Fixed(ast.NodeTransformer):
 
 def _item_lines(scope: Scope, node: ast.For, target: ast.expr, value: Code) -> list[str]:
     if isinstance(target, ast.Tuple) and isinstance(value.kind, Tuple):
-        pairs = [(part, item_of(value, n)) for n, part in enumerate(target.elts)]
+        pairs = [(part, part_of(scope, value, n)) for n, part in enumerate(target.elts)]
     else:
         pairs = [(target, value)]
     lines = []

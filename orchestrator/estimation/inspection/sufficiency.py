@@ -14,7 +14,7 @@ from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible, smooth
 from orchestrator.records.record import Record
-from pyfmu_sources.drivetrain_parameters import P_ALPHA, P_I
+from pyfmu_sources.drivetrain_parameters import DrivetrainParameters
 
 SIZES = (5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05)  # rad, half-gaps that are tried
 MOST_ROWS = 3000  # for one bound
@@ -135,10 +135,9 @@ def _other_sign(record: Record, model: Model) -> float:
 
 def _traversals(model: Model, record: Record, size: float) -> int:
     """Return how often the model's plant, driven by the record's torque from rest, goes through a half-gap [rad]."""
-    values = list(model.values)
-    values[P_ALPHA] = size
-    states = simulate(affine_model(tuple(values)), record.u, record.step, np.zeros(5))
-    twist = states[:, 0] / values[P_I] - states[:, 2]
+    p = DrivetrainParameters._make(model.values)._replace(alpha=size)
+    states = simulate(affine_model(p), record.u, record.step, np.zeros(5))
+    twist = states[:, 0] / p.i - states[:, 2]
     flanks = np.where(twist > size, 1, np.where(twist < -size, -1, 0))
     return int(np.count_nonzero(np.diff(flanks[flanks != 0])))
 

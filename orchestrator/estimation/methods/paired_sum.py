@@ -23,7 +23,7 @@ from orchestrator.master.system import SignalSource, System
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import interval_95
-from pyfmu_sources.drivetrain_parameters import P_ALPHA, PARAMETERS
+from pyfmu_sources.drivetrain_parameters import PARAMETERS, DrivetrainParameters
 
 SIZES = (0.0, *(3e-4 * 1.25**n for n in range(34)))  # to half a radian
 
@@ -37,9 +37,8 @@ def estimate(record: Record, model: Model) -> Estimate:
     x0 = np.array([record.theta_m[0], 0.0, record.theta_l[0], 0.0, 0.0])
     runs = [without]
     for alpha in SIZES[1:]:
-        p = list(model.values)
-        p[P_ALPHA] = alpha
-        runs.append(simulate(affine_model(tuple(p)), record.u, record.step, x0)[:, 2])
+        p = DrivetrainParameters._make(model.values)._replace(alpha=alpha)
+        runs.append(simulate(affine_model(p), record.u, record.step, x0)[:, 2])
     sums = np.array([float(np.mean(np.abs(run - without))) for run in runs])
     monotone = np.maximum.accumulate(sums)
     measured = float(np.mean(np.abs(record.theta_l - without)))

@@ -13,6 +13,7 @@ from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD, LEAD, SHIFT
 from orchestrator.shared.cores import cache_once
 from pyfmu_sources import drivetrain_parameters as dt
 from pyfmu_sources.backlash_models import GRADUAL, MODELS
+from pyfmu_sources.bristles import unloaded_l, unloaded_m
 
 Array = NDArray[np.float64]
 
@@ -58,26 +59,30 @@ def _dry() -> tuple[Any, Any]:
     from numba import njit
 
     from orchestrator.plants.compiled import compile_module
+    from orchestrator.plants.sample import named_of
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
     source, bristles, whole = compile_module("equations"), compile_module("bristles"), _whole()
     twist, contact_of, elastic, lever_arm = source.twist, source.contact_of, source.elastic_torque, source.lever_arm
     friction_m, friction_l, rest_m, rest_l = source.friction_m, source.friction_l, bristles.rest_m, bristles.rest_l
-    alpha_at, loaded, wavy = dt.P_ALPHA, (dt.P_LOADED_M, dt.P_LOADED_L), (dt.P_WAVY_M, dt.P_WAVY_L)
+    named = named_of(dt.DrivetrainParameters)
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def friction(x: Any, p: Any) -> Any:
-        full, shaft = whole(x, 0.0), 0.0
-        if p[loaded[0]] + p[loaded[1]] > 0.0:
-            contact = contact_of(twist(full, p), p[alpha_at]) if p[alpha_at] > 0.0 else 1
+    def friction(x: Any, values: Any) -> Any:
+        p, full, shaft = named(values), whole(x, 0.0), 0.0
+        if p.load_dependent_friction_motor_coefficient + p.load_dependent_friction_load_coefficient > 0.0:
+            contact = contact_of(twist(full, p), p.alpha) if p.alpha > 0.0 else 1
             shaft = elastic(full, contact, p)
         return friction_m(full, shaft * lever_arm(full, p), p), friction_l(full, shaft, p)
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def rest_levels(p: Any) -> Any:
+    def rest_levels(values: Any) -> Any:
+        p = named(values)
         at_motor, at_load = rest_m(p), rest_l(p)
-        levels = (at_motor if at_motor > 0.0 else abs(p[wavy[0]]), at_load if at_load > 0.0 else abs(p[wavy[1]]))
-        varies = (p[loaded[0]] != 0.0 or p[wavy[0]] != 0.0, p[loaded[1]] != 0.0 or p[wavy[1]] != 0.0)
+        wavy = (p.periodic_friction_motor_amplitude, p.periodic_friction_load_amplitude)
+        levels = (at_motor if at_motor > 0.0 else abs(wavy[0]), at_load if at_load > 0.0 else abs(wavy[1]))
+        loaded = (p.load_dependent_friction_motor_coefficient, p.load_dependent_friction_load_coefficient)
+        varies = (loaded[0] != 0.0 or wavy[0] != 0.0, loaded[1] != 0.0 or wavy[1] != 0.0)
         return levels, varies
 
     return friction, rest_levels
@@ -88,29 +93,31 @@ def _flanks() -> tuple[Any, Any]:
     from numba import njit
 
     from orchestrator.plants.compiled import compile_module
-    from orchestrator.plants.sample import travel_bound
+    from orchestrator.plants.sample import named_of, travel_bound
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
     source, whole = compile_module("equations"), _whole()
     twist, twist_slope = source.twist, source.twist_slope
-    alpha_at, onset_at, stops, far = dt.P_ALPHA, dt.COUNT + 2, (dt.P_STOP_LOWER, dt.P_STOP_UPPER), dt.BIG
+    named, onset_at, far = named_of(dt.DrivetrainParameters), dt.COUNT + 2, dt.BIG
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def flanks(p: Any) -> Any:
-        return p[alpha_at] > 0.0 or p[stops[0]] > -far or p[stops[1]] < far
+    def flanks(values: Any) -> Any:
+        p = named(values)
+        return p.alpha > 0.0 or p.end_stop_lower > -far or p.end_stop_upper < far
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
+    def meets(x: Any, rate: Any, values: Any, h: float) -> Any:
+        p = named(values)
         way = travel_bound(x[3], rate[3], h)
-        if abs(x[2] - p[stops[0]]) < way or abs(x[2] - p[stops[1]]) < way:
+        if abs(x[2] - p.end_stop_lower) < way or abs(x[2] - p.end_stop_upper) < way:
             return True
-        if p[alpha_at] == 0.0:
+        if p.alpha == 0.0:
             return False
         full = whole(x, 0.0)
         slope = twist_slope(full, p)
-        depth = abs(twist(full, p)) - p[alpha_at]
+        depth = abs(twist(full, p)) - p.alpha
         way = travel_bound(x[1] * slope - x[3], rate[1] * slope - rate[3], h)
-        return -way < depth < way + SETTING_IN * math.exp(p[onset_at])
+        return -way < depth < way + SETTING_IN * math.exp(values[onset_at])
 
     return flanks, meets
 
@@ -119,27 +126,27 @@ def _flanks() -> tuple[Any, Any]:
 def _stage() -> CompiledEquations:
     """Return the compiled equations, with the damping of teeth that meet growing with their penetration."""
     from orchestrator.plants.compiled import compile_module
+    from orchestrator.plants.sample import named_of
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 
     source, whole = compile_module("equations"), _whole()
     rates, twist, contact_of = source.rates, source.twist, source.contact_of
     twist_rate, lever_arm = source.twist_rate, source.lever_arm
-    alpha_at, end, set_in_at, lag_at = dt.P_ALPHA, dt.COUNT, dt.P_ONSET, dt.P_TAU
-    damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
+    named, end, onset_at = named_of(dt.DrivetrainParameters), dt.COUNT, dt.COUNT + 2
     friction, rest = _dry()
 
     @njit_on_disk(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def smooth_stage(x: Any, signs: Any, p: Any, u: float) -> Any:
-        full = whole(x, u)
+    def smooth_stage(x: Any, signs: Any, values: Any, u: float) -> Any:
+        p, full = named(values), whole(x, u)
         angle = twist(full, p)
-        contact = contact_of(angle, p[alpha_at]) if p[alpha_at] > 0.0 else 1
+        contact = contact_of(angle, p.alpha) if p.alpha > 0.0 else 1
         r = rates(full, contact, signs[0], signs[1], p, u, 0.0)
         motor, load = 0.0, 0.0
-        if p[alpha_at] > 0.0 and contact != 0 and p[set_in_at] == 0.0:
-            depth = abs(angle) - p[alpha_at]
-            lacking = p[damping_at] * twist_rate(full, p) * math.exp(-depth / math.exp(p[onset_at]))
-            motor, load = lacking * lever_arm(full, p) / p[motor_at], lacking / p[load_at]
-        lag = (u - x[4]) / p[lag_at]
+        if p.alpha > 0.0 and contact != 0 and p.impact_damping_depth == 0.0:
+            depth = abs(angle) - p.alpha
+            lacking = p.c * twist_rate(full, p) * math.exp(-depth / math.exp(values[onset_at]))
+            motor, load = lacking * lever_arm(full, p) / p.J_m, lacking / p.J_l
+        lag = (u - x[4]) / p.tau
         return (r[0], r[1] + motor, r[2], r[3] - load, lag, r[5], r[6], r[10])
 
     return CompiledEquations(friction, smooth_stage, (end, end + 1), rest, *_flanks())
@@ -149,20 +156,25 @@ def _stage() -> CompiledEquations:
 def _runner() -> Any:
     """Return the compiled, event-located simulation."""
     from orchestrator.plants.compiled import compile_module
+    from orchestrator.plants.sample import record_of
     from orchestrator.shared.numba_cache import njit_on_disk
 
     source = compile_module("drivetrain")
-    advance, initial_mode, prepare, consistent = (
-        source.advance, source.initial_mode, source.prepare, source.consistent_start,
+    advance, initial_mode, step_table, consistent, has_nonlinear_effect = (
+        source.advance, source.initial_mode, source.step_table, source.consistent_start, source.has_nonlinear_effect,
     )  # fmt: skip
 
     @njit_on_disk(nogil=True)
-    def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
+    def run_by_name(
+        start: Any, values: Array, p: Any, early: Array, late: Array, first: float, h: float, out: Array
+    ) -> None:
         x = consistent((start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0), p)
         x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], start[7], start[8])
         mode = initial_mode(x, p)
-        whole = prepare(p, h)
-        before, after = prepare(p, max(first, 1e-9)), prepare(p, max(h - first, 1e-9))
+        nonlinear = has_nonlinear_effect(values)
+        whole = step_table(p, h, nonlinear)
+        before = step_table(p, max(first, 1e-9), nonlinear)
+        after = step_table(p, max(h - first, 1e-9), nonlinear)
         for n in range(out.shape[0]):
             out[n, 0], out[n, 1] = x[0], x[2]
             if first <= 1e-9:
@@ -170,6 +182,10 @@ def _runner() -> Any:
             else:
                 x, mode = advance(x, mode, p, early[n], 0.0, first, before)
                 x, mode = advance(x, mode, p, late[n], 0.0, h - first, after)
+
+    def run(start: Any, values: Array, early: Array, late: Array, first: float, h: float, out: Array) -> None:
+        p = record_of(dt.DrivetrainParameters, values)
+        run_by_name(start, values, p, early, late, first, h, out)
 
     return run
 
@@ -180,15 +196,14 @@ def fmu_parameters(p: Array) -> Array:
     Args:
         p: the parameters of the analysis, (n,).
     """
-    own = np.array(p[: dt.COUNT], dtype=float)
-    motor = own[dt.P_COULOMB_M] + own[dt.P_STRIBECK_M] + own[dt.P_BREAKAWAY_M]
-    load = own[dt.P_COULOMB_L] + own[dt.P_STRIBECK_L] + own[dt.P_BREAKAWAY_L]
-    gap = own[dt.P_ALPHA] if int(own[dt.P_MODEL]) in GRADUAL else 0.0
-    places = (dt.P_PRESLIDING_M, dt.P_PRESLIDING_L, dt.P_ONSET)
-    for place, on, fitted in zip(places, (motor, load, gap), p[dt.COUNT : dt.COUNT + len(places)], strict=True):
+    own = dt.DrivetrainParameters._make(p[: dt.COUNT])
+    gap = own.alpha if int(own.backlash_model) in GRADUAL else 0.0
+    ons = (unloaded_m(own), unloaded_l(own), gap)
+    fields = ("presliding_motor_distance", "presliding_load_distance", "impact_damping_depth")
+    for field, on, fitted in zip(fields, ons, p[dt.COUNT : dt.COUNT + len(fields)], strict=True):
         if on > 0.0:
-            own[place] = build_up_distance(own[place], float(fitted))
-    return own
+            own = own._replace(**{field: build_up_distance(getattr(own, field), float(fitted))})
+    return np.array(own)
 
 
 PLANT = Plant(

@@ -10,6 +10,7 @@ from orchestrator.plants.description import Body, CompiledEquations, Drive, Plan
 from orchestrator.plants.measurement import EARLY_TORQUE, LEAD
 from orchestrator.shared.cores import cache_once
 from pyfmu_sources import servo_axis_parameters as ap
+from pyfmu_sources.axis_equations import rest
 
 Array = NDArray[np.float64]
 
@@ -29,34 +30,36 @@ def stage() -> CompiledEquations:
     from numba import njit
 
     from orchestrator.plants.compiled import compile_module
-    from orchestrator.plants.sample import travel_bound
+    from orchestrator.plants.sample import named_of, travel_bound
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 
     source = compile_module("servo_axis")
     rates, level, breakaway = source.rates, source.friction, compile_module("axis_equations").rest
-    end, wavy, stops, far = ap.COUNT, ap.P_WAVY, (ap.P_STOP_LOWER, ap.P_STOP_UPPER), ap.BIG
+    named, end, far = named_of(ap.AxisParameters), ap.COUNT, ap.BIG
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def friction(x: Any, p: Any) -> Any:
-        return level((x[0], x[1], x[4], 0.0, 0.0), p), 0.0
+    def friction(x: Any, values: Any) -> Any:
+        return level((x[0], x[1], x[4], 0.0, 0.0), named(values)), 0.0
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def rest_levels(p: Any) -> Any:
-        at_rest = breakaway(p)
-        return (at_rest if at_rest > 0.0 else abs(p[wavy]), 0.0), (p[wavy] != 0.0, False)
+    def rest_levels(values: Any) -> Any:
+        p = named(values)
+        at_rest, wavy = breakaway(p), p.periodic_friction_motor_amplitude
+        return (at_rest if at_rest > 0.0 else abs(wavy), 0.0), (wavy != 0.0, False)
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def flanks(p: Any) -> Any:
-        return p[stops[0]] > -far or p[stops[1]] < far
+    def flanks(values: Any) -> Any:
+        p = named(values)
+        return p.end_stop_lower > -far or p.end_stop_upper < far
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
-        way = travel_bound(x[1], rate[1], h)
-        return abs(x[0] - p[stops[0]]) < way or abs(x[0] - p[stops[1]]) < way
+    def meets(x: Any, rate: Any, values: Any, h: float) -> Any:
+        p, way = named(values), travel_bound(x[1], rate[1], h)
+        return abs(x[0] - p.end_stop_lower) < way or abs(x[0] - p.end_stop_upper) < way
 
     @njit_on_disk(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def smooth_stage(x: Any, signs: Any, p: Any, u: float) -> Any:
-        speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
+    def smooth_stage(x: Any, signs: Any, values: Any, u: float) -> Any:
+        speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], named(values), u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
 
     return CompiledEquations(friction, smooth_stage, (end, end), rest_levels, flanks, meets)
@@ -66,13 +69,14 @@ def stage() -> CompiledEquations:
 def runner() -> Any:
     """Return the compiled, event-located simulation."""
     from orchestrator.plants.compiled import compile_module
+    from orchestrator.plants.sample import record_of
     from orchestrator.shared.numba_cache import njit_on_disk
 
     source = compile_module("servo_axis")
     advance, initial_mode, begin = source.advance, source.initial_mode, source.start
 
     @njit_on_disk(nogil=True)
-    def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
+    def run_by_name(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = begin(start[0], start[1], start[4], p)
         x = (x[0], x[1], x[2], x[3], start[8])
         mode = initial_mode(x, p, early[0])
@@ -82,15 +86,19 @@ def runner() -> Any:
                 x, mode = advance(x, mode, p, early[n], 0.0, first)
             x, mode = advance(x, mode, p, late[n], 0.0, h - first)
 
+    def run(start: Any, values: Array, early: Array, late: Array, first: float, h: float, out: Array) -> None:
+        run_by_name(start, record_of(ap.AxisParameters, values), early, late, first, h, out)
+
     return run
 
 
 def _fmu_parameters(p: Array) -> Array:
     """Return the FMU's own parameters of a model (n,): the fitted distance of friction included."""
-    own = np.array(p[: ap.COUNT], dtype=float)
-    if own[ap.P_COULOMB] + own[ap.P_STRIBECK] + own[ap.P_BREAKAWAY] > 0.0:
-        own[ap.P_PRESLIDING] = build_up_distance(own[ap.P_PRESLIDING], float(p[ap.COUNT]))
-    return own
+    own = ap.AxisParameters._make(p[: ap.COUNT])
+    if rest(own) > 0.0:
+        distance = build_up_distance(own.presliding_motor_distance, float(p[ap.COUNT]))
+        own = own._replace(presliding_motor_distance=distance)
+    return np.array(own)
 
 
 PLANT = Plant(
