@@ -7,6 +7,7 @@ from typing import TypeVar
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.experiment import BACKLASH_MODELS, EXPERIMENTS, Experiment, experiment_of
 from orchestrator.paired.pair import with_settings
+from orchestrator.shared.numbers import exact_text
 from orchestrator.shared.settings import Settings, read_settings
 
 S = TypeVar("S", bound=Settings)
@@ -35,7 +36,9 @@ def not_negative(name: str, value: float) -> float:
 def within(name: str, value: float, least: float, most: float) -> float:
     """Return ``value``, a number that must lie between two bounds."""
     if not least <= value <= most:
-        raise ScenarioError(f"`{name}` must be between {least:g} and {most:g}, but is {value:g}", name)
+        raise ScenarioError(
+            f"`{name}` must be between {exact_text(least)} and {exact_text(most)}, but is {value:g}", name
+        )
     return value
 
 

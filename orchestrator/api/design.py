@@ -1,6 +1,7 @@
 """The excitation that would show a gap."""
 
 import csv
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -137,8 +138,8 @@ def check_design(
     own = natural_frequency(model)
     if rate * LONGEST_STEP < own:
         raise ScenarioError(
-            f"`rate` must be at least {own / LONGEST_STEP:.3g} to show a shaft that oscillates at {own:.3g} rad/s, "
-            f"but is {rate:g}",
+            f"`rate` must be at least {math.ceil(own / LONGEST_STEP)} to show a shaft that oscillates at {own:.3g} "
+            f"rad/s, but is {rate:g}",
             "rate",
         )
 

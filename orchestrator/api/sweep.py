@@ -24,6 +24,7 @@ from orchestrator.paired.pair import run_pair, with_settings
 from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sweep import OWN_PARAMETERS, SweepArrays, SweepPlan, gather, sweep_work
 from orchestrator.scenarios.sweep import check_parameters
+from orchestrator.shared.numbers import exact_text
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import CalibrationFound, ErrorsFound, SweepFound
 from orchestrator.shared.settings import as_tables
@@ -229,7 +230,7 @@ def sweep(
     calibrations = plan.calibrations(tell, calibrated)
     done = options.run(cases, sweep_work(plan, fmus, calibrations))
     given: dict[str, object] = {"experiment": chosen.name, "backlash_model": chosen.backlash_model, "sizes": text}
-    given |= {"noise": ",".join(f"{level:g}" for level in levels), "seeds": seeds, "vary": list(words)}
+    given |= {"noise": ",".join(exact_text(level) for level in levels), "seeds": seeds, "vary": list(words)}
     return SweepResult(plan, cases, done, fmus, calibrations, options.parquet, given, builds.kind)
 
 
@@ -242,7 +243,7 @@ def _ready(experiment: Experiment) -> None:
 def _levels(noise: float | Sequence[float]) -> tuple[float, ...]:
     levels = tuple(float(level) for level in (noise if isinstance(noise, Sequence) else (noise,)))
     if len(set(levels)) != len(levels):
-        listed = ",".join(f"{level:g}" for level in levels)
+        listed = ",".join(exact_text(level) for level in levels)
         raise ScenarioError(f"`noise` must name each level once, but is {listed!r}", "noise")
     return levels
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from orchestrator.checking.description import DescribedVariable, Description, number
 from orchestrator.checking.findings import Finding
+from orchestrator.shared.numbers import exact_text
 
 _PERIODIC = ("constant", "fixed", "tunable")
 
@@ -130,7 +131,8 @@ def _fraction(v: DescribedVariable, kind: str, length: float | None) -> Iterator
     elif shift and counter is None:
         wrong = "shiftCounter needs intervalCounter"
     elif counter and resolution and length and abs(counter / resolution - length) > 1e-6 * length:
-        wrong = f"intervalCounter / resolution must be intervalDecimal = {length:g}, but is {counter / resolution:g}"
+        ratio = counter / resolution
+        wrong = f"intervalCounter / resolution must be intervalDecimal = {exact_text(length)}, but is {ratio:g}"
     if wrong:
         yield Finding("clock.fraction", v.path(), f"{wrong} (clock `{v.name}`)")
 

@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from orchestrator.checking.description import DescribedVariable, Description, SimpleType, integer, number
 from orchestrator.checking.dialects import NUMERIC, REAL, VARIABILITIES, FmiDialect
 from orchestrator.checking.findings import Finding
+from orchestrator.shared.numbers import exact_text
 
 # EBNF of section 2.2.9.
 _Q_CHAR = r"[A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]"
@@ -136,9 +137,8 @@ def _bounds(v: DescribedVariable) -> Iterator[Finding]:
         message = f"min of `{v.name}` must be at most max, but {low:g} > {high:g}"
         yield Finding("variable.bounds", v.path("min"), message)
     elif start is not None:
-        message = (
-            f"start of `{v.name}` must lie in [{_or(low, -math.inf):g}, {_or(high, math.inf):g}], but is {start:g}"
-        )
+        least, most = exact_text(_or(low, -math.inf)), exact_text(_or(high, math.inf))
+        message = f"start of `{v.name}` must lie in [{least}, {most}], but is {start:g}"
         yield Finding("variable.start-range", v.path("start"), message)
     nominal = v.number("nominal")
     if nominal is not None and not nominal > 0:
@@ -173,7 +173,9 @@ def _check_declared_type(types: Mapping[str, SimpleType], v: DescribedVariable) 
         outer = number(declared.attributes.get(attribute), "Real")
         inner = number(v.own.get(attribute), "Real")
         if outer is not None and inner is not None and sign * inner < sign * outer:
-            message = f"{attribute} of `{v.name}` must not widen that of `{name}` ({outer:g}), but is {inner:g}"
+            message = (
+                f"{attribute} of `{v.name}` must not widen that of `{name}` ({exact_text(outer)}), but is {inner:g}"
+            )
             yield Finding("variable.bounds-exceed-type", v.path(attribute), message)
 
 

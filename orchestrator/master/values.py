@@ -4,6 +4,7 @@ import difflib
 import math
 
 from orchestrator.master.protocol import Value, Variable
+from orchestrator.shared.numbers import exact_text
 
 _INT32 = -(2**31), 2**31 - 1
 """Whole numbers that every type of them can hold, save for those that a variable's limits say are longer."""
@@ -46,12 +47,13 @@ def coerce_value(variable: Variable, value: Value) -> tuple[Value | None, str | 
         return None, f"must be {need}, but is {_short(value)}"
     assert not isinstance(value, str)
     if (low is not None and value < low) or (high is not None and value > high):
+        bounds = [None if bound is None else exact_text(bound) for bound in (low, high)]
         text = (
-            f"must be at least {low:g}"
+            f"must be at least {bounds[0]}"
             if high is None
-            else f"must be at most {high:g}"
+            else f"must be at most {bounds[1]}"
             if low is None
-            else f"must lie in [{low:g}, {high:g}]"
+            else f"must lie in [{bounds[0]}, {bounds[1]}]"
         )
         return None, f"{text}, but is {value!r}"
     return (float(value) if kind == "Real" else int(value)), None

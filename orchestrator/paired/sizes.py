@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from orchestrator.engine.grid import MAX_CASES
 from orchestrator.errors import CalibrationError, ScenarioError
 from orchestrator.paired.experiment import Experiment
+from orchestrator.shared.numbers import exact_text
 
 THESIS_RANGE = (1.2, 4.8)
 RANGES = ("range", "logrange")
@@ -69,8 +70,9 @@ def _require(alpha: float, experiment: Experiment) -> None:
     if not (math.isfinite(alpha) and alpha > 0.0):
         raise ScenarioError(f"`sizes` must be finite and positive, but one is {alpha:g}", "sizes")
     if not experiment.smallest <= alpha <= experiment.largest:
+        low, high = exact_text(experiment.smallest), exact_text(experiment.largest)
         raise CalibrationError(
-            f"`sizes` must lie within the calibrated {experiment.smallest:g} to {experiment.largest:g} rad of the "
-            f"{experiment.name} experiment, but one is {alpha:g}",
+            f"`sizes` must lie within the calibrated {low} to {high} rad of the {experiment.name} experiment, but one "
+            f"is {alpha:g}",
             "sizes",
         )

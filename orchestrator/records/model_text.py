@@ -5,8 +5,7 @@ from dataclasses import fields
 
 from orchestrator.records.columns import Column
 from orchestrator.records.model_file import Encoder
-
-LARGEST_WHOLE = 1e15  # number that is written without a point
+from orchestrator.shared.numbers import exact_text
 
 
 def entry_texts(entry: Column | Encoder) -> dict[str, str]:
@@ -19,5 +18,4 @@ def toml_text(value: str | float) -> str:
     """Return a text or a number as TOML, from which exactly that is read again."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    number = float(value)
-    return str(int(number)) if number.is_integer() and abs(number) < LARGEST_WHOLE else repr(number)
+    return exact_text(value)

@@ -11,6 +11,7 @@ from typing import Any
 from orchestrator.checking.probing.driver import MOST_ITERATIONS, Driver
 from orchestrator.checking.probing.job import ProbedClock
 from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
+from orchestrator.shared.numbers import exact_text
 
 _NOT_YET_KNOWN, _UNCHANGED, _CHANGED = range(3)
 _SMALL = 1e-9
@@ -86,7 +87,7 @@ class EventDriver(Driver):
                 break
             found = values[0][0]
             if abs(found - clock.interval) > 1e-6 * clock.interval:
-                wrong.append(f"the interval of `{clock.name}` must be {clock.interval:g}, but is {found:g}")
+                wrong.append(f"the interval of `{clock.name}` must be {exact_text(clock.interval)}, but is {found:g}")
         return wrong
 
     def _shift(self, clock: ProbedClock) -> float:
