@@ -27,6 +27,9 @@ class Record:
         source: file name or description, for messages and plots.
         further: other columns that were asked for by name, (n,) each.
         u_deviation: (n,) standard deviation of ``u`` where it is interpolated [N.m], 0.0 elsewhere; None: nowhere.
+        u_sampled: (n,) N.m, what ``u`` would be were its own rows samples of a smooth signal; None: they are not rarer
+            than these.
+        u_raster: step of the torque's own rows [s], where ``u_sampled`` is there; else 0.0.
         u_scale_uncertainty: by what share the scale of ``u`` may be off at most.
         timing: what the time stamps said, or None.
         notes: what was detected and assumed, one sentence each.
@@ -44,6 +47,8 @@ class Record:
     timing: Timing | None = None
     notes: tuple[str, ...] = ()
     averaged: int = 1
+    u_sampled: Array | None = None
+    u_raster: float = 0.0
 
     @property
     def size(self) -> int:
@@ -99,6 +104,7 @@ class Record:
             theta_l=None if self.theta_l is None else self.theta_l[rows],
             further={name: values[rows] for name, values in self.further.items()},
             u_deviation=None if self.u_deviation is None else self.u_deviation[rows],
+            u_sampled=None if self.u_sampled is None else self.u_sampled[rows],
         )
 
     def without_load_encoder(self) -> "Record":

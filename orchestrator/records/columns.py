@@ -3,7 +3,6 @@
 In all functions: ``values``: (n,), in the unit of the file.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +16,6 @@ __all__ = ["COLUMNS", "KINDS", "SI", "Array", "Column"]
 Array = NDArray[np.float64]
 COLUMNS = ("time", "u", "theta_m", "theta_l")
 OPTIONAL = ("theta_l",)
-# Ranges of counters of time, in the numbers of a file.
-COUNTERS = (60.0, 3600.0, 86400.0, *(10.0**n for n in range(2, 10)), *(2.0**n for n in range(8, 33)))
 MEANINGS = {
     "time": "the time",
     "u": "the torque that the drive was asked for",
@@ -60,6 +57,7 @@ class Column:
         inductance: of the winding [H], for ``V``; None: none.
         relative_uncertainty: of the scale of ``u``, as a share: of the torque constant, for instance.
         modulo: value at which the file's numbers start again from zero [unit]; None: they do not.
+        sign_bit: what the file's numbers have in addition where they are negative, such as 32768; None: nothing.
         rate: samples per second, where the time is a sample number.
     """
 
@@ -75,6 +73,7 @@ class Column:
     inductance: float | None = None
     relative_uncertainty: float = 0.0
     modulo: float | None = None
+    sign_bit: float | None = None
     rate: float | None = None
 
 
@@ -127,73 +126,3 @@ def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, sou
             "(`model`)"
         )
     return unit.factor * factor
-
-
-def unwrap(values: Array, column: Column) -> Array:
-    """Return values that go on where the file's start again from zero after ``column.modulo``."""
-    if column.modulo is None:
-        return values
-    good = np.isfinite(values)
-    out = values.copy()
-    out[good] = np.unwrap(values[good], period=column.modulo)
-    return out
-
-
-def check_wraps(values: Array, name: str, label: str, source: str) -> None:
-    """Refuse an angle that starts again at an end of its range."""
-    finite = np.isfinite(values)
-    good = values if finite.all() else values[finite]
-    steps = np.diff(good)
-    span = float(np.ptp(good)) if steps.size else 0.0
-    far = np.abs(steps) > 0.8 * span
-    if span <= 0.0 or not far.any():
-        return
-    usual = float(np.quantile(np.abs(steps[~far]), 0.999)) if np.any(~far) else span
-    # An angle that wraps leaves one end of its range and comes in at the other.
-    ends = np.minimum(good - good.min(), good.max() - good)
-    at_ends = np.maximum(ends[:-1], ends[1:])[far] <= 2.0 * usual
-    if np.mean(far) < 0.05 and usual < 0.25 * span and np.all(at_ends):
-        guess = _round_turn(span + usual)
-        raise RecordError(
-            f"{source}: column `{label}` must go on over a full turn, but jumps by {np.abs(steps[far]).max():.6g} at "
-            f"row {int(np.flatnonzero(np.abs(np.diff(values)) > 0.8 * span)[0]) + 2}: say `[columns.{name}] modulo = "
-            f"{guess:g}` in the model file (`model`)"
-        )
-
-
-def unwrap_time(values: Array, column: Column, label: str, source: str) -> Array:
-    """Return times that go on where a counter overflows, after ``column.modulo``; refuse those that seem to.
-
-    Args:
-        values: (n,), in the numbers of the file.
-    """
-    if column.modulo is None and not np.any(np.diff(values) < 0.0) and np.isfinite(values).all():
-        return values
-    rows = np.flatnonzero(np.isfinite(values))
-    good = values[rows]
-    steps = np.diff(good)
-    if column.modulo is not None:
-        out = values.copy()
-        out[rows[1:]] = good[:1] + np.cumsum(np.mod(steps, column.modulo))
-        return out
-    fallen = np.flatnonzero(steps < 0.0)
-    if not fallen.size or fallen.size > 0.1 * steps.size:
-        return values
-    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    high, low = float(good.max()), float(good.min())
-    for size in COUNTERS:
-        if abs(high + usual - size) <= 1.5 * usual and low < 2.0 * usual and np.all(good[fallen] > high - 2.0 * usual):
-            raise RecordError(
-                f"{source}: row {int(rows[fallen[0] + 1]) + 1}, column `{label}` must increase, but begins again at "
-                f"{good[fallen[0] + 1]:g} after {good[fallen[0]]:g}: where a counter overflows, say `[columns.time] "
-                f"modulo = {size:g}` in the model file (`model`); of two runs keep one by `part` START:END"
-            )
-    return values
-
-
-def _round_turn(span: float) -> float:
-    """Return the likely range of an angle that wraps: a full turn, a power of two, or the range itself."""
-    for known in (TURN, 360.0, 1.0, 400.0, *(2.0**n for n in range(8, 33))):
-        if 0.9 * known < span < 1.1 * known:
-            return known
-    return float(f"{span:.3g}") if math.isfinite(span) else span

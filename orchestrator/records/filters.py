@@ -38,8 +38,11 @@ def decimate(record: Record, rate: float) -> Record:
             f"{record.source}: `rate` must leave at least {MINIMUM_ROWS} rows, but {rate:g} Hz leaves {centres.size}"
             ": ask for a higher rate"
         )
-    held = np.convolve(interpolate_missing(record.u), taps, "same")
-    held = np.convolve(held, np.ones(factor) / factor, "full")[factor - 1 :][: record.size]
+
+    def held(torque: Array) -> Array:
+        low = np.convolve(interpolate_missing(torque), taps, "same")
+        return np.convolve(low, np.ones(factor) / factor, "full")[factor - 1 :][: record.size][centres]
+
     columns = {
         name: None if values is None else _at(values, taps, centres)
         for name, values in (("theta_m", record.theta_m), ("theta_l", record.theta_l))
@@ -55,7 +58,8 @@ def decimate(record: Record, rate: float) -> Record:
     return replace(
         record,
         time=record.time[centres],
-        u=held[centres],
+        u=held(record.u),
+        u_sampled=None if record.u_sampled is None else held(record.u_sampled),
         theta_m=columns["theta_m"],
         theta_l=columns["theta_l"],
         further={name: _at(values, taps, centres) for name, values in record.further.items()},

@@ -1,8 +1,7 @@
 """From an opened file to the columns of a record in SI: which channels, which units, which time."""
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +15,18 @@ from orchestrator.records.columns import (
     SI,
     Array,
     Column,
-    check_wraps,
     scale_of,
     unit_of,
-    unwrap,
-    unwrap_time,
 )
+from orchestrator.records.counters import check_sign, check_wraps, decode_sign, unwrap, unwrap_time
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, choose
+from orchestrator.records.rasters import bring_to_motor, make_uniform
+from orchestrator.records.requests import SAMPLED
 from orchestrator.records.stamps import seconds_of
-from orchestrator.records.timing import interpolate, interpolation_cost, resample_grid
 from orchestrator.records.units import parse_unit
+from orchestrator.shared.numbers import exact_text
 
 
 @dataclass(frozen=True)
@@ -51,11 +50,36 @@ class Reading:
 
 @dataclass(frozen=True)
 class Loaded:
-    """Columns in SI by name, their names in the file, and what was detected and assumed."""
+    """What was read.
+
+    Attributes:
+        table: columns in SI by name; ``SAMPLED``: the torque as a sampled signal, where it has rows of its own.
+        labels: their names in the file.
+        notes: what was detected and assumed.
+        torque_raster: step of the torque's own rows [s], where they are rarer than the angles'; else 0.0.
+    """
 
     table: dict[str, Array]
     labels: dict[str, str]
     notes: tuple[str, ...]
+    torque_raster: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Clock:
+    """The time of the motor's rows.
+
+    Attributes:
+        time: (n,) [s].
+        spoken: words that say what it was.
+        factor: seconds in the file's numbers; None: it was not made from these.
+        start: what the file says at 0 s.
+    """
+
+    time: Array
+    spoken: str
+    factor: float | None = None
+    start: float = 0.0
 
 
 def load(
@@ -71,9 +95,8 @@ def load(
     places = sorted({choice.place for choice in chosen.values()} | set(extra.values()))
     labels = {name: source.heads[c.place].full or source.heads[c.place].name for name, c in chosen.items()}
     labels.setdefault("time", "time")
-    values, time, spoken = _in_part(
-        source, places, chosen, columns.get("time", Column()), labels["time"], path, reading
-    )
+    values, clock = _in_part(source, places, chosen, columns.get("time", Column()), labels["time"], path, reading)
+    time = clock.time
     shared = set(extra.values())
 
     def take(place: int) -> Array:
@@ -84,7 +107,7 @@ def load(
         values.pop(chosen["time"].place, None)
     table: dict[str, Array] = {"time": time}
     notes = [source.dialect, *(choice.assumed for choice in chosen.values() if choice.assumed)]
-    units = [spoken]
+    units = [clock.spoken]
     for name in COLUMNS[1:]:
         if name in chosen:
             written = source.heads[chosen[name].place].unit
@@ -92,19 +115,26 @@ def load(
             table[name], said = _convert(name, raw, columns.get(name, Column()), written, labels[name], path, time)
             units.append(said)
     table |= {name: values[place].astype(float) for name, place in extra.items() if name not in table}
-    table, more = _same_rows(table, source, chosen, extra, path, reading)
+
+    def own_time(place: int) -> Array:
+        return _time_alike(source, place, columns.get("time", Column()), clock, labels["u"], path)
+
+    at = {name: choice.place for name, choice in chosen.items()} | extra
+    table, raster, more = bring_to_motor(table, at, source, path, reading.resample, own_time)
     notes += [", ".join(units), *more]
     drive = columns.get("u", Column())
     unit = None
     if "u" in chosen:
         unit = parse_unit(drive.unit or source.heads[chosen["u"].place].unit, KINDS["u"])
     if unit is not None and unit.kind == "voltage":
-        table["u"] = torque_of_voltage(table["u"], table["theta_m"], table["time"], drive)
+        for name in ("u", SAMPLED):
+            if name in table:
+                table[name] = torque_of_voltage(table[name], table["theta_m"], table["time"], drive)
         notes.append("torque from the voltage, the winding's resistance and the motor's speed")
     if "u" not in chosen:
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
-    table, more = _resample(table, reading)
-    return Loaded(table, labels, (*notes, *more))
+    table, more = make_uniform(table, reading.resample)
+    return Loaded(table, labels, (*notes, *more), raster)
 
 
 def _in_part(
@@ -115,21 +145,22 @@ def _in_part(
     label: str,
     path: Path,
     reading: Reading,
-) -> tuple[dict[int, NDArray[Any]], Array, str]:
-    """Return the channels, the time [s] and the words for it; of a part nothing outside is looked at but the time."""
+) -> tuple[dict[int, NDArray[Any]], "_Clock"]:
+    """Return the channels and their time; of a part nothing outside is looked at but the time."""
     raster = source.heads[chosen["theta_m"].place].raster
     if reading.part is not None and "time" in chosen:
         place = chosen["time"].place
-        time, spoken = _time(source, chosen, {place: source.times(place)}, column, label, path, 0, False)
-        rows = _rows_of(time, reading.part, path)
-        return dict(zip(places, source.within(rows, raster).load(places), strict=True)), time[rows], spoken
+        clock = _time(source, chosen, {place: source.times(place)}, column, label, path, 0, False)
+        rows = _rows_of(clock.time, reading.part, path)
+        values = dict(zip(places, source.within(rows, raster).load(places), strict=True))
+        return values, replace(clock, time=clock.time[rows])
     values = dict(zip(places, source.load(places), strict=True))
-    time, spoken = _time(source, chosen, values, column, label, path, values[chosen["theta_m"].place].size)
+    clock = _time(source, chosen, values, column, label, path, values[chosen["theta_m"].place].size)
     if reading.part is not None:
-        rows = _rows_of(time, reading.part, path)
-        time = time[rows]
+        rows = _rows_of(clock.time, reading.part, path)
+        clock = replace(clock, time=clock.time[rows])
         values = {n: v[rows] if source.heads[n].raster == raster else v for n, v in values.items()}
-    return values, time, spoken
+    return values, clock
 
 
 def choose_channels(
@@ -163,20 +194,21 @@ def _time(
     path: Path,
     rows: int,
     whole: bool = True,
-) -> tuple[Array, str]:
-    """Return the time [s] and the words that say what it was; ``whole``: nothing of it will be left out."""
+) -> "_Clock":
+    """Return the time; ``whole``: nothing of it will be left out."""
     rate = column.rate if column.rate is not None else source.rate
     if "time" not in chosen:
         assert rate is not None
         _refuse_broken(source, path)
-        return np.arange(rows) / rate, f"time from the row and {rate:g} Hz"
+        return _Clock(np.arange(rows) / rate, f"time from the row and {rate:.12g} Hz")
     choice = chosen["time"]
     raw = values[choice.place]
     if column.rate is not None and not _are_sample_numbers(raw):
         _refuse_broken(source, path)
-        return np.arange(raw.size) / column.rate, f"time from the row and {column.rate:g} Hz, `{label}` not used"
+        spoken = f"time from the row and {column.rate:.12g} Hz, `{label}` not used"
+        return _Clock(np.arange(raw.size) / column.rate, spoken)
     if raw.dtype.kind == "M":
-        return seconds_of(raw, label, path), f"{label} as date and time"
+        return _Clock(seconds_of(raw, label, path), f"{label} as date and time")
     numbers = np.asarray(raw, dtype=float)
     if whole or column.modulo is not None:
         numbers = unwrap_time(numbers, column, label, str(path))
@@ -188,12 +220,23 @@ def _time(
                 f"{path}: column `{label}` is a sample number: say `[columns.time] rate = ...` [Hz] in the model file "
                 "(`model`)"
             )
-        return numbers / rate, f"{label} as sample number at {rate:g} Hz"
+        return _Clock(numbers / rate, f"{label} as sample number at {rate:g} Hz", 1.0 / rate)
     unit = unit_of("time", column, written, label, str(path))
     factor, spoken = (unit.factor, column.unit or written) if unit is not None else _epoch(numbers)
     first = float(numbers[np.isfinite(numbers)][0]) if np.isfinite(numbers).any() else 0.0
     start = first if abs(first * factor) > 1e6 else 0.0
-    return _scale(numbers, factor, -start * factor), f"{label} in {spoken or 's'}"
+    return _Clock(_scale(numbers, factor, -start * factor), f"{label} in {spoken or 's'}", factor, start)
+
+
+def _time_alike(source: RecordSource, place: int, column: Column, clock: "_Clock", label: str, path: Path) -> Array:
+    """Return the time [s] of another raster, from its own stamps, as that of the motor's was made from its stamps."""
+    if clock.factor is None:
+        raise RecordError(
+            f"{path}: column `{label}` has time stamps of its own, so the angles must have theirs too, but "
+            f"{clock.spoken}: leave `[columns.time] rate` out, or name channels of one raster"
+        )
+    numbers = np.asarray(source.load([place])[0], dtype=float) * column.factor + column.offset
+    return np.asarray((numbers - clock.start) * clock.factor)
 
 
 def _scale(values: Array, factor: float, offset: float) -> Array:
@@ -239,7 +282,9 @@ def _convert(
     where = str(path)
     unit = unit_of(name, column, written, label, where)
     scale = scale_of(name, column, unit, label, where)
-    values = _scale(raw, column.factor, column.offset)
+    if column.sign_bit is None:
+        check_sign(raw, name, label, where)
+    values = _scale(decode_sign(raw, column, label, where), column.factor, column.offset)
     del raw
     spoken = f"{label} in {(column.unit or written) if unit is not None else SI[KINDS[name][0]]}"
     if unit is None and not written and not column.unit:
@@ -254,49 +299,10 @@ def _convert(
         return summed, f"{spoken}, summed to an angle"
     if name != "u":
         if column.modulo is None and np.all(np.diff(time[np.isfinite(time)]) > 0.0):  # else the time is what is wrong
-            check_wraps(values, name, label, where)
+            turn = column.counts_per_rev if unit is not None and unit.kind == "counts" else None
+            check_wraps(values, name, label, where, turn)
         values = unwrap(values, column)
     return _scale(values, scale, 0.0), spoken
-
-
-def _same_rows(
-    table: dict[str, Array],
-    source: RecordSource,
-    chosen: Mapping[str, Choice],
-    extra: Mapping[str, int],
-    path: Path,
-    reading: Reading,
-) -> tuple[dict[str, Array], list[str]]:
-    """Bring columns of another raster to the motor's, when told how."""
-    places = {name: choice.place for name, choice in chosen.items()} | dict(extra)
-    main = source.heads[places["theta_m"]].raster
-    notes = []
-    for name in list(table):
-        place = places.get(name)
-        if place is None or (source.heads[place].raster == main and table[name].size == table["time"].size):
-            continue
-        head = source.heads[place]
-        clock = next((n for n, h in enumerate(source.heads) if h.raster == head.raster and h.name == "time"), None)
-        if name in extra and name not in COLUMNS:
-            del table[name]
-            continue
-        if clock is None:
-            raise RecordError(
-                f"{path}: column `{head.full}` must have as many rows as `{source.heads[places['theta_m']].full}` and "
-                f"the time, but has {table[name].size}, not {table['theta_m'].size}: name channels of one raster"
-            )
-        own = np.asarray(source.load([clock])[0], dtype=float)
-        if own.size == table["time"].size and np.array_equal(own, table["time"]):
-            continue
-        if reading.resample not in ("linear", "cubic"):
-            raise RecordError(
-                f"{path}: column `{head.full}` has time stamps of its own: say how to bring it to those of "
-                f"`{source.heads[places['theta_m']].full}`: `resample` linear or cubic"
-            )
-        cost = interpolation_cost(own, table[name], reading.resample)
-        table[name] = interpolate(table["time"], own, table[name], reading.resample)
-        notes.append(f"{head.full} resampled ({reading.resample}), error about {cost:.2g} (rms)")
-    return table, notes
 
 
 def _rows_of(time: Array, part: tuple[float, float], path: Path) -> slice:
@@ -306,36 +312,11 @@ def _rows_of(time: Array, part: tuple[float, float], path: Path) -> slice:
     inside = (away >= part[0]) & (away <= part[1])
     if not inside.any():
         raise RecordError(
-            f"{path}: `part` must lie within the record's 0 to {away.max(initial=0.0):g} s, but is {part[0]:g} to "
-            f"{part[1]:g}"
+            f"{path}: `part` must lie within the record's 0 to {exact_text(float(away.max(initial=0.0)))} s, but is "
+            f"{exact_text(part[0])} to {exact_text(part[1])}"
         )
     first = int(np.argmax(inside))
     fallen = np.diff(away[first:]) < -0.5 * (away[first:-1] - away[first]) - 1e-9  # another run
     ends = np.flatnonzero(~inside[first + 1 :] | fallen)
     last = int(ends[0]) if ends.size else good.size - 1 - first
     return slice(int(good[first]), int(good[first + last]) + 1)
-
-
-def _resample(table: dict[str, Array], reading: Reading) -> tuple[dict[str, Array], list[str]]:
-    """Bring all columns to a uniform grid, when told to; says what it costs."""
-    if reading.resample not in ("linear", "cubic"):
-        return table, []
-    good = np.isfinite(table["time"])
-    table = {name: values[good] for name, values in table.items()}
-    time = table["time"]
-    if time.size < 8 or np.any(np.diff(time) <= 0.0):
-        return table, []  # the checks of the record say what is wrong
-    grid, step = resample_grid(time)
-    if grid.size == time.size and np.allclose(grid, time, rtol=0.0, atol=1e-3 * step):
-        return table, []
-    if grid.size > 2 * time.size:
-        return table, []
-    cost = {name: interpolation_cost(time, table[name], reading.resample) for name in COLUMNS[1:] if name in table}
-    out = {name: interpolate(grid, time, values, reading.resample) for name, values in table.items() if name != "time"}
-    spoken = ", ".join(f"{name} {error:.2g} {'N.m' if name == 'u' else 'rad'}" for name, error in cost.items())
-    low, high = np.quantile(1e3 * np.diff(time), (0.05, 0.95))
-    text = (
-        f"resampled ({reading.resample}) to {1.0 / step:.6g} Hz, the mean rate of steps of {low:.3g} to {high:.3g} ms; "
-        f"error of that about (rms): {spoken}"
-    )
-    return {"time": grid, **out}, [text] if all(map(math.isfinite, cost.values())) else []

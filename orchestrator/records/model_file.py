@@ -35,6 +35,7 @@ from orchestrator.plants.description import Plant
 from orchestrator.plants.known import plants
 from orchestrator.records.columns import COLUMNS, EXAMPLES, KINDS, Column
 from orchestrator.records.units import parse_unit
+from orchestrator.shared.numbers import exact_text
 
 ENCODERS = ("theta_m", "theta_l")
 MAXIMUM_BYTES = 16 * 2**20
@@ -125,6 +126,7 @@ COLUMN_NUMBERS = {
     "offset": COLUMNS,
     "counts_per_rev": ("theta_m", "theta_l"),
     "modulo": ("time", "theta_m", "theta_l"),
+    "sign_bit": ("u", "theta_m", "theta_l"),
     "rated_value": ("u",),
     "torque_constant": ("u",),
     "resistance": ("u",),
@@ -318,7 +320,7 @@ def _column_number(number: str, entry: Entry, key: str, content: _Content) -> fl
         return _share(entry, key, content)
     if number in ("factor", "rated_value", "torque_constant") and value == 0.0:
         raise content.wrong(f"{key}.{number}", "be a number other than 0, but is 0")
-    if number in ("counts_per_rev", "modulo", "rate", "resistance") and value <= 0.0:
+    if number in ("counts_per_rev", "modulo", "sign_bit", "rate", "resistance") and value <= 0.0:
         raise content.wrong(f"{key}.{number}", f"be a positive number, but is {value:g}")
     if number in ("back_emf_constant", "inductance") and value < 0.0:
         raise content.wrong(f"{key}.{number}", f"be a number that is not negative, but is {value:g}")
@@ -330,7 +332,9 @@ def _share(entry: Entry, key: str, content: _Content) -> float:
     value = _not_negative(entry, "relative_uncertainty", key, content)
     if value >= 1.0:
         must = f"be a share below 1 (5 % is 0.05), but is {value:g}"
-        raise content.wrong(f"{key}.relative_uncertainty", f"{must}; {value:g} % is {value / 100.0:g}")
+        raise content.wrong(
+            f"{key}.relative_uncertainty", f"{must}; {value:g} % is {exact_text(round(value / 100.0, 12))}"
+        )
     return value
 
 

@@ -25,7 +25,9 @@ from orchestrator.records.columns import COLUMNS, Array, Column
 from orchestrator.records.filters import decimate
 from orchestrator.records.formats import open_source
 from orchestrator.records.loading import Reading, load
+from orchestrator.records.requests import SAMPLED
 from orchestrator.records.timing import RESAMPLING, Grid, grid_of
+from orchestrator.shared.numbers import exact_text
 
 __all__ = ["COLUMNS", "MINIMUM_ROWS", "RESAMPLING", "Column", "Reading", "Record", "quantisation_step", "read_record"]
 
@@ -40,12 +42,13 @@ def read_record(
     if "u" in loaded.table:
         check_driven(loaded.table["u"], loaded.labels["u"], path.name)
     record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
+    record = replace(record, u_raster=loaded.torque_raster)
     span = motion_span(interpolate_missing(record.theta_m), record.time)
     if span is not None:
         start, end = span
         note = (
             f"the motor moves only from {start:.3g} to {end:.3g} s of {record.duration:.3g} s, the rest shows nothing: "
-            f"keep `part` {start:.3g}:{end:.3g}, or log motion throughout"
+            f"keep `part` {exact_text(round(start, 6))}:{exact_text(round(end, 6))}, or log motion throughout"
         )
         record = replace(record, notes=(*record.notes, note))
     scale = (columns or {}).get("u", Column()).relative_uncertainty
@@ -112,8 +115,11 @@ def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: b
         table["time"] = np.asarray(grid.start + timing.step * np.arange(grid.size), dtype=np.float64)
     absent = np.full(table["time"].size, np.nan)
     u, deviation = _interpolate(table["u"]) if "u" in table else (absent, None)
-    rest = {name: interpolate_missing(values) for name, values in table.items() if name not in COLUMNS}
+    known = (*COLUMNS, SAMPLED)
+    rest = {name: interpolate_missing(values) for name, values in table.items() if name not in known}
     record = Record(table["time"], u, table["theta_m"], table.get("theta_l"), source, rest, deviation, 0.0, timing)
+    if SAMPLED in table:
+        record = replace(record, u_sampled=interpolate_missing(table[SAMPLED]))
     if record.n_missing:
         share = 100.0 * record.n_missing / record.size
         notes.append(f"{record.n_missing} rows ({share:.2g} %) have missing samples; estimates leave them out")

@@ -106,7 +106,7 @@ def _mat(content: Callable[[Table], dict[str, Any]]) -> Callable[[Path, Table], 
 def _two_rasters(path: Path, table: Table) -> None:
     asammdf = pytest.importorskip("asammdf")
     with asammdf.MDF(version="4.10") as file:
-        for name, slow in (("u", 2), ("theta_m", 1), ("theta_l", 1)):
+        for name, slow in (("u", 1), ("theta_m", 1), ("theta_l", 2)):
             file.append([asammdf.Signal(table[name][::slow], table["time"][::slow], name=name)])
         file.save(path.with_suffix(".mf4"), overwrite=True)
     path.with_suffix(".mf4").rename(path)

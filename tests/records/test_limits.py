@@ -147,7 +147,7 @@ def test_gaps_between_stamps_that_jitter_lose_no_rows() -> None:
 
 def test_a_record_of_gaps_is_refused_with_the_longest() -> None:
     place = np.array([*range(10), *range(40, 50)])
-    with pytest.raises(RecordError, match=r"row 11, .* but 60 % are \(longest gap 7.5 s from 7.25 s on\)"):
+    with pytest.raises(RecordError, match=r"row 11, .* but 60 % are \(longest gap 7.5 s from 2.25 s after the first"):
         grid_of(5.0 + 0.25 * place, "t", "a.csv")
 
 

@@ -16,7 +16,7 @@ from orchestrator.records.units import parse_unit
 ASSUMED_COUNTS = 4096.0
 MACHINE_KEYS = (
     "counts_per_rev", "rated_value", "resistance", "torque_constant", "back_emf_constant", "inductance", "modulo",
-    "rate",
+    "sign_bit", "rate",
 )  # fmt: skip
 OF_DEFAULT = "of the thesis's drivetrain, whose gear ratio and inertia the record shows"
 MEANING = {

@@ -1,0 +1,152 @@
+"""Columns that a counter wrote: numbers that start again, and numbers whose sign is a bit.
+
+In all functions: ``values``: (n,), in the numbers of the file; NaN: missing.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.checks import quantisation_step
+from orchestrator.records.columns import Array, Column
+from orchestrator.records.units import TURN
+from orchestrator.shared.numbers import exact_text
+
+# Ranges of counters of time.
+COUNTERS = (60.0, 3600.0, 86400.0, *(10.0**n for n in range(2, 10)), *(2.0**n for n in range(8, 33)))
+# Ranges of angles that wrap: turns in usual units, and counters.
+RANGES = (TURN, 1.0, 360.0, 400.0, 3600.0, 21600.0, 36000.0, *(10.0**n for n in range(2, 10)))
+RANGES += tuple(2.0**n for n in range(8, 54))
+LEAST_SIGN_BIT = 64.0  # counts: below it a sign bit is not told from motion
+
+LEAST_JUMP = 0.25  # of the largest value: what a sign bit adds is at least half of it
+
+
+def decode_sign(values: Array, column: Column, label: str, source: str) -> Array:
+    """Return values with the sign that a bit of the file's numbers says."""
+    if column.sign_bit is None:
+        return values
+    bad = np.flatnonzero((values < 0.0) | (values >= 2.0 * column.sign_bit))
+    if bad.size:
+        bit = exact_text(column.sign_bit)
+        raise RecordError(
+            f"{source}: row {bad[0] + 1}, column `{label}` must be 0 or more and below twice its `sign_bit`, {bit}, "
+            f"but is {exact_text(float(values[bad[0]]))}: leave `sign_bit` out, or state the right one"
+        )
+    return np.where(values >= column.sign_bit, column.sign_bit - values, values)
+
+
+def check_sign(values: Array, name: str, label: str, source: str) -> None:
+    """Refuse numbers whose sign is a bit: they leave zero on one side, and come in at a power of two."""
+    if np.fmin.reduce(values) < 0.0 or np.isnan(values).all():
+        return
+    rows = np.flatnonzero(np.isfinite(values))
+    bit = _sign_bit(values[rows])
+    if bit is None:
+        return
+    place = int(np.flatnonzero(np.diff((values[rows] >= (1.0 - 1e-6) * bit).astype(int)))[0])
+    before, after = (exact_text(float(values[row])) for row in rows[place : place + 2])
+    raise RecordError(
+        f"{source}: row {rows[place + 1] + 1}, column `{label}` must go on through zero, but jumps from {before} to "
+        f"{after}: a bit seems to be its sign; say `[columns.{name}] sign_bit = {exact_text(bit)}` in the model file "
+        "(`model`)"
+    )
+
+
+def _sign_bit(good: Array) -> float | None:
+    """Return what negative numbers have in addition; None: nothing."""
+    if good.size < 2 or np.abs(np.diff(good)).max() < LEAST_JUMP * good.max() or np.ptp(good) == 0.0:
+        return None
+    unit = 1.0 if np.all(good == np.rint(good)) else quantisation_step(good)
+    distinct = np.unique(good)
+    first = float(distinct[int(np.argmax(np.diff(distinct))) + 1])  # beyond the widest range without values
+    if unit <= 0.0 or first < (LEAST_SIGN_BIT - 0.5) * unit:
+        return None
+    bit = unit * 2.0 ** np.floor(np.log2(first / unit + 0.5))
+    high = good >= bit - 0.5 * unit
+    if good.max() >= 2.0 * bit or good[~high].max(initial=0.0) >= bit - 0.5 * unit:
+        return None
+    signed, crossing = np.where(high, bit - good, good), np.diff(high.astype(int)) != 0
+    if not crossing.any():
+        return None
+    within = float(np.abs(np.diff(good))[~crossing].max(initial=0.0))
+    across = float(np.abs(np.diff(signed))[crossing].max())
+    goes_on = across <= 1.5 * within + unit and 4.0 * within < min(bit, float(np.ptp(signed)))
+    # A request may jump from one sign to the other: then both have the same largest value, to the count.
+    mirrored = abs(float(signed.max() + signed.min())) <= 0.5 * unit and signed.max() > 2.0 * unit
+    if not (goes_on or mirrored):
+        return None
+    short = (float(f"{bit:.{digits}g}") for digits in range(1, 18))  # a file of scaled counts tells the bit nearly
+    return next(number for number in short if abs(number - bit) < 0.01 * unit)
+
+
+def unwrap(values: Array, column: Column) -> Array:
+    """Return values that go on where the file's start again from zero after ``column.modulo``."""
+    if column.modulo is None:
+        return values
+    good = np.isfinite(values)
+    out = values.copy()
+    out[good] = np.unwrap(values[good], period=column.modulo)
+    return out
+
+
+def check_wraps(values: Array, name: str, label: str, source: str, turn: float | None = None) -> None:
+    """Refuse an angle that starts again at an end of its range; ``turn``: counts of a revolution, where stated."""
+    finite = np.isfinite(values)
+    good = values if finite.all() else values[finite]
+    steps = np.diff(good)
+    span = float(np.ptp(good)) if steps.size else 0.0
+    far = np.abs(steps) > 0.8 * span
+    if span <= 0.0 or not far.any():
+        return
+    usual = float(np.quantile(np.abs(steps[~far]), 0.999)) if np.any(~far) else span
+    # An angle that wraps leaves one end of its range and comes in at the other.
+    ends = np.minimum(good - good.min(), good.max() - good)
+    at_ends = np.maximum(ends[:-1], ends[1:])[far] <= 2.0 * usual
+    if np.mean(far) < 0.05 and usual < 0.25 * span and np.all(at_ends):
+        size, known = _range_of(steps, far, usual, turn)
+        say = f"`[columns.{name}] modulo = {exact_text(size) if known else '...'}` in the model file (`model`)"
+        raise RecordError(
+            f"{source}: column `{label}` must go on over a full turn, but jumps by "
+            f"{float(np.abs(steps[far]).max()):.10g} at row "
+            f"{int(np.flatnonzero(np.abs(np.diff(values)) > 0.8 * span)[0]) + 2}: say {say}"
+            + ("" if known else f": the number at which it starts again from zero, near {size:.9g}")
+        )
+
+
+def _range_of(steps: Array, far: NDArray[np.bool_], usual: float, turn: float | None) -> tuple[float, bool]:
+    """Return the range of an angle that wraps, and whether it is one that is known."""
+    smooth = np.interp(np.arange(steps.size), np.flatnonzero(~far), steps[~far])
+    each = np.abs(smooth - steps)[far]
+    size = float(np.median(each))
+    ranges = (*RANGES, turn) if turn is not None else RANGES
+    nearest = min(ranges, key=lambda known: abs(known - size))
+    doubt = 2.0 * float(np.abs(each - size).max()) + usual + 1e-6 * size
+    return (float(nearest), True) if abs(nearest - size) <= doubt else (size, False)
+
+
+def unwrap_time(values: Array, column: Column, label: str, source: str) -> Array:
+    """Return times that go on where a counter overflows, after ``column.modulo``; refuse those that seem to."""
+    if column.modulo is None and not np.any(np.diff(values) < 0.0) and np.isfinite(values).all():
+        return values
+    rows = np.flatnonzero(np.isfinite(values))
+    good = values[rows]
+    steps = np.diff(good)
+    if column.modulo is not None:
+        out = values.copy()
+        out[rows[1:]] = good[:1] + np.cumsum(np.mod(steps, column.modulo))
+        return out
+    fallen = np.flatnonzero(steps < 0.0)
+    if not fallen.size or fallen.size > 0.1 * steps.size:
+        return values
+    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    high, low = float(good.max()), float(good.min())
+    for size in COUNTERS:
+        if abs(high + usual - size) <= 1.5 * usual and low < 2.0 * usual and np.all(good[fallen] > high - 2.0 * usual):
+            raise RecordError(
+                f"{source}: row {int(rows[fallen[0] + 1]) + 1}, column `{label}` must increase, but begins again at "
+                f"{exact_text(good[fallen[0] + 1])} after {exact_text(good[fallen[0]])}: where a counter overflows, "
+                f"say `[columns.time] modulo = {exact_text(size)}` in the model file (`model`); of two runs keep one "
+                "by `part` START:END"
+            )
+    return values

@@ -1,0 +1,122 @@
+"""Columns whose rows are not those of the motor's angle, or not uniform, brought to rows that are.
+
+The torque is held from its own row to the next, whatever is asked for; what was measured is interpolated as it is asked
+for.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.errors import RecordError
+from orchestrator.records.columns import COLUMNS, Array
+from orchestrator.records.formats.source import Head, RecordSource
+from orchestrator.records.requests import SAMPLED, hold_request
+from orchestrator.records.timing import INTERPOLATION, has_gap, interpolate, interpolation_cost, resample_grid
+
+Table = dict[str, Array]
+
+
+def bring_to_motor(
+    table: Table, places: Mapping[str, int], source: RecordSource, path: Path, how: str | None,
+    clock: Callable[[int], Array],
+) -> tuple[Table, float, list[str]]:  # fmt: skip
+    """Return columns of other rasters at the rows of the motor's.
+
+    Args:
+        table: columns in SI, ``time`` that of the motor's raster.
+        places: of the columns in the file, by name.
+        how: to interpolate angles: "linear" or "cubic"; else they are refused.
+        clock: place of the time stamps of a raster -> these, in s, as ``time`` has them.
+
+    Returns:
+        The columns, the step of the torque's own rows [s] where they are rarer (else 0.0), and what was done.
+    """
+    main, raster, notes = source.heads[places["theta_m"]], 0.0, []
+    table = dict(table)
+    for name in list(table):
+        place = places.get(name)
+        if place is None or (source.heads[place].raster == main.raster and table[name].size == table["time"].size):
+            continue
+        if name not in COLUMNS:
+            del table[name]
+            continue
+        head = source.heads[place]
+        stamps = _own_time(source, head, main, table[name].size, table["theta_m"].size, path, clock)
+        if stamps.size == table["time"].size and np.array_equal(stamps, table["time"]):
+            continue
+        if name == "u":
+            table, raster, note = _hold(table, stamps, head.full or head.name, path)
+            notes.append(note)
+            continue
+        if how not in INTERPOLATION:
+            raise RecordError(
+                f"{path}: column `{head.full}` has time stamps of its own: say how to bring it to those of "
+                f"`{main.full}`: `resample` linear or cubic"
+            )
+        cost = interpolation_cost(stamps, table[name], how)
+        table[name] = interpolate(table["time"], stamps, table[name], how)
+        notes.append(f"{head.full} resampled ({how}), error about {cost:.2g} rad (rms)")
+    return table, raster, notes
+
+
+def _own_time(
+    source: RecordSource, head: Head, main: Head, rows: int, motor_rows: int, path: Path,
+    clock: Callable[[int], Array],
+) -> Array:  # fmt: skip
+    place = next((n for n, h in enumerate(source.heads) if h.raster == head.raster and h.name == "time"), None)
+    if place is None:
+        raise RecordError(
+            f"{path}: column `{head.full}` must have as many rows as `{main.full}` and the time, but has {rows}, not "
+            f"{motor_rows}: name channels of one raster"
+        )
+    return clock(place)
+
+
+def _hold(table: Table, stamps: Array, label: str, path: Path) -> tuple[Table, float, str]:
+    """Return the columns with the torque at the motor's rows, and the words for it; rows without a torque go."""
+    good = np.isfinite(table["time"])
+    table = {name: values if name == "u" else values[good] for name, values in table.items()}
+    time = table["time"]
+    if time.size < 2 or np.any(np.diff(time) <= 0.0):
+        return table | {"u": np.full(time.size, np.nan)}, 0.0, ""  # the checks of the record say what is wrong
+    request = hold_request(time, stamps, table["u"], label, str(path))
+    table["u"] = request.held
+    if request.sampled is not None:
+        table[SAMPLED] = request.sampled
+    known = np.flatnonzero(np.isfinite(request.held))
+    rows = slice(int(known[0]), int(known[-1]) + 1) if known.size else slice(0, 0)
+    lost = time.size - (rows.stop - rows.start)
+    return {name: values[rows] for name, values in table.items()}, request.raster, request.describe(label, lost)
+
+
+def make_uniform(table: Table, how: str | None) -> tuple[Table, list[str]]:
+    """Return all columns at a uniform grid of the same mean rate, when asked for, and what it costs."""
+    if how not in INTERPOLATION:
+        return table, []
+    good = np.isfinite(table["time"])
+    table = {name: values[good] for name, values in table.items()}
+    time = table["time"]
+    if time.size < 8 or np.any(np.diff(time) <= 0.0):
+        return table, []  # the checks of the record say what is wrong
+    grid, step = resample_grid(time)
+    if grid.size == time.size and np.allclose(grid, time, rtol=0.0, atol=1e-3 * step):
+        return table, []
+    if grid.size > 2 * time.size:
+        return table, []
+    out, spoken = {"time": grid}, []
+    for name, values in table.items():
+        if name in ("u", SAMPLED):
+            request = hold_request(grid, time, values, name, "record")
+            out[name] = np.where(has_gap(grid, time), np.nan, request.held)
+            spoken += [f"u {request.within:.2g} N.m, held from row to row"] if name == "u" else []
+        elif name != "time":
+            out[name] = interpolate(grid, time, values, how)
+            spoken += [f"{name} {interpolation_cost(time, values, how):.2g} rad"] if name in COLUMNS else []
+    low, high = np.quantile(1e3 * np.diff(time), (0.05, 0.95))
+    text = (
+        f"angles resampled ({how}) to {1.0 / step:.6g} Hz, the mean rate of steps of {low:.3g} to {high:.3g} ms; "
+        f"error of that about (rms): {', '.join(spoken)}"
+    )
+    return out, [text]
