@@ -12,6 +12,7 @@ from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
 from orchestrator.estimation.profile import profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import GapVerdictSettings
+from orchestrator.estimation.torque_reading import torque_words
 from orchestrator.shared.inference.normal import NORMAL_95
 
 
@@ -63,7 +64,7 @@ def describe(fit: GapFit) -> Estimate:
         diagnostics, drive, likelihood.parameters(fit.point.theta).i, problem.record.size, settings
     )
     diagnostics["lacking"] = lacking
-    message = "; ".join(text for text in (message, lacking) if text)
+    message = "; ".join(text for text in (message, lacking, torque_words(problem)) if text)
     curves = {"states": kept.states, "contacts": kept.contacts, "errors": kept.errors, "profile": curve}
     curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
     curves["model"] = likelihood.parameters(fit.point.theta)

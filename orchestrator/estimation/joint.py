@@ -11,12 +11,12 @@ import numpy as np
 
 from orchestrator.estimation.innovations import Array, Innovations
 from orchestrator.estimation.likelihood import Likelihood
-from orchestrator.estimation.problem import OFFSET, STATE_NAMES, GapProblem
+from orchestrator.estimation.problem import OFFSET, SAMPLED, STATE_NAMES, GapProblem
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.record import Record
 
-OWN = (*STATE_NAMES, OFFSET)  # the unknowns that each record has for itself
+OWN = (*STATE_NAMES, OFFSET, SAMPLED)  # the unknowns that each record has for itself
 
 
 def _joint_problem(problems: Sequence[GapProblem]) -> GapProblem:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels, affine_model, innovations
-from orchestrator.estimation.problem import IMPULSE, OFFSET, SCALE, STATE_NAMES, GapProblem
+from orchestrator.estimation.problem import IMPULSE, OFFSET, SAMPLED, SCALE, STATE_NAMES, GapProblem
 from orchestrator.estimation.protocol import TimeLimitError
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.shared.inference.inverse import pseudo_inverse
@@ -94,6 +94,7 @@ class Likelihood:
         self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
         self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
         self._scale = names.index(SCALE) if SCALE in names else None
+        self._sampled = names.index(SAMPLED) if SAMPLED in names else None
         self.deadline = deadline  # of time.monotonic()
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._mean = problem.start
@@ -143,7 +144,11 @@ class Likelihood:
                 "`time_limit` must be longer for this record, or its `rate` lower", "time_limit", "rate"
             )
         record = self.problem.record
-        u = record.u if self._scale is None else record.u * theta[self._scale]
+        u = record.u
+        if self._sampled is not None and record.u_sampled is not None:
+            u = u + theta[self._sampled] * (record.u_sampled - u)
+        if self._scale is not None:
+            u = u * theta[self._scale]
         model = affine_model(self.parameters(theta), float(theta[self._impulse]))
         outputs, x0 = self.problem.outputs, theta[self._state]
         if self._offset is not None:

@@ -13,6 +13,7 @@ from orchestrator.shared.inference.noise import rms_behind_lag, robust_noise
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
 ALPHA = "alpha"
 SCALE = "u_scale"
+SAMPLED = "u_sampled"  # way from a torque that is held between its own rows to a smooth one: 0 to 1
 OFFSET = "effects.sensor_offset.load.offset"
 IMPULSE = "contact_impulse"
 IMPULSE_DEPTH = 2e-3  # rad, within which a contact's damping sets in; prior standard deviation
@@ -102,6 +103,8 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     if record.u_scale_uncertainty > 0.0:
         spread = record.u_scale_uncertainty / math.sqrt(3.0)
         unknowns.append(Unknown(SCALE, 1.0, spread, spread, 0.1, 10.0))
+    if record.u_sampled is not None:
+        unknowns.append(Unknown(SAMPLED, 0.0, math.inf, 0.1, 0.0, 1.0))
     units = _torque_units(record, model.parameters["tau"].value, ratio)
     unknowns += _initial_state(record, ratio, units[0])
     levels, noises = [], []

@@ -29,6 +29,10 @@ class MaximisationSettings(Settings, frozen=True):
     clear_impulse: Annotated[
         float, setting("standard errors from which the machine's contact law is another than the model's")
     ] = 3.0
+    settled: Annotated[
+        float,
+        setting("difference of the objective from which one reading of a torque with rows of its own is right"),
+    ] = 10.0
     long_record: Annotated[int, setting("rows above which a record is first fitted to its beginning", ge=200)] = 9000
     short_record: Annotated[int, setting("rows of that beginning", ge=200)] = 6000
     enough_traversals: Annotated[int, setting("traversals that the beginning must hold to start from it", ge=0)] = 6

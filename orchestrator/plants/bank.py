@@ -105,7 +105,8 @@ def _timing(name: str, parameter: str) -> Effect:
     return Effect(
         name, "actuator", "timing", group(name, parameter), parameter, lambda s: {parameter: 0.3 * s.step},
         lambda s: {parameter: times(s)}, bounds=lambda s: {parameter: (0.0, longest_time(s))},
-        possible=lambda v, s: 0.15 * s.step < v[parameter] < 0.95 * longest_time(s), takes_drive=True,
+        possible=lambda v, s: max(0.15 * s.step, s.torque_raster) < v[parameter] < 0.95 * longest_time(s),
+        takes_drive=True,
     )  # fmt: skip
 
 
@@ -207,7 +208,8 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         "rate_limit", "actuator", "timing", group("rate_limit", "rate"), "rate",
         lambda s: {"rate": 0.02 * float(np.max(np.abs(np.diff(s.requests)))) / s.step}, lambda s: {"rate": _rates(s)},
         bounds=lambda s: {"rate": (1e-3 * float(np.max(_changes(s), initial=1.0)), BIG)},
-        possible=lambda v, s: v["rate"] < 0.999 * float(np.max(_changes(s), initial=0.0)), takes_drive=True,
+        possible=lambda v, s: v["rate"] < 0.999 * float(np.max(_changes(s), initial=0.0)) and not s.torque_raster,
+        takes_drive=True,
     ),
     Effect(
         "hardening_stiffness", "shaft", "gap", group("hardening_stiffness", "cubic", "sharpness"), "cubic",

@@ -46,6 +46,7 @@ class SignalScales:
         twist: (n,) twist of the shaft [rad]; empty: there is no shaft.
         twist_is_measured: by an encoder on either side; else it is that of the nominal model.
         angular: positions are angles, not metres.
+        torque_raster: step of the torque's own rows, where they are rarer than the angles' [s]; else 0.0.
     """
 
     step: float
@@ -62,6 +63,7 @@ class SignalScales:
     twist: Array
     twist_is_measured: bool = True
     angular: bool = True
+    torque_raster: float = 0.0
 
     def rms_speed(self, site: str) -> float:
         """Return the rms speed [rad/s] of a body."""
@@ -117,6 +119,7 @@ class Effect:
         takes_drive: it takes torque away from the drive.
         memory: it has a state of its own that no encoder shows.
         measurement: it is no physics of the machine but a property of its log.
+        rare_torque: it can be only where the torque has rows of its own, rarer than the angles'.
         against: quantity against which its law is drawn: "speed", "angle" within a turn, or "position"; "": none.
     """
 
@@ -141,6 +144,7 @@ class Effect:
     takes_drive: bool = False
     memory: bool = False
     measurement: bool = False
+    rare_torque: bool = False
     against: str = ""
 
     @property

@@ -8,6 +8,10 @@ from pyfmu_sources.drivetrain_parameters import Parameter
 LEAD = Parameter("measurement.lead", "s", 0.0, 0.0, 1.0, "Time by which torques act before their stamp")
 SHIFT = Parameter("measurement.shift", "s", 0.0, -1.0, 1.0, "Time by which the load's angle is stamped later")
 
+SAMPLED = Parameter(
+    "measurement.sampled", "1", 0.0, 0.0, 1.0, "Way from a torque that is held between its own rows to a smooth one"
+)
+
 
 def longest_time(scales: SignalScales) -> float:
     """Return the longest time [s] by which a torque can be late and not be taken for its neighbour."""
@@ -22,10 +26,15 @@ def times(scales: SignalScales) -> tuple[float, ...]:
 
 EARLY_TORQUE = Effect(
     "early_torque", "log", "timing", {"lead": LEAD.name}, "lead", lambda s: {"lead": 0.3 * s.step},
-    lambda s: {"lead": times(s)}, bounds=lambda s: {"lead": (0.0, longest_time(s))}, measurement=True,
+    lambda s: {"lead": times(s)}, bounds=lambda s: {"lead": (0.0, longest_time(s))},
+    possible=lambda v, s: v["lead"] > s.torque_raster, measurement=True,
 )  # fmt: skip
 LATE_LOAD = Effect(
     "late_load", "log", "timing", {"shift": SHIFT.name}, "shift", lambda s: {"shift": 0.3 * s.step},
     lambda s: {"shift": tuple(sign * t for t in times(s)[::2] for sign in (1.0, -1.0))},
     bounds=lambda s: {"shift": (-longest_time(s), longest_time(s))}, both_encoders=True, measurement=True,
+)  # fmt: skip
+SAMPLED_TORQUE = Effect(
+    "sampled_torque", "log", "sampling", {"share": SAMPLED.name}, "share", lambda s: {"share": 0.5},
+    amplitudes=("share",), signed=False, bounds=lambda s: {"share": (0.0, 1.0)}, measurement=True, rare_torque=True,
 )  # fmt: skip

@@ -7,7 +7,7 @@ u[k])/2``, what is smooth gives ``(x[k-1] + 10 x[k] + x[k+1])/12`` (Numerov's we
 sample time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,9 @@ class Signals:
         measured: (n,) rows whose samples were measured, not interpolated.
         source: name of the record.
         rows_each: rows of the record for each row here.
+        torque_raster: step of the torque's own rows [s], where these are rarer than the record's; else 0.0.
+        smoothing: (n,) what the torque changes by when its own rows are samples of a smooth signal [N.m]; empty
+            where they are not rarer.
     """
 
     step: float
@@ -45,6 +48,8 @@ class Signals:
     measured: NDArray[np.bool_]
     source: str
     rows_each: int = 1
+    torque_raster: float = 0.0
+    smoothing: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def size(self) -> int:
@@ -66,6 +71,7 @@ def prepare_signals(
     if load_encoder and record.theta_l is not None:
         angles.append(interpolate_missing(record.theta_l))
     torque, step, count = record.u, record.step, record.size
+    torques = [torque] if record.u_sampled is None else [torque, record.u_sampled - torque]
     cutoffs = [motion_band(angle, step, settings) for angle in angles]
     if inertia is not None:
         cutoffs = [
@@ -76,17 +82,18 @@ def prepare_signals(
     factor = max(int(1.0 / (step * settings.samples_per_period * highest)), -(-count // settings.most_rows), 1)
     measured, held = ~record.is_missing, True
     if factor > 1:
-        centred = np.concatenate([torque[:1], 0.5 * (torque[1:] + torque[:-1])])  # half a sample of the hold
+        centred = [np.append(u[:1], 0.5 * (u[1:] + u[:-1])) for u in torques]  # half a sample of the hold
         low_pass = butter(6, 0.8 / factor, output="sos")
-        torque = sosfiltfilt(low_pass, centred)[::factor]
+        torques = [sosfiltfilt(low_pass, u)[::factor] for u in centred]
         angles = [sosfiltfilt(low_pass, angle)[::factor] for angle in angles]
         rows = np.arange(0, count, factor)
         measured = np.array([measured[row : row + factor].all() for row in rows])
         step, held = step * factor, False
     top = 0.35 / step
     return Signals(
-        step, np.ascontiguousarray(torque), np.ascontiguousarray(angles), held,
-        tuple(min(cutoff, top) for cutoff in cutoffs), noise, measured, record.source, factor,
+        step, np.ascontiguousarray(torques[0]), np.ascontiguousarray(angles), held,
+        tuple(min(cutoff, top) for cutoff in cutoffs), noise, measured, record.source, factor, record.u_raster,
+        np.ascontiguousarray(torques[1]) if len(torques) > 1 else np.empty(0),
     )  # fmt: skip
 
 

@@ -25,6 +25,8 @@ def candidate_effects(model: Model, scales: SignalScales, channels: Sequence[str
         given = place < len(plant.table) and model.values[place] != plant.entry(place).default
         if given or (row.angular and not scales.angular) or (row.both_encoders and len(channels) < 2):
             continue
+        if row.rare_torque and not scales.torque_raster:
+            continue
         found[row.label] = _candidate(plant, row, scales, channels)
     return found
 

@@ -33,7 +33,7 @@ from orchestrator.diagnosis.data.signals import (
     triangle_average,
 )
 from orchestrator.diagnosis.model.balance_kernel import acceleration_kernel, hidden_load_kernel, slide_bristle
-from orchestrator.diagnosis.model.drive import delivered_torque, shift_signal
+from orchestrator.diagnosis.model.drive import delivered_torque, logged_torque, shift_signal
 from orchestrator.diagnosis.model.interface import (
     CandidateEffect,
     ModelPoint,
@@ -45,7 +45,7 @@ from orchestrator.diagnosis.model.interface import (
 from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters, in_metres
 from orchestrator.diagnosis.settings import BalanceSettings, DiagnosisSettings
 from orchestrator.plants.effects import SignalScales, rms
-from orchestrator.plants.measurement import SHIFT
+from orchestrator.plants.measurement import LEAD, SAMPLED, SHIFT
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
@@ -82,7 +82,7 @@ class TorqueBalance(ResidualModel):
         self._torques: dict[tuple[float, ...], Array] = {}
         self._drive = tuple(
             plant.index(name)
-            for name in (*vars(plant.drive).values(), "measurement.lead")
+            for name in (*vars(plant.drive).values(), LEAD.name, SAMPLED.name)
             if isinstance(name, str) and name in plant.names
         )
         self.parameters = self._uncertain(model)
@@ -132,6 +132,7 @@ class TorqueBalance(ResidualModel):
             inertia=plant.value(self.nominal, plant.bodies[-1].inertia),
             stiffness=plant.value(self.nominal, plant.shaft.stiffness) if plant.shaft else 0.0, ratio=ratio,
             twist=twist, twist_is_measured=not self.hides_load, angular=self.angular,
+            torque_raster=signals.torque_raster,
         )  # fmt: skip
 
     # --- residuals -----------------------------------------------------------------------------------------
@@ -252,7 +253,8 @@ class TorqueBalance(ResidualModel):
         if key not in self._torques:
             if len(self._torques) > MOST_KEPT:
                 self._torques.clear()
-            self._torques[key] = delivered_torque(self.plant, p, self.signals.torque, self.step, self.signals.held)
+            requests = logged_torque(self.plant, p, self.signals.torque, self.signals.smoothing)
+            self._torques[key] = delivered_torque(self.plant, p, requests, self.step, self.signals.held)
         return self._torques[key]
 
     def _uses_memory(self, p: Array) -> bool:

@@ -128,7 +128,7 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
             difference = max(difference, float(np.max(np.abs(off))))
     covered = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     return BeforeAfter(
-        np.asarray(step * np.arange(signals.size)[covered]), signals.requests[covered],
+        np.asarray(step * np.arange(signals.size)[covered]), signals.requests_of(plant, w.final)[covered],
         signals.angles_in_time(plant, w.final)[covered], np.concatenate(runs["before"]), np.concatenate(runs["after"]),
         difference, tuple(step * part.start for part in parts), tuple(part.start - parts[0].start for part in parts),
         tuple(starts),
@@ -138,7 +138,7 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
 def requests_for_fmu(signals: RunSignals, plant: Plant, p: Array) -> Array:
     """Return the requests (n,) for an FMU that takes one a sample: what the log has early comes later."""
     lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
-    return shift_signal(signals.requests, -lead / signals.step)
+    return shift_signal(signals.requests_of(plant, p), -lead / signals.step)
 
 
 def format_corrected_model(model: Model, diagnosis: Diagnosis) -> str:

@@ -7,14 +7,14 @@ teeth meet, and whatever else there is, the exact, event-located plant itself ru
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import first_derivative, smooth
-from orchestrator.diagnosis.model.drive import apply_lag, shift_signal
+from orchestrator.diagnosis.model.drive import apply_lag, logged_torque, shift_signal
 from orchestrator.plants.coarse_run import FINER, coarse_runner_of, coarse_steps, runs_coarsely
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import is_linear, linear_run_of
@@ -40,6 +40,8 @@ class RunSignals:
         noise: (channels,) standard deviation of each encoder's noise, rounding included [rad].
         torque: rms of the requests [N.m].
         cutoff: frequency up to which the machine moves [Hz], for first guesses of speeds.
+        smoothing: (n,) what the requests change by when the torque's own rows are samples of a smooth signal [N.m]; or
+            empty.
     """
 
     step: float
@@ -48,6 +50,7 @@ class RunSignals:
     noise: Array
     torque: float
     cutoff: float
+    smoothing: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def size(self) -> int:
@@ -72,6 +75,10 @@ class RunSignals:
             return self.angles
         return np.column_stack([self.angles[:, 0], shift_signal(self.angles[:, 1], -late / self.step)])
 
+    def requests_of(self, plant: Plant, p: Array) -> Array:
+        """Return the requests (n,) [N.m] as the log has them, held or sampled."""
+        return logged_torque(plant, p, self.requests, self.smoothing)
+
     def lateness(self, plant: Plant, p: Array) -> float:
         """Return the time [s] by which requests act after their stamp; negative: before it."""
         lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
@@ -94,7 +101,7 @@ class RunSignals:
                 state[body.angle], state[body.speed] = state[0] / ratio, state[1] / ratio
         lag = plant.value(p, plant.drive.lag)
         limit = plant.value(p, plant.drive.limit)
-        torque = np.clip(self.requests[: row + 1], -limit, limit)
+        torque = np.clip(self.requests_of(plant, p)[: row + 1], -limit, limit)
         state[plant.drive.torque] = apply_lag(np.append(0.0, torque), lag, self.step)[-1] if lag > 0.0 else torque[-1]
         for place, followed in plant.followers:
             state[place] = state[followed]
@@ -128,8 +135,15 @@ def run_signals(record: Record, channels: int, cutoff: float) -> RunSignals:
     noise = [residual_noise(angle, quantisation_step(angle), NOISE_WINDOW) for angle in angles if angle is not None]
     columns = np.column_stack([angle for angle in angles if angle is not None])
     torque = float(np.sqrt(np.mean(whole.u**2))) + 1e-300
+    smoothing = np.empty(0) if whole.u_sampled is None else np.ascontiguousarray(whole.u_sampled - whole.u)
     return RunSignals(
-        whole.step, np.ascontiguousarray(whole.u), np.ascontiguousarray(columns), np.array(noise), torque, cutoff
+        whole.step,
+        np.ascontiguousarray(whole.u),
+        np.ascontiguousarray(columns),
+        np.array(noise),
+        torque,
+        cutoff,
+        smoothing,
     )
 
 
@@ -182,7 +196,7 @@ class Simulation:
     def _requests(self) -> tuple[Array, Array]:
         """What is requested in each sample (n,), and what is at its beginning (n,)."""
         limit = self.p[self.plant.index(self.plant.drive.limit)]
-        u = np.clip(self.signals.requests, -limit, limit)
+        u = np.clip(self.signals.requests_of(self.plant, self.p), -limit, limit)
         mean, followed = self.plant.follow_requests(self.p, u, self.signals.step)
         return (u if self._kernel is None else mean), followed
 

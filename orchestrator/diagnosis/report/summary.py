@@ -223,6 +223,11 @@ def nuisance_words(nuisance: Nuisance) -> str:
     width = 0.5 * (e.interval[1] - e.interval[0])
     size = f"{1e3 * abs(e.value):.3g} ms (95 %: within {1e3 * width:.2g} ms)"
     sure = "" if nuisance.grade is Grade.CERTAIN else f" ({nuisance.grade.word})"
+    if name == "share":
+        return (
+            f"`u` is no request that is held from its own row to the next, but a signal that was sampled{sure}: what "
+            "lies between its rows is interpolated"
+        )
     if name == "lead":
         return f"`u` acts {size} before its time stamp{sure}"
     return f"`theta_l` is stamped {size} {'later' if e.value > 0.0 else 'earlier'} than `theta_m`{sure}"

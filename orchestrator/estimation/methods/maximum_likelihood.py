@@ -28,6 +28,7 @@ from orchestrator.estimation.problem import (
 )
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
+from orchestrator.estimation.torque_reading import settle_torque
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
@@ -75,6 +76,7 @@ def estimate(
         fit = _refine(likelihood, _likelihood(shorts, model, threads, deadline, settings), report)
     if fit is None:
         fit = fit_record(likelihood, report)
+    fit = settle_torque(fit)
     report("finding the interval", BEFORE_INTERVAL)
     found = describe(fit)
     return by_record(found, records) if more else found

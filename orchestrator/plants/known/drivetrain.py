@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant, Resonance, Shaft
-from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD, LEAD, SHIFT
+from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD, LEAD, SAMPLED, SAMPLED_TORQUE, SHIFT
 from orchestrator.shared.cores import cache_once
 from pyfmu_sources import drivetrain_parameters as dt
 from pyfmu_sources.backlash_models import GRADUAL, MODELS
@@ -229,9 +229,9 @@ PLANT = Plant(
     followers=((5, 2), (6, 3)),
     starts={0: "theta_m_start", 1: "omega_m_start", 2: "theta_l_start", 3: "omega_l_start", 4: "T_m_start"},
     offsets=("effects.sensor_offset.motor.offset", "effects.sensor_offset.load.offset"),
-    nuisances=(*(PRESLIDING._replace(name=name) for name in NUISANCES), LEAD, SHIFT),
+    nuisances=(*(PRESLIDING._replace(name=name) for name in NUISANCES), LEAD, SHIFT, SAMPLED),
     enumerations=("backlash_model",),
-    bank=(*DRIVETRAIN_BANK, EARLY_TORQUE, LATE_LOAD),
+    bank=(*DRIVETRAIN_BANK, EARLY_TORQUE, LATE_LOAD, SAMPLED_TORQUE),
     stage=_stage,
     runner=_runner,
     refused=refusal,

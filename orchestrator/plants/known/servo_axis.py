@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant
-from orchestrator.plants.measurement import EARLY_TORQUE, LEAD
+from orchestrator.plants.measurement import EARLY_TORQUE, LEAD, SAMPLED, SAMPLED_TORQUE
 from orchestrator.shared.cores import cache_once
 from pyfmu_sources import servo_axis_parameters as ap
 from pyfmu_sources.axis_equations import rest
@@ -117,8 +117,8 @@ PLANT = Plant(
     ),
     starts={0: "theta_m_start", 1: "omega_m_start", 4: "T_m_start"},
     offsets=("effects.sensor_offset.motor.offset",),
-    nuisances=(PRESLIDING._replace(name="presliding.motor"), LEAD),
-    bank=(*SERVO_AXIS_BANK, EARLY_TORQUE),
+    nuisances=(PRESLIDING._replace(name="presliding.motor"), LEAD, SAMPLED),
+    bank=(*SERVO_AXIS_BANK, EARLY_TORQUE, SAMPLED_TORQUE),
     stage=stage,
     runner=runner,
     realised=_fmu_parameters,
