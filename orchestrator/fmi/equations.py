@@ -69,9 +69,8 @@ class Equations:
         return self._read(self._get_states, self._vector).copy()
 
     def read_nominals(self) -> NDArray[np.float64]:
-        """Return the nominal values of the states, shape (n,); 1 where there is none of use."""
-        found = np.abs(self._read(self._get_nominals, self._vector))
-        return np.where(np.isfinite(found) & (found > 0.0), found, 1.0)
+        """Return the nominal values of the states as the FMU gives them, shape (n,)."""
+        return self._read(self._get_nominals, self._vector).copy()
 
     def place(self, time: float, states: NDArray[np.float64]) -> None:
         """Set time [s], states (n,) and inputs."""

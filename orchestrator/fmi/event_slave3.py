@@ -39,7 +39,7 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
     def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
         self._updates = IntermediateUpdates(name)
         super().__init__(name, path, description)
-        self._clocks = InstanceClocks(description, self._call)
+        self._clocks = InstanceClocks(name, description, self._call)
         self._in_event_mode = False
         self._next_event = math.inf
         self._halves = False
@@ -86,7 +86,7 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
     def _advance(self, time: float, step: float) -> StepOutcome:
         end = self._last.value = time + step
         status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
-        self._reached = time
+        self._reached, self._size = time, step
         failure = self._updates.take_failure()
         if failure is not None:
             self._worst = ERROR

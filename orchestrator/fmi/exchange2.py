@@ -27,5 +27,5 @@ class Exchange2Slave(ExchangeSlave, Fmu2Instance):
             bool(info.newDiscreteStatesNeeded),
             bool(info.terminateSimulation),
             bool(info.nominalsOfContinuousStatesChanged),
-            info.nextEventTime if info.nextEventTimeDefined else math.inf,
+            self._require_time(info.nextEventTime) if info.nextEventTimeDefined else math.inf,
         )

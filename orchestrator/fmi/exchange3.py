@@ -30,7 +30,7 @@ class Exchange3Slave(ClockedSlave, ExchangeSlave, Fmu3Instance):
     FLAG = c_bool
 
     def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
-        self._clocks = InstanceClocks(description, self._call)
+        self._clocks = InstanceClocks(name, description, self._call)
         super().__init__(name, path, description)
 
     def _necessary_functions(self) -> list[str]:

@@ -22,12 +22,12 @@ class InstanceClocks:
         transfers: of variables, those of clocks only while one of their clocks is active.
     """
 
-    def __init__(self, description: FmuDescription, call: Call) -> None:
+    def __init__(self, name: str, description: FmuDescription, call: Call) -> None:
         model, self._events, self._call = description.model, description.events, call
         self._periodic = [model.clocks[name] for name in self._events.told]
         self._inputs = {name: clock.reference for name, clock in model.input_clocks.items()}
         self._outputs = {reference: name for name, reference in model.output_clocks.items()}
-        self._timed = TimedClocks(self._events.timed, call)
+        self._timed = TimedClocks(name, self._events.timed, call)
         self.transfers = ClockedTransfers(self._events.clocked, self._is_active)
         self.reset()
 

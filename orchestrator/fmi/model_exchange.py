@@ -24,6 +24,7 @@ from orchestrator.fmi.messages import ERROR, OK
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.protocol import EventSlave, EventUpdate, NativeCalls, Signals, StepOutcome, Transfer
+from orchestrator.master.result import RunRemark
 
 TOLERANCE = 1e-8
 """Relative tolerance of the integrator, where none is asked for; of small states, of their nominal values."""
@@ -64,6 +65,7 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         self._integrator = Integrator(self._equations)
         self._forget()
         self._rescaled, self._nominals = True, np.empty(0)
+        self._useless_nominals: dict[str, int] = {}  # how many, by what is said of them
         self._failure: BaseException | None = None  # of a step that was done from machine code
         self._native: Any = None
         inputs = [v.name for v in self.model.variables.values() if v.causality == "input" and v.type != "String"]
@@ -149,11 +151,26 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
             self._known[:], self._goes_on = self._watched, False
         if not self._goes_on:
             if self._rescaled:
-                self._nominals, self._rescaled = self._equations.read_nominals(), False
+                self._nominals, self._rescaled = self._usable_nominals(), False
             states = self._equations.read_states()
             self._integrator.restart(time, states, self._tolerance or TOLERANCE, self._nominals)
             self._goes_on = True
         return self._integrator
+
+    def _usable_nominals(self) -> NDArray[np.float64]:
+        """Return the nominal values of the states, shape (n,): 1 where the FMU gives none of use, which is told."""
+        found = self._equations.read_nominals()
+        good = np.isfinite(found) & (found != 0.0)
+        if not good.all():
+            k = int(np.argmin(good))
+            text = f"the nominal value of continuous state {k + 1} must be finite and not zero, but is {found[k]:g}"
+            self._useless_nominals.setdefault(f"{text}: 1 is taken for such", int(np.sum(~good)))
+        return np.where(good, np.abs(found), 1.0)
+
+    def take_remarks(self) -> list[RunRemark]:
+        """Return warnings since this was last asked, and nominal values of no use."""
+        useless, self._useless_nominals = self._useless_nominals, {}
+        return [*super().take_remarks(), *(RunRemark(self.name, text, count) for text, count in useless.items())]
 
     def _place(self, time: float) -> None:
         """Set time, states and inputs to where the integrator is."""
@@ -274,8 +291,10 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         accesses = self._accesses(inputs), self._accesses(outputs)
         return native_calls(self._functions, *accesses, self._description.python, (address, "a step of the integrator"))
 
-    def raise_for_status(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
+    def raise_for_status(
+        self, status: int, function: str, time: float, reached: float = math.nan, size: float = math.nan
+    ) -> None:
         failure, self._failure = self._failure, None
         if failure is not None:
             raise failure
-        super().raise_for_status(status, function, time, reached)
+        super().raise_for_status(status, function, time, reached, size)

@@ -134,6 +134,8 @@ class RemoteSlave(Slave):
     def _ask(self, method: str, *arguments: Any) -> Any:
         try:
             return self._jail.call((method, list(arguments)))
+        except SlaveError as error:
+            raise SlaveError(f"{error}{self._jail.describe_printed()}") from None
         except ChildError as error:
             raise SlaveError(f"{self.name}: {method} must come to its end, but {error}") from None
 

@@ -30,6 +30,7 @@ class ShorterSteps:
     def __init__(self, slave: _Stepped) -> None:
         self._slave = slave
         self._steps, self._first, self._last, self._least = 0, 0.0, 0.0, 0.0
+        self._said = ""
 
     def do_step(self, time: float, step: float) -> None:
         """Advance from ``time`` to ``time + step`` [s], in parts where the whole is discarded.
@@ -49,7 +50,7 @@ class ShorterSteps:
             now, length = max(now, min(reached, end)), 0.5 * length
             if length < SMALLEST * step:
                 text = f"steps from t = {now:g} s must be done, but even those of {length:g} s are discarded"
-                raise StepDiscardedError(f"{self._slave.name}: {text}", self._slave.name, time)
+                raise StepDiscardedError(f"{self._said}: {text}", self._slave.name, time)
 
     def take_remarks(self) -> list[RunRemark]:
         """Return how many communication steps were done in shorter ones, and forget it."""
@@ -68,6 +69,7 @@ class ShorterSteps:
         except RunEndedError:
             raise
         except StepDiscardedError as error:
+            self._said = str(error)
             if state is not None:
                 slave.set_state(state)
                 return time

@@ -63,6 +63,7 @@ class FmuSlave(Slave):
         self._worst = OK
         self._closed = False
         self._reached: float | None = None  # s, in a run
+        self._size = math.nan  # s, of the step that was asked for last
         self._tolerance: float | None = None
         self._once = ""
         self._sets: dict[tuple[str, ...], tuple[list[VariableBatch], list[Value]]] = {}
@@ -130,6 +131,10 @@ class FmuSlave(Slave):
             raise KeyboardInterrupt
         label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
         text = f"{self.name}: {what}{moment} returned {label}{self._last_message()}"
+        if what.endswith("DoStep") and status != PENDING:
+            text += f" (to a step of {self._size:g} s)"
+            if status == DISCARD and self._description.python:
+                text += ": a Python slave's `do_step` must return True when it has done the step"
         if status == PENDING:
             raise SlaveError(f"{text}: it must do its steps while it is called, but goes on by itself")
         if status == DISCARD:
@@ -167,6 +172,13 @@ class FmuSlave(Slave):
             return False
         self._shorter = ShorterSteps(self)
         return True
+
+    def _require_time(self, time: float) -> float:
+        """Return the time that the FMU says for its next event [s]; infinity for none, an error where it is no time."""
+        if math.isnan(time):
+            self._worst = ERROR
+            raise SlaveError(f"{self.name}: nextEventTime must be a time, but is nan{self._last_message()}")
+        return time
 
     def _alive(self, what: str) -> None:
         if self._closed or self._worst >= ERROR:
@@ -353,12 +365,15 @@ class FmuSlave(Slave):
         """
         self._inbox.warn(f"{function} at t = {time:g} s", count)
 
-    def raise_for_status(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
+    def raise_for_status(
+        self, status: int, function: str, time: float, reached: float = math.nan, size: float = math.nan
+    ) -> None:
         """Raise for a status that the compiled loop met.
 
         Args:
             time: when [s].
             reached: where the FMU says that it came to in a step [s].
+            size: of the step [s].
         """
-        self._reached = time
+        self._reached, self._size = time, size
         self._check(status, function)

@@ -108,7 +108,7 @@ class Fmu2Slave(Fmu2Instance):
 
     def try_step(self, time: float, step: float) -> None:
         status = self._step(self._component, time, step, 1)
-        self._reached = time
+        self._reached, self._size = time, step
         if status:
             self._check(status, "fmi2DoStep")
         self._reached = time + step

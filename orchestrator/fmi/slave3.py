@@ -64,7 +64,7 @@ class Fmu3Instance(FmuSlave):
         flags, time = (c_bool * 5)(), c_double()  # again, end, nominals, values, next event
         first = ctypes.addressof(flags)
         self._call("UpdateDiscreteStates", *(c_void_p(first + k) for k in range(5)), ctypes.byref(time))
-        return flags[0], flags[1], flags[2], time.value if flags[4] else math.inf
+        return flags[0], flags[1], flags[2], self._require_time(time.value) if flags[4] else math.inf
 
     def _instantiate(self) -> tuple[Any, c_void_p]:
         folder, description = extract_fmu(self.path), self._description
@@ -161,7 +161,7 @@ class Fmu3Slave(Fmu3Instance):
     def try_step(self, time: float, step: float) -> None:
         end = self._last.value = time + step
         status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
-        self._reached = time
+        self._reached, self._size = time, step
         if status:
             self._check(status, "fmi3DoStep")
         reached = self._last.value
@@ -205,8 +205,10 @@ class Fmu3Slave(Fmu3Instance):
         super().reset()
         self._rolls_back = False
 
-    def raise_for_status(self, status: int, function: str, time: float, reached: float = math.nan) -> None:
+    def raise_for_status(
+        self, status: int, function: str, time: float, reached: float = math.nan, size: float = math.nan
+    ) -> None:
         if status >= ENDED:
             self._reached = time
             self._refuse_end(status == ENDED, time, reached)
-        super().raise_for_status(status, function, time, reached)
+        super().raise_for_status(status, function, time, reached, size)

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from orchestrator.errors import SlaveError
+
 NOT_YET_KNOWN, UNCHANGED, CHANGED = range(3)  # fmi3IntervalQualifier
 
 
@@ -32,11 +34,14 @@ class TimedClocks:
     """The clocks of one instance that it times itself.
 
     Args:
+        instance: its name, for messages.
         clocks: value reference and kind (``fixed``, ``tunable``, ``changing`` or ``countdown``) by name.
     """
 
-    def __init__(self, clocks: Mapping[str, tuple[int, str]], call: Call) -> None:
+    def __init__(self, instance: str, clocks: Mapping[str, tuple[int, str]], call: Call) -> None:
+        self._instance = instance
         self._kinds = dict(clocks.values())
+        self._names = {reference: name for name, (reference, _) in clocks.items()}
         self._call = call
         self._ticks: dict[int, _Tick] = {}
 
@@ -99,6 +104,11 @@ class TimedClocks:
     def _interval(self, reference: int) -> tuple[float, int]:
         interval, qualifier = ctypes.c_double(math.inf), ctypes.c_int(NOT_YET_KNOWN)
         self._ask("GetIntervalDecimal", reference, ctypes.byref(interval), ctypes.byref(qualifier))
+        at_once = self._kinds[reference] == "countdown" and interval.value == 0.0  # it ticks in the next instant
+        if qualifier.value != NOT_YET_KNOWN and not (interval.value > 0.0 or at_once):
+            name = self._names[reference]
+            text = f"fmi3GetIntervalDecimal of clock {name} must give more than 0 s, but gives {interval.value:g} s"
+            raise SlaveError(f"{self._instance}: {text}")
         return interval.value, qualifier.value
 
     def _shift(self, reference: int) -> float:

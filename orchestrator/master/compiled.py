@@ -204,7 +204,7 @@ class CompiledWiring:
                 failed: Any = self._wiring.stages[failure.slave].slave
                 name = _call_name(self._natives[failure.slave], failure.call)
                 reached = self._slaves[failure.slave].reached
-                failed.raise_for_status(status, name, start + failure.step * step, reached)
+                failed.raise_for_status(status, name, start + failure.step * step, reached, step)
             taken = time.perf_counter() - clock
             chunk = (
                 min(2 * chunk, MOST_STEPS) if taken < 0.5 * CHUNK_TIME else max(1, round(chunk * CHUNK_TIME / taken))

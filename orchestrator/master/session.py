@@ -11,6 +11,7 @@ from orchestrator.errors import FmuError, ScenarioError, SimulationError, SlaveE
 from orchestrator.master.adaptive import run_adaptive
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Jacobi, step_count
 from orchestrator.master.clocks import TickSamples, clock_problems
+from orchestrator.master.divergence import divergence_remarks
 from orchestrator.master.event_steps import FixedSteps
 from orchestrator.master.event_windows import EventWindows
 from orchestrator.master.events import EventIteration
@@ -142,6 +143,8 @@ class Session:
                 if not allow_early_end:
                     raise SlaveError(f"{error}: it wants the run to end, but the whole run is needed") from None
                 steps = math.floor((error.time - self.start) / self.algorithm.step + 1e-6)
+                if steps == 0:
+                    raise SlaveError(f"{error}: it asks for the end of the run before a step is done") from None
                 text = f"ended the run at t = {error.time:g} s of {self.stop:g} s ({error.how})"
                 calls = dict.fromkeys((block.name for block in self.layout.blocks), steps)
                 events = EventStatistics() if self._events is None else self._events.statistics()
@@ -163,7 +166,7 @@ class Session:
             found += self._events.remarks()
         if not isinstance(self.algorithm, Adaptive):
             found += own_step_remarks(self.system, self.record, rows, self.start, self.algorithm.step)
-        return found
+        return found + divergence_remarks(self.record, rows, self._times)
 
     def _signal_table(self, replaced: Mapping[int, Signal]) -> Array:
         """Return the table of signals; what is not replaced is sampled once."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import ChildError, FmuError, OrchestratorError, SimulationError
+from orchestrator.errors import ChildError, FmuError, OrchestratorError, SimulationError, SlaveError
 from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.ours import is_ours
@@ -165,7 +165,10 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
                 "orchestrator.scenarios.inside:open_runs", job, read=[scratch.path], limits=limits, walls=bool(foreign)
             ) as jail:
                 jail.start(time)
-                answer = jail.call({}, most=8 * shape[0] * shape[1] + _SLACK)
+                try:
+                    answer = jail.call({}, most=8 * shape[0] * shape[1] + _SLACK)
+                except SlaveError as error:
+                    raise SlaveError(f"{error}{jail.describe_printed()}") from None
         except ChildError as error:
             raise SimulationError(f"{names}: {_word_error(error, time)}", "time_limit") from None
         except OrchestratorError as error:

@@ -7,13 +7,11 @@ reported at once, each problem with its path in the file.
 import math
 import os
 import tomllib
-from collections.abc import Callable
-from dataclasses import fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
-
-import msgspec
 
 from orchestrator.building.build import ensure_built
 from orchestrator.building.sources import catalogue
@@ -28,6 +26,7 @@ from orchestrator.master.protocol import Value, Variable
 from orchestrator.master.result import Recording
 from orchestrator.master.system import ClockConnection, Connection, Instance, Quantity, SignalSource, System
 from orchestrator.master.values import coerce_value, one_line
+from orchestrator.scenarios.conversion import convert_table, convert_what_fits
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.file_format import (
     AnySource,
@@ -61,14 +60,27 @@ def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
         raise FmuError(f"{scenario.origin}: {error}" if scenario.origin else str(error)) from None
 
 
+@dataclass(frozen=True)
+class _Top:
+    """The parts of a file that fit, see ``ScenarioTable``."""
+
+    stop: float = math.nan
+    start: float = 0.0
+    name: str = "scenario"
+    master: Any = None
+    instances: Mapping[str, Any] = field(default_factory=dict)
+    record: Sequence[str] = ()
+    connections: Sequence[Any] = ()
+    clock_connections: Sequence[Any] = ()
+    terminals: Sequence[Any] = ()
+    sources: Sequence[Any] = ()
+
+
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be."""
     content = _content(path)
     problems: list[Problem] = []
-    top = _convert(content, ScenarioTable, "$", problems)
-    if top is None:
-        raise_problems(problems, str(path))
-        raise AssertionError("a failed conversion leaves a problem")
+    top = _Top(**convert_what_fits(content, ScenarioTable, "$", problems))
     reader = _Reader(path, problems)
     algorithm, order = reader.master(top)
     instances = reader.instances(top.instances)
@@ -78,23 +90,28 @@ def load_scenario(path: Path) -> Scenario:
     )
     clock_connections = reader.clock_connections(top.clock_connections)
     sources = reader.sources(top.sources, instances, algorithm.step if algorithm else math.nan, top.start)
-    if algorithm is not None:
+    if algorithm is not None and "stop" in content:
         try:
             step_count(top.start, top.stop, algorithm.step)
         except ScenarioError as error:
             problems.append(Problem("$.stop", str(error)))
-    raise_problems(problems, str(path))
-    assert algorithm is not None
     system = System(instances, connections, sources, order, clock_connections)
-    raise_problems(system.problems() + system.record_problems(tuple(top.record)), str(path))
+    if instances:
+        unread = set(top.instances).difference(instance.name for instance in instances)
+        found = system.problems() + system.record_problems(tuple(top.record))
+        problems += [p for p in found if not any(f"'{name}." in p.text for name in unread)]
+    if reader.lacking and not problems:
+        raise FmuError(one_line(f"{path}: {'; '.join(map(str, reader.lacking))}"))
+    raise_problems([*problems, *reader.lacking], str(path))
+    assert algorithm is not None
     return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))
 
 
-def _joints(top: ScenarioTable, problems: list[Problem]) -> list[tuple[str, str, str]]:
+def _joints(top: _Top, problems: list[Problem]) -> list[tuple[str, str, str]]:
     """Return where each pair of terminals is asked for, and the two."""
     found = []
     for k, table in enumerate(top.terminals):
-        pair: TerminalsTable | None = _convert(table, TerminalsTable, f"$.terminals[{k}]", problems)
+        pair: TerminalsTable | None = convert_table(table, TerminalsTable, f"$.terminals[{k}]", problems)
         if pair is not None:
             found.append((f"$.terminals[{k}].join", *pair.join))
     return found
@@ -114,24 +131,18 @@ def _content(path: Path) -> dict[str, Any]:
         raise ScenarioError(f"{path}: must be TOML, but is not: {text}") from None
 
 
-def _convert(value: Any, kind: Any, path: str, problems: list[Problem]) -> Any:
-    try:
-        return msgspec.convert(value, kind)
-    except (msgspec.ValidationError, RecursionError) as error:
-        text, _, place = str(error).partition(" - at `$")
-        problems.append(Problem(path + place.rstrip("`"), text[:1].lower() + text[1:]))
-        return None
-
-
 class _Reader:
     """Turns the checked pieces of a file into the parts of a scenario, collecting what is wrong with them."""
 
     def __init__(self, path: Path, problems: list[Problem]) -> None:
         self.path, self.problems = path, problems
+        self.lacking: list[Problem] = []  # FMUs that cannot be read
         self._events = True  # event mode is used where an FMU has it
 
-    def master(self, top: ScenarioTable) -> tuple[Algorithm | None, tuple[str, ...]]:
-        master: MasterTable | None = _convert(top.master, MasterTable, "$.master", self.problems)
+    def master(self, top: _Top) -> tuple[Algorithm | None, tuple[str, ...]]:
+        if top.master is None:
+            return None, ()
+        master: MasterTable | None = convert_table(top.master, MasterTable, "$.master", self.problems)
         if master is None:
             return None, ()
         self._events = master.events
@@ -145,7 +156,7 @@ class _Reader:
             value = getattr(master, name)
             if value is None:
                 continue
-            if name not in {field.name for field in fields(kind)}:
+            if name not in {entry.name for entry in fields(kind)}:
                 text = f"must be left out, but is given, and {master.algorithm!r} does not use it"
                 self.problems.append(Problem(f"$.master.{name}", text))
             elif not isinstance(value, bool) and not (math.isfinite(value) and value > 0):
@@ -154,11 +165,11 @@ class _Reader:
                 settings[name] = value
         return kind(master.step, **settings), tuple(master.order)
 
-    def instances(self, tables: dict[str, Any]) -> tuple[Instance, ...]:
+    def instances(self, tables: Mapping[str, Any]) -> tuple[Instance, ...]:
         found, size = [], SystemSize(self.path)
         for name, table in tables.items():
             path = f"$.instances.{name}"
-            instance: InstanceTable | None = _convert(table, InstanceTable, path, self.problems)
+            instance: InstanceTable | None = convert_table(table, InstanceTable, path, self.problems)
             if instance is None:
                 continue
             start = {}
@@ -176,7 +187,8 @@ class _Reader:
                 self.problems.append(Problem(path, str(error)))
                 continue
             except FmuError as error:
-                raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
+                self.lacking.append(Problem(f"{path}.fmu", str(error)))
+                continue
             size.add(len(found[-1].model.variables), f"instance {name}")
         return tuple(found)
 
@@ -201,7 +213,7 @@ class _Reader:
 
     def _parameter(self, value: Any, path: str) -> Value | Quantity | None:
         if isinstance(value, dict):
-            quantity: QuantityTable | None = _convert(value, QuantityTable, path, self.problems)
+            quantity: QuantityTable | None = convert_table(value, QuantityTable, path, self.problems)
             return None if quantity is None else Quantity(quantity.value, quantity.unit)
         if isinstance(value, (bool, int, float, str)):
             return value
@@ -219,31 +231,31 @@ class _Reader:
             raise FmuError(f"must be a file or one of {', '.join(catalogue())}, but {text!r} is neither")
         return path
 
-    def connections(self, tables: list[Any]) -> tuple[Connection, ...]:
+    def connections(self, tables: Sequence[Any]) -> tuple[Connection, ...]:
         found = []
         for k, table in enumerate(tables):
-            c: ConnectionTable | None = _convert(table, ConnectionTable, f"$.connections[{k}]", self.problems)
+            c: ConnectionTable | None = convert_table(table, ConnectionTable, f"$.connections[{k}]", self.problems)
             if c is not None:
                 found.append(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit))
         return tuple(found)
 
-    def clock_connections(self, tables: list[Any]) -> tuple[ClockConnection, ...]:
+    def clock_connections(self, tables: Sequence[Any]) -> tuple[ClockConnection, ...]:
         found = []
         for k, table in enumerate(tables):
-            c: ClockConnectionTable | None = _convert(
+            c: ClockConnectionTable | None = convert_table(
                 table, ClockConnectionTable, f"$.clock_connections[{k}]", self.problems
             )
             found += [] if c is None else [ClockConnection(c.source, c.target)]
         return tuple(found)
 
     def sources(
-        self, tables: list[Any], instances: tuple[Instance, ...], step: float, start: float
+        self, tables: Sequence[Any], instances: tuple[Instance, ...], step: float, start: float
     ) -> tuple[SignalSource, ...]:
         found = []
         system = System(instances)
         for k, table in enumerate(tables):
             path = f"$.sources[{k}]"
-            source = _convert(table, AnySource, path, self.problems)
+            source = convert_table(table, AnySource, path, self.problems)
             if source is None:
                 continue
             variable = system.variable(source.target)

@@ -53,6 +53,13 @@ def test_steps_end_where_the_fmu_returns_early_and_times_of_events_are_told(tmp_
     slave.close()
 
 
+@pytest.mark.parametrize("clock", ["changing", "fixed"])
+@pytest.mark.parametrize("interval", ["0.0", "-0.1", "NAN"])
+def test_an_interval_that_gets_nowhere_is_refused_by_the_clocks_name(tmp_path: Path, clock: str, interval: str) -> None:
+    with pytest.raises(SlaveError, match=r"a: .*of clock later must give more than 0 s, but gives"):
+        started(build_event3_fmu(tmp_path, f"INTERVAL={interval}", clock=clock))
+
+
 @pytest.mark.parametrize(
     ("clock", "ticks"),
     [

@@ -140,6 +140,30 @@ def test_inputs_are_held_or_fed(tmp_path: Path, version: int) -> None:
 
 
 @VERSIONS
+def test_a_next_event_at_no_time_is_refused(tmp_path: Path, version: int) -> None:
+    slave = make_slave("a", build_exchange_fmu(tmp_path, version, "NEXT=NAN"))
+    assert isinstance(slave, ExchangeSlave)
+    slave.begin(0.0, None, None)
+    slave.start()
+    with pytest.raises(SlaveError, match="a: nextEventTime must be a time, but is nan"):
+        slave.update_discrete_states()
+    slave.close()
+
+
+@VERSIONS
+@pytest.mark.parametrize(("nominal", "remarks"), [("NAN", 1), ("0.0", 1), ("INFINITY", 1), ("-2.0", 0), ("2.0", 0)])
+def test_nominal_values_of_no_use_are_told(tmp_path: Path, version: int, nominal: str, remarks: int) -> None:
+    slave = started(build_exchange_fmu(tmp_path, version, f"NOMINAL={nominal}"))
+    slave.step(0.0, 0.1)
+    assert slave.get(["h"]) == pytest.approx([height(0.1)], abs=1e-6)
+    texts = [r.text for r in slave.take_remarks()]
+    assert len(texts) == remarks
+    assert all(text.startswith("the nominal value of continuous state 1 must be finite and not zero") for text in texts)
+    assert not slave.take_remarks()
+    slave.close()
+
+
+@VERSIONS
 def test_what_goes_wrong_inside_a_step_is_raised_after_it(tmp_path: Path, version: int) -> None:
     slave = started(build_exchange_fmu(tmp_path, version, "FAILS_AT=0.2"))
     slave.step(0.0, 0.1)

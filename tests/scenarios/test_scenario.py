@@ -189,6 +189,23 @@ def test_connections_that_cannot_be_made(tmp_path: Path, change: tuple[str, str]
     assert expected in str(caught.value)
 
 
+def test_what_does_not_convert_hides_nothing_else(tmp_path: Path) -> None:
+    text = (
+        'stop = "a"\nrecrd = []\nrecord = ["plant.zz", "gone.y"]\n[master]\nstep = 1e-3\nfoo = 1\n'
+        '[instances.plant]\nfmu = "Drivetrain"\nparameters = { alfa = 0.02 }\n[instances.gone]\nfmu = "none.fmu"\n'
+        '[[connections]]\nfrom = "plant.theta_m"\ntoo = "plant.u"\n'
+        '[[sources]]\nto = "plant.uu"\nkind = "constant"\nvalue = 1.0\n'
+        '[[sources]]\nto = "gone.u"\nkind = "constant"\nvalue = 1.0\n'
+    )
+    with pytest.raises(ScenarioError) as error:
+        load_scenario(write(tmp_path, text))
+    said = str(error.value).removeprefix(f"{tmp_path / 'scenario.toml'}: ").split("; $")
+    assert [part.lstrip("$").partition(": ")[0] for part in said] == [
+        "", ".stop", ".master", ".connections[0]", ".connections[0]",
+        ".instances.plant.parameters.alfa", ".sources[0].to", ".record[0]", ".instances.gone.fmu",
+    ]  # fmt: skip
+
+
 def test_table_and_noise_sources(tmp_path: Path) -> None:
     (tmp_path / "torque.csv").write_text("time,u\n0,0\n0.01,5\n0.02,5\n", encoding="utf-8")
     table = 'kind = "table"\nto = "plant.u"\nfile = "torque.csv"\ncolumn = "u"\n'

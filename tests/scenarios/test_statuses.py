@@ -14,6 +14,7 @@ from orchestrator.errors import SlaveError
 from orchestrator.scenarios.scenario import load_scenario
 from tests.support.answers_fmu import build_answers_fmu
 from tests.support.c_fmu import have_compiler
+from tests.support.python_fmus import build_python_fmu, slave_source
 from tests.support.shared_inputs import shared_input
 
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
@@ -116,6 +117,44 @@ def test_a_discarded_step_that_cannot_be_shorter_ends_the_run_in_words(tmp_path:
 def test_steps_are_not_shortened_for_ever(tmp_path: Path) -> None:
     with pytest.raises(SlaveError, match="must be done, but even those of"):
         simulate(scenario(tmp_path, "LONGEST=0.0", saves=True))
+
+
+@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
+def test_an_end_before_the_first_step_is_an_error_and_a_later_one_a_remark(tmp_path: Path, algorithm: str) -> None:
+    with pytest.raises(SlaveError, match=r"t = 0 s returned Discard .*asks for the end of the run before a step"):
+        simulate(scenario(tmp_path, "ENDS_AT=0.0", algorithm=algorithm))
+    result = simulate(scenario(tmp_path, "ENDS_AT=0.01", algorithm=algorithm))
+    assert [r.text for r in result.run.remarks] == ["ended the run at t = 0.01 s of 1 s (fmi2Discard, terminated)"]
+
+
+@pytest.mark.parametrize("returns", ["return False", "pass", "return time < 0.05"])
+def test_a_python_slave_is_told_what_it_must_return(tmp_path: Path, returns: str) -> None:
+    fmu = build_python_fmu(tmp_path / "slave", slave_source(f"self.y = time + step\n{returns}"))
+    path = tmp_path / "slave.toml"
+    path.write_text(f'stop = 1.0\nrecord = ["a.y"]\n[master]\nstep = 0.1\n[instances.a]\nfmu = "{fmu}"\n')
+    if "<" in returns:
+        (remark,) = simulate(path).run.remarks
+        assert remark.text.startswith("ended the run at t = 0.1 s of 1 s")
+    else:
+        with pytest.raises(SlaveError, match="`do_step` must return True when it has done the step"):
+            simulate(path)
+
+
+@pytest.mark.parametrize("step", [0.25, 0.0004])  # in machine code, too
+def test_a_refused_step_says_how_long_it_was_and_what_the_fmu_printed(tmp_path: Path, step: float) -> None:
+    with pytest.raises(SlaveError) as error:
+        simulate(scenario(tmp_path, "REFUSES", step=step))
+    assert f"a: fmi2DoStep at t = 0 s returned Error (to a step of {step:g} s)" in str(error.value)
+    assert str(error.value).endswith("(it printed: steps must be whole numbers of 0.1 s)")
+
+
+@pytest.mark.parametrize(("factor", "diverges"), [(-1e4, True), (-50.0, False)])
+def test_a_run_that_diverges_is_said_to(tmp_path: Path, factor: float, diverges: bool) -> None:
+    path = scenario(tmp_path)
+    path.write_text(f'{path.read_text()}[[connections]]\nfrom = "a.x"\nto = "a.u"\nfactor = {factor}\n')
+    texts = [r.text for r in simulate(path).run.remarks]
+    assert len(texts) == diverges
+    assert all("`a.x` runs away: it is " in text and " at t = 0.1" in text for text in texts)
 
 
 def test_a_step_that_is_pending_is_refused_in_words(tmp_path: Path) -> None:

@@ -5,11 +5,13 @@
  *   ENDS_AT=t       fmi2DoStep returns fmi2Discard from then on, and fmi2Terminated is true
  *   LONGEST=h       longer steps are discarded; COMES_TO: after that much, which fmi2LastSuccessfulTime says
  *   OWN_STEP=h      steps of its own, until the communication point is reached or passed
+ *   REFUSES         fmi2DoStep prints why and returns fmi2Error
  *   PENDS           fmi2DoStep returns fmi2Pending
  *   ONCE            a second instance in a process is refused
  *   RESETS=code     what fmi2Reset does after it began anew, with x and gain of before; LEFT: a variable of the library that outlives instances
  */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fmi2FunctionTypes.h"
@@ -116,6 +118,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean k)
     s->last = t;
 #ifdef PENDS
     return fmi2Pending;
+#endif
+#ifdef REFUSES
+    printf("steps must be whole numbers of 0.1 s\n");
+    return fmi2Error;
 #endif
 #ifdef ENDS_AT
     if (t > ENDS_AT - 1e-9) return fmi2Discard;

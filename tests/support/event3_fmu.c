@@ -148,7 +148,9 @@ FMI3_Export fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueRef
     State *s = &((Slave *)c)->s;
     NEED(s->mode == INITIALISING || s->mode == EVENT, "wrong mode");
     q[0] = fmi3IntervalChanged;
-#if KIND == 'd' /* countdown */
+#ifdef INTERVAL
+    v[0] = INTERVAL;
+#elif KIND == 'd' /* countdown */
     v[0] = 0.05;
     if (s->n == s->asked) q[0] = s->n ? fmi3IntervalUnchanged : fmi3IntervalNotYetKnown;
     s->asked = s->n;

@@ -31,6 +31,12 @@ enum { OK = fmi3OK, DISCARD = fmi3Discard, ERROR = fmi3Error };
 #define SIZES , size_t total
 #endif
 
+#ifndef NOMINAL
+#define NOMINAL 1.0
+#endif
+#ifndef NEXT
+#define NEXT s->next
+#endif
 enum { TIME, H, V, U, Y, DERH, DERV, N = 10, D, E, S };
 typedef enum { SET_UP, INITIALISING, EVENT, CONTINUOUS } Mode;
 
@@ -148,7 +154,7 @@ EXPORT Status F(GetContinuousStates)(Instance c, double x[], size_t n)
     return OK;
 }
 
-EXPORT Status F(GetNominalsOfContinuousStates)(Instance c, double x[], size_t n) { x[0] = x[1] = 1.0; return OK; }
+EXPORT Status F(GetNominalsOfContinuousStates)(Instance c, double x[], size_t n) { x[0] = x[1] = NOMINAL; return OK; }
 
 #if FMI == 2
 EXPORT Status fmi2GetDerivatives(Instance c, double x[], size_t n)
@@ -226,12 +232,12 @@ EXPORT Status fmi3UpdateDiscreteStates(Instance c, Bool *again, Bool *end, Bool 
     if (s->step_event) s->s = 1;
     s->step_event = false;
 #if FMI == 2
-    info->nextEventTime = s->next;
+    info->nextEventTime = NEXT;
 #ifdef ENDS_AT_EVENT
     info->terminateSimulation = s->n == ENDS_AT_EVENT;
 #endif
 #else
-    *next = s->next;
+    *next = NEXT;
 #ifdef ENDS_AT_EVENT
     *end = s->n == ENDS_AT_EVENT;
 #endif

@@ -9,6 +9,7 @@ from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import DISCARD, OK, PENDING, WARNING, DiscardedError, TerminatedError
 
 _DO_STEP_STATUS, _TERMINATED = 0, 3
+NOT_DONE = "is discarded, and the end of the run asked for: a step that is done returns OK (`return True` in Python)"
 
 
 class CoSimulation2(Driver):
@@ -53,7 +54,7 @@ class CoSimulation2(Driver):
         if status == DISCARD:
             answer, ended = self.raw("GetBooleanStatus", ("int", _TERMINATED), ("out", "int", 1))
             if answer == OK and ended[0][0]:
-                raise TerminatedError
+                raise TerminatedError(NOT_DONE)
             return False
         if status == PENDING and "canRunAsynchronuously" in self.job.flags:
             status = self._wait()

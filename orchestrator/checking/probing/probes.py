@@ -117,7 +117,9 @@ def life_cycle(context: Context) -> None:
                     raise StatusError("DoStep", DISCARD, "a first step must be done, but each is discarded") from None
                 bench.job = replace(job, steps=n)
                 break
-            except TerminatedError:
+            except TerminatedError as ended:
+                if n == 0 and str(ended):
+                    raise StatusError("DoStep", DISCARD, f"a first step must be done, but {ended}") from None
                 bench.job = replace(job, steps=max(n, 1))
                 break
             when = f"at t = {t + job.step:g}"

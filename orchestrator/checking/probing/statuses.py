@@ -21,7 +21,10 @@ class StatusError(Exception):
 
 
 class TerminatedError(Exception):
-    """The slave asks for the simulation to end, or cannot be followed further; that is no fault."""
+    """The slave asks for the simulation to end, or cannot be followed further; that is no fault.
+
+    Its text, where it has one, says that the step was not done, which a first one must be.
+    """
 
 
 class DiscardedError(Exception):

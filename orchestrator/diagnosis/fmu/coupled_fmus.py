@@ -239,7 +239,7 @@ class CoupledFmus:
                 member.slave.came_elsewhere(int(number), start + begin * step, off)
         if status > 1 and call != self._loop.AWAY:
             reached = start + k * step
-            members[n].slave.raise_for_status(int(status), members[n].name_of_call(call), reached, reached)
+            members[n].slave.raise_for_status(int(status), members[n].name_of_call(call), reached, reached, step)
         for member in members:
             member.broken = False
         if call == self._loop.AWAY:

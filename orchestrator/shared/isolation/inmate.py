@@ -3,6 +3,8 @@
 Until the walls are up, only the standard library and this room's light modules are imported.
 """
 
+import contextlib
+import ctypes
 import os
 import pickle
 import socket
@@ -65,6 +67,7 @@ def _serve(link: socket.socket, setup: Setup, walls: list[Any] | None) -> None:
                 value = handler(pickle.loads(body))
             message = wire.encode([nonce, ANSWER, value])
         except BaseException as error:  # what was loaded may even call sys.exit
+            _flush_printed()
             message = wire.encode([nonce, REFUSAL, [type(error).__name__, _text(error)]])
         wire.send(link, message)
         if handler is None:
@@ -75,6 +78,14 @@ def _open(setup: Setup) -> Any:
     module, _, function = setup.entry.partition(":")
     entry = import_module(module)
     return getattr(entry, function)(pickle.loads(setup.argument))
+
+
+def _flush_printed() -> None:
+    """Write what was printed, by C as well, to where the parent can read it."""
+    with contextlib.suppress(Exception):
+        sys.stdout.flush()
+    if sys.platform != "win32":
+        ctypes.CDLL(None).fflush(None)
 
 
 def _text(error: BaseException) -> str:

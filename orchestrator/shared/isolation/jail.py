@@ -160,6 +160,11 @@ class Jail:
         """Return the child's resident memory in bytes; 0 where the system does not tell."""
         return resident_memory(self.pid)[0]
 
+    def describe_printed(self) -> str:
+        """Return the last line that the child has printed, as an addition to a message; empty for none."""
+        said = self._read_printed()
+        return f" (it printed: {said})" if said else ""
+
     def output_size(self) -> int:
         """Return how much the child has printed."""
         return os.fstat(self._log.fileno()).st_size
