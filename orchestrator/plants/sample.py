@@ -222,14 +222,20 @@ def named_of(kind: Any) -> Any:
     return njit(error_model="numpy", forceinline=True, **ALGEBRA)(eval(f"lambda p: kind({entries})", {"kind": kind}))
 
 
-def record_of(kind: Any, p: Any) -> Any:
-    """Return the parameters of a plant by name, in one place: compiled code hands them on by their address.
+def run_with_record(kind: Any, run: Any) -> Any:
+    """Return a plant's run of a compiled one, which takes the parameters ``p`` (n,) as they are and, next, by name.
+
+    By name they are a record, which compiled code hands on by its address: a tuple it would copy at each call.
 
     Args:
         kind: the plant's named tuple, in which its equations take them.
-        p: array (n,) that begins with them.
     """
-    return np.array(p[: len(kind._fields)], dtype=float).view([(name, float) for name in kind._fields])[0]
+
+    def run_plant(start: Any, p: Any, early: Any, late: Any, first: float, h: float, out: Any) -> None:
+        fields = [(name, float) for name in kind._fields]
+        run(start, p, np.array(p[: len(fields)], dtype=float).view(fields)[0], early, late, first, h, out)
+
+    return run_plant
 
 
 def is_usual(plant: Plant, p: Any) -> bool:

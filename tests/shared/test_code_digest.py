@@ -2,7 +2,7 @@
 
 import math
 from types import FunctionType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -43,6 +43,15 @@ def test_the_same_content_has_the_same_digest() -> None:
 )  # fmt: skip
 def test_whatever_changes_the_machine_code_changes_the_digest(change: dict[str, Any]) -> None:
     assert made(**change) != made()
+
+
+def test_a_named_tuple_is_known_by_its_fields() -> None:
+    def digest(*fields: str) -> str | None:
+        kind = NamedTuple("Kind", [(name, float) for name in fields])
+        return digest_of(lambda x: kind(x, x))
+
+    assert digest("a", "b") == digest("a", "b") is not None
+    assert digest("a", "b") != digest("b", "a")
 
 
 def test_options_of_the_function_itself_change_its_digest() -> None:

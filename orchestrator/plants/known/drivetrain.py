@@ -156,7 +156,7 @@ def _stage() -> CompiledEquations:
 def _runner() -> Any:
     """Return the compiled, event-located simulation."""
     from orchestrator.plants.compiled import compile_module
-    from orchestrator.plants.sample import record_of
+    from orchestrator.plants.sample import run_with_record
     from orchestrator.shared.numba_cache import njit_on_disk
 
     source = compile_module("drivetrain")
@@ -165,9 +165,7 @@ def _runner() -> Any:
     )  # fmt: skip
 
     @njit_on_disk(nogil=True)
-    def run_by_name(
-        start: Any, values: Array, p: Any, early: Array, late: Array, first: float, h: float, out: Array
-    ) -> None:
+    def run(start: Any, values: Array, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = consistent((start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0), p)
         x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], start[7], start[8])
         mode = initial_mode(x, p)
@@ -183,11 +181,7 @@ def _runner() -> Any:
                 x, mode = advance(x, mode, p, early[n], 0.0, first, before)
                 x, mode = advance(x, mode, p, late[n], 0.0, h - first, after)
 
-    def run(start: Any, values: Array, early: Array, late: Array, first: float, h: float, out: Array) -> None:
-        p = record_of(dt.DrivetrainParameters, values)
-        run_by_name(start, values, p, early, late, first, h, out)
-
-    return run
+    return run_with_record(dt.DrivetrainParameters, run)
 
 
 def fmu_parameters(p: Array) -> Array:

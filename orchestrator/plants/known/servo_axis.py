@@ -69,14 +69,14 @@ def stage() -> CompiledEquations:
 def runner() -> Any:
     """Return the compiled, event-located simulation."""
     from orchestrator.plants.compiled import compile_module
-    from orchestrator.plants.sample import record_of
+    from orchestrator.plants.sample import run_with_record
     from orchestrator.shared.numba_cache import njit_on_disk
 
     source = compile_module("servo_axis")
     advance, initial_mode, begin = source.advance, source.initial_mode, source.start
 
     @njit_on_disk(nogil=True)
-    def run_by_name(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
+    def run(start: Any, values: Array, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = begin(start[0], start[1], start[4], p)
         x = (x[0], x[1], x[2], x[3], start[8])
         mode = initial_mode(x, p, early[0])
@@ -86,10 +86,7 @@ def runner() -> Any:
                 x, mode = advance(x, mode, p, early[n], 0.0, first)
             x, mode = advance(x, mode, p, late[n], 0.0, h - first)
 
-    def run(start: Any, values: Array, early: Array, late: Array, first: float, h: float, out: Array) -> None:
-        run_by_name(start, record_of(ap.AxisParameters, values), early, late, first, h, out)
-
-    return run
+    return run_with_record(ap.AxisParameters, run)
 
 
 def _fmu_parameters(p: Array) -> Array:
