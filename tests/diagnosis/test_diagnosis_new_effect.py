@@ -1,4 +1,4 @@
-"""The worked example of docs/extending.md, carried out on a copy of the sources."""
+"""The worked examples of docs/extending.md, carried out on copies of the sources."""
 
 import re
 from pathlib import Path
@@ -22,6 +22,41 @@ effect = found.effects[0]
 off = abs(effect.parameters["coefficient"].value - 0.2)
 print(found.verdict, effect.name, off < 0.005, len(found.graded(Grade.LIKELY)))
 """
+# A drivetrain with such a fan, and its torque balances without and with the effect.
+BALANCE = """
+import numpy as np
+from orchestrator.diagnosis.data.signals import prepare_signals
+from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.model.torque_balance import TorqueBalance
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.records.model_file import default_model
+from orchestrator.records.record import record_from_columns
+from pyfmu_sources import drivetrain
+from pyfmu_sources.drivetrain_parameters import DEFAULTS
+
+h, rng = 0.005, np.random.default_rng(3)
+time = h * np.arange(1800)
+u, speeds = np.repeat(rng.uniform(-40.0, 40.0, 60), 30), []
+for size in (0.0, 0.4):
+    p = DEFAULTS._replace(fan_coefficient=size)
+    x, table, angles = drivetrain.consistent_start((0.0,) * 8, p), drivetrain.prepare(p, h), []
+    mode = drivetrain.initial_mode(x, p)
+    for torque in u:
+        angles.append((x[0], x[2]))
+        x, mode = drivetrain.advance(x, mode, p, float(torque), 0.0, h, table)
+    speeds.append(x[3])
+theta = np.array(angles) + 1e-7 * rng.standard_normal((len(u), 2))
+columns = {"time": time, "u": u, "theta_m": theta[:, 0], "theta_l": theta[:, 1]}
+settings = DiagnosisSettings()
+signals = prepare_signals(record_from_columns(columns, "fan"), None, settings.band, True)
+balance = TorqueBalance(default_model(), signals, settings.balance)
+point = ModelPoint.nominal(balance.parameters)
+without, fan = (
+    np.sqrt(np.mean((balance.residual(at) * balance.active) ** 2))
+    for at in (point, point.with_effect("fan@load", (0.4,)))
+)
+print(abs(speeds[1] - speeds[0]) > 0.1, without > 10.0 * fan, without, fan)
+"""
 
 
 def apply(edit: str, root: Path) -> Path:
@@ -37,13 +72,26 @@ def apply(edit: str, root: Path) -> Path:
     return path
 
 
+def edits_between(start: str, stop: str) -> list[str]:
+    page = (ROOT / "docs" / "extending.md").read_text()
+    return re.findall(r"```python\n(.*?)```", page[page.index(start) : page.index(stop)], re.DOTALL)
+
+
 @pytest.mark.slow
 def test_worked_example_adds_an_effect(tmp_path: Path) -> None:
     copy_project(tmp_path)
-    page = (ROOT / "docs" / "extending.md").read_text()
-    start, stop = page.index("## Adding an effect"), page.index("## Adding a plant")
-    edits = re.findall(r"```python\n(.*?)```", page[start:stop], re.DOTALL)
+    edits = edits_between("## Adding an effect", "### In the drivetrain")
     assert len(edits) == 5
     assert len({apply(edit, tmp_path) for edit in edits}) == 3
     (tmp_path / "model.toml").write_text(axis_record.MODEL)
     assert run_in_copy(PROGRAM, tmp_path).split() == ["effects", "fan", "True", "1"]
+
+
+@pytest.mark.slow
+def test_worked_example_adds_an_effect_to_the_drivetrain(tmp_path: Path) -> None:
+    copy_project(tmp_path)
+    edits = edits_between("### In the drivetrain", "## Adding a plant")
+    assert len(edits) == 4
+    assert len({apply(edit, tmp_path) for edit in edits}) == 3
+    found = run_in_copy(BALANCE, tmp_path).split()
+    assert found[:2] == ["True", "True"], found
