@@ -14,8 +14,10 @@ from orchestrator.fmi.clocks import ClockTimes
 from orchestrator.fmi.instances import FmuFactory, fmu_instance
 from orchestrator.master.compiled import prepare
 from orchestrator.master.problems import Problem, raise_problems
+from orchestrator.master.result import Recording
 from orchestrator.master.session import Session
-from orchestrator.master.system import Instance, System
+from orchestrator.master.system import Instance, System, split
+from orchestrator.master.values import coerce_value
 from orchestrator.scenarios.isolated import foreign_fmus
 from orchestrator.scenarios.scenario import Scenario
 
@@ -36,10 +38,20 @@ def check_parameters(system: System, cases: DesignCases, ignored: frozenset[str]
     for index in range(min(len(cases), CHECKED_CASES)):
         for name, value in cases[index].parameters.items():
             if name not in ignored and name not in problems and value is not None:
-                _, text = system.start_value(name, value)
+                variable = system.variable(name)
+                if variable is not None and name in _structural(system):
+                    _, text = coerce_value(variable, value)
+                else:
+                    _, text = system.start_value(name, value)
                 if text is not None:
                     problems[name] = Problem(name, text)
     raise_problems(list(problems.values()), "`vary`", "vary")
+
+
+def _structural(system: System) -> frozenset[str]:
+    """Return the structural parameters of a system's FMUs, by ``instance.variable``."""
+    described = [(i.name, i.create.description) for i in system.instances if isinstance(i.create, FmuFactory)]
+    return frozenset(f"{name}.{variable}" for name, description in described for variable in description.structural)
 
 
 def scenario_work(scenario: Scenario, cases: DesignCases, trust: bool = False) -> Work:
@@ -53,7 +65,10 @@ def scenario_work(scenario: Scenario, cases: DesignCases, trust: bool = False) -
     summaries = (ResultColumn(f"{name}.{what}", units[name]) for name in scenario.record for what in SUMMARIES)
     columns = (*summaries, ResultColumn(REMARKS, "", str))
     bare = replace(scenario.system, instances=())
-    payload = _Payload(replace(scenario, system=bare), {i.name: _Made.of(i) for i in scenario.system.instances})
+    made = {i.name: _Made.of(i) for i in scenario.system.instances}
+    payload = _Payload(
+        replace(scenario, system=bare), made, tuple(sorted(_structural(scenario.system).intersection(cases.names)))
+    )
     walls = not trust and bool(foreign_fmus(scenario.system))
     return Work(_prepare, _run, columns, payload, files, {"scenario": repr(payload)}, unpacked=True, walls=walls)
 
@@ -80,10 +95,11 @@ class _Made:
         events = instance.model.has_events
         return cls(start, instance.solver_tolerance, events, clocks, exchange, instance.resets)
 
-    def instance(self, name: str, path: Path) -> Instance:
-        """Return the instance, of the unpacked FMU at ``path``."""
+    def instance(self, name: str, path: Path, sizes: Mapping[str, Any]) -> Instance:
+        """Return the instance, of the unpacked FMU at ``path``, with further structural parameters."""
+        start = {**self.start, **sizes}
         return fmu_instance(
-            name, path, self.start, self.solver_tolerance, self.events, self.clocks, self.exchange, self.resets
+            name, path, start, self.solver_tolerance, self.events, self.clocks, self.exchange, self.resets
         )
 
 
@@ -91,6 +107,7 @@ class _Made:
 class _Payload:
     scenario: Scenario
     instances: Mapping[str, _Made]
+    structural: tuple[str, ...]
 
 
 def _path(instance: Instance) -> Path:
@@ -99,15 +116,46 @@ def _path(instance: Instance) -> Path:
     return instance.create.path
 
 
-def _prepare(payload: _Payload, files: Mapping[str, Path]) -> Session:
-    instances = tuple(made.instance(name, files[name]) for name, made in payload.instances.items())
-    scenario = replace(payload.scenario, system=replace(payload.scenario.system, instances=instances))
-    return scenario.session()
+class _Sessions:
+    """The session of the structural parameters of the last case: they decide which variables there are."""
+
+    def __init__(self, payload: _Payload, files: Mapping[str, Path]) -> None:
+        self._payload, self._files = payload, files
+        self._sizes: Mapping[str, Value] = {}
+        self._session: Session | None = None
+        if not payload.structural:
+            self._session = self._open({})
+
+    def run(self, values: Mapping[str, Value]) -> Recording:
+        """Run once with these values by ``instance.variable``."""
+        sizes = {name: value for name, value in values.items() if name in self._payload.structural}
+        if self._session is None or sizes != self._sizes:
+            if self._session is not None:
+                self._session.close()
+                self._session = None
+            self._session, self._sizes = self._open(sizes), sizes
+        start = {name: value for name, value in values.items() if name not in sizes and value is not None}
+        return self._session.run(start, allow_early_end=True)
+
+    def _open(self, sizes: Mapping[str, Value]) -> Session:
+        by_instance: dict[str, dict[str, Value]] = {}
+        for address, value in sizes.items():
+            name, variable = split(address)
+            by_instance.setdefault(name, {})[variable] = value
+        payload = self._payload
+        instances = tuple(
+            made.instance(name, self._files[name], by_instance.get(name, {}))
+            for name, made in payload.instances.items()
+        )
+        return replace(payload.scenario, system=replace(payload.scenario.system, instances=instances)).session()
 
 
-def _run(session: Session, case: Case) -> dict[str, Value]:
-    start = {name: value for name, value in case.parameters.items() if value is not None}
-    result = session.run(start, allow_early_end=True)
+def _prepare(payload: _Payload, files: Mapping[str, Path]) -> _Sessions:
+    return _Sessions(payload, files)
+
+
+def _run(sessions: _Sessions, case: Case) -> dict[str, Value]:
+    result = sessions.run(case.parameters)
     summary: dict[str, Value] = {}
     for name, values in zip(result.names, result.values, strict=True):
         numbers = (values[-1], values.min(), values.max(), values.mean(), np.sqrt(np.mean(values**2)))

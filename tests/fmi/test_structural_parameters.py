@@ -6,7 +6,7 @@ import pytest
 
 from orchestrator.api.scenario_sweep import sweep_scenario
 from orchestrator.api.simulate import simulate
-from orchestrator.errors import FmuError
+from orchestrator.errors import FmuError, ScenarioError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
@@ -48,6 +48,23 @@ def test_a_sweep_keeps_the_size(sized: Path) -> None:
     )
     result = sweep_scenario(path, {"a.p[3]": "range:2:4:2"}, workers=1)
     assert [row.outcome.values[0] for row in result.rows()] == pytest.approx([4.0, 8.0])
+
+
+def test_a_sweep_varies_the_size(sized: Path) -> None:
+    path = sized.parent / "sizes.toml"
+    path.write_text(
+        'stop = 1.0\nrecord = ["a.y[1]", "a.size"]\n[master]\nstep = 0.1\n[instances.a]\nfmu = "Sized.fmu"\n'
+        '[[sources]]\nto = "a.u[1]"\nkind = "constant"\nvalue = 2.0\n'
+    )
+    vary = {"a.size": "1,2", "a.p[1]": "3,5"}
+    rows = [row.outcome for row in sweep_scenario(path, vary, workers=1).rows()]
+    assert [row.values[0::5][:2] for row in rows] == [pytest.approx(v) for v in ((6, 1), (10, 1), (6, 2), (10, 2))]
+    with pytest.raises(ScenarioError, match=r"a.size: must lie in \[1, 8\], but is 9"):
+        sweep_scenario(path, {"a.size": "2,9"}, workers=1)
+    path.write_text(path.read_text().replace('"a.y[1]"', '"a.y[2]"'))
+    done = [row.outcome for row in sweep_scenario(path, {"a.size": "2,1,2"}, workers=1).rows()]
+    assert [row.message == "" for row in done] == [True, False, True]
+    assert "must name a variable of a (Sized), but 'y[2]' is none" in done[1].message
 
 
 @pytest.mark.parametrize("trust", [True, False])
