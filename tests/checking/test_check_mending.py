@@ -14,6 +14,7 @@ from orchestrator.checking.mending.members import UnmendableError
 from orchestrator.checking.mending.mend import mend_fmu
 from orchestrator.cli import main
 from orchestrator.errors import FmuError
+from tests.support.broken_archives import pack
 from tests.support.c_fmu import GUID, LIBRARY, build_c_fmu, fmu_files, have_compiler, write_fmu
 
 pytestmark = pytest.mark.skipif(
@@ -222,3 +223,11 @@ def test_without_a_compiler_the_rest_is_mended_and_that_is_said(
     repair = mend_fmu(tmp_path / "Doubler.fmu", tmp_path / "mended.fmu")
     assert "needs a C compiler" in repair.left[0]
     assert errors(tmp_path / "mended.fmu", static=False) == set()
+
+
+def test_odd_folders_are_left_out(tmp_path: Path) -> None:
+    entries = [("./", b""), *fmu_files().items(), ("resources\\", b"")]
+    repair = mend_fmu(pack(tmp_path / "a.fmu", entries), tmp_path / "b.fmu")
+    assert repair.done == ("left out the folder ./", "left out the folder resources\\")
+    with zipfile.ZipFile(tmp_path / "b.fmu") as archive:
+        assert {n: archive.read(n) for n in archive.namelist()} == fmu_files()

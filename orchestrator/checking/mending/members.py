@@ -58,7 +58,7 @@ def _entries(path: Path, limits: ArchiveLimits, repairs: list[str]) -> Iterator[
         for entry in archive.infolist():
             name, plain = entry.orig_filename, plain_path(entry) or ""
             if is_folder(entry):
-                if name.rstrip("/") != plain:
+                if name.rstrip("/") != plain or plain == ".":
                     repairs.append(f"left out the folder {name}")
                 continue
             try:
