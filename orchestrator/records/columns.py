@@ -115,6 +115,11 @@ def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, sou
     if worth is None:
         return unit.factor
     key, factor, spoken = worth
+    if factor is None and unit.kind == "share" and unit.factor == 100.0:
+        raise RecordError(
+            f"{source}: column `{label}` has no dimension: say `[columns.{name}] rated_value = ...` (what 1 is, in "
+            f'N.m), or `[columns.{name}] unit = "..."` where that is not so, in the model file (`model`)'
+        )
     if factor is None:
         what = {
             "counts_per_rev": "counts of one revolution",

@@ -25,6 +25,7 @@ from orchestrator.records.names import Choice, choose
 from orchestrator.records.rasters import bring_to_motor, make_uniform
 from orchestrator.records.requests import SAMPLED
 from orchestrator.records.stamps import seconds_of
+from orchestrator.records.topics import has_topics, split_topics
 from orchestrator.records.units import parse_unit
 from orchestrator.shared.numbers import exact_text
 
@@ -97,6 +98,11 @@ def load(
     labels.setdefault("time", "time")
     values, clock = _in_part(source, places, chosen, columns.get("time", Column()), labels["time"], path, reading)
     time = clock.time
+    wanted = [choice.place for name, choice in chosen.items() if name != "time"]
+    if "time" in chosen and len({head.raster for head in source.heads}) == 1 and has_topics(values, wanted):
+        topics = split_topics(source, chosen["time"].place, wanted, chosen["theta_m"].place)
+        if topics is not None:
+            return load(topics, path, columns, further, reading)
     shared = set(extra.values())
 
     def take(place: int) -> Array:

@@ -20,6 +20,7 @@ NO_JITTER = 1e-6  # of a step: what is left of the arithmetic
 LARGEST_JITTER = 0.1  # of a step: stamps this close to the grid are on it
 LARGEST_MISSING = 0.2  # of the rows: with more, what is assumed in between decides
 GAP = 5.0  # median steps: a longer one is a gap, whose samples are missing
+LEAST_FALLS, LEAST_FALL = 2, 0.2  # s: of 0.9 to 0.1, 0.95 to 0.1 and 0.5 to 0.1, which fractions without zeros make
 INTERPOLATION = ("linear", "cubic")
 RESAMPLING = ("uniform", *INTERPOLATION)
 
@@ -110,12 +111,29 @@ def _check_increasing(time: Array, label: str, source: str) -> None:
             cure = (
                 "the stamps are too coarse: log them finer, or say `[columns.time] rate = ...` [Hz] in the model file"
             )
+        elif has_unpadded_fractions(time):
+            cure = (
+                "fractions seem to be counts without leading zeros (12.5 for 12.005 s): log them with all digits, or "
+                "say `[columns.time] rate = ...` [Hz] in the model file (`model`)"
+            )
         else:
             cure = "sort the rows by time, delete repeats, or keep one run by `part` START:END"
         raise RecordError(
             f"{source}: row {row}, column `{label}` must increase, but {word} ({time[row - 2]:g} then "
             f"{time[row - 1]:g} s): {cure}"
         )
+
+
+def has_unpadded_fractions(time: Array) -> bool:
+    """Return whether stamps (n,) [s] fall as fractions do that lack their leading zeros: 0.995, 0.1, 0.105, ...
+
+    All falls are below a second, more than a few samples, and there are several; without them time goes on.
+    """
+    steps = np.diff(time[np.isfinite(time)])
+    falls = -steps[steps < 0.0]
+    if falls.size < LEAST_FALLS or np.ptp(time) == 0.0:
+        return False
+    return bool(falls.max() < 1.0 and np.median(falls) > LEAST_FALL and np.nanargmax(time) > 0.9 * time.size - 1)
 
 
 def _check_step(step: float, where: str) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.master.signals import Table
 from orchestrator.records.tables import Wanted, read_columns
+from orchestrator.records.timing import has_unpadded_fractions
 
 
 def read_table(
@@ -34,8 +35,9 @@ def read_table(
             )
     back = np.flatnonzero(np.diff(times) < 0.0)
     if back.size:
+        cure = "write fractions with all digits: 12.005" if has_unpadded_fractions(times) else "sort the rows"
         raise ScenarioError(
             f"column {read.labels[0]!r} must not go back, but {path} row {back[0] + 2} has {times[back[0] + 1]:g} s "
-            f"after {times[back[0]]:g} s: sort the rows"
+            f"after {times[back[0]]:g} s: {cure}"
         )
     return Table(tuple(times.tolist()), tuple(values.tolist()), hold), read.units[0]

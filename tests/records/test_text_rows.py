@@ -277,3 +277,46 @@ def test_inspect_prints_what_was_left_out(tmp_path: Path, rows: list[str], capsy
     path.write_text("\n".join([HEAD, *rows[:700], "overrun", *rows[700:]]) + "\n")
     assert main(["inspect", str(path), "--out", str(tmp_path / "out")]) == 0
     assert "`overrun` is no row and is left out" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("kind", ["epoch, microseconds", "epoch, milliseconds", "seconds", "clock", "date"])
+def test_fractions_without_leading_zeros_are_refused_and_the_cure_works(
+    tmp_path: Path, columns: dict[str, np.ndarray], rows: list[str], kind: str
+) -> None:
+    lines = []
+    for n, row in enumerate(rows):
+        second, count = divmod(5 * n, 1000)
+        stamp = {
+            "epoch, microseconds": f"{1_700_000_000 + second}.{1000 * count}",
+            "epoch, milliseconds": f"{1_700_000_000 + second}.{count}",
+            "seconds": f"{second}.{count}",
+            "clock": f"08:59:{57 + second}.{count}" if second < 3 else f"09:00:{second - 3:02d}.{count}",
+            "date": f"2026-01-02 08:59:{50 + second}.{count}",
+        }[kind]
+        lines.append(stamp + "," + row.partition(",")[2])
+    with pytest.raises(
+        RecordError, match=r"goes back .* without leading zeros .* or say `\[columns.time\] rate = ...`"
+    ):
+        _read(tmp_path / "log.csv", [HEAD, *lines])
+    record = read_record(tmp_path / "log.csv", {"time": Column(rate=200.0)})
+    np.testing.assert_allclose(record.time, columns["time"], atol=1e-9)
+    np.testing.assert_allclose(record.u, columns["u"], atol=1e-7)
+
+
+def test_two_runs_have_fractions_with_zeros(tmp_path: Path, rows: list[str]) -> None:
+    with pytest.raises(
+        RecordError, match=r"goes back .* sort the rows by time, delete repeats, or keep one run by `part`"
+    ):
+        _read(tmp_path / "log.csv", [HEAD, *rows, *rows])
+    assert read_record(tmp_path / "log.csv", None, (), Reading(part=(0.0, 10.0))).size == len(rows)
+
+
+def test_a_torque_without_dimension_asks_for_what_one_is(
+    tmp_path: Path, columns: dict[str, np.ndarray], rows: list[str]
+) -> None:
+    lines = ["time,u [-],theta_m,theta_l", *rows]
+    with pytest.raises(RecordError, match=r"column `u \[-\]` has no dimension: say .* rated_value .*, or .* unit = "):
+        _read(tmp_path / "log.csv", lines)
+    for given, factor in ((Column(rated_value=20.0), 20.0), (Column(unit="mN.m"), 1e-3)):
+        record = read_record(tmp_path / "log.csv", {"u": given})
+        np.testing.assert_allclose(record.u, factor * columns["u"], rtol=1e-6, atol=1e-7)

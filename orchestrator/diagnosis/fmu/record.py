@@ -15,7 +15,7 @@ from orchestrator.master.protocol import Unit
 from orchestrator.master.units import contradiction, conversion, resolve
 from orchestrator.records.arrays import interpolate_missing, runs_of
 from orchestrator.records.tables import NamedColumns, Wanted, read_columns, read_unit
-from orchestrator.records.timing import interpolate
+from orchestrator.records.timing import has_unpadded_fractions, interpolate
 from orchestrator.shared.inference.band import content_band
 from orchestrator.shared.inference.noise import residual_noise
 
@@ -194,6 +194,12 @@ def _fill(values: Array, time: Array, entry: ColumnEntry, path: Path) -> tuple[A
 
 def _unevenness(time: Array) -> str:
     """Return what is wrong with times that do not grow evenly, in words."""
+    if has_unpadded_fractions(time):
+        row = int(np.argmax(np.diff(time) < 0.0))
+        return (
+            f"row {row + 2}: time must grow, but goes from {time[row]:.10g} to {time[row + 1]:.10g} s: fractions seem "
+            "to be counts without leading zeros (12.5 for 12.005); write them with all digits"
+        )
     grown = np.diff(time)
     usual = float(np.median(grown))
     if not usual > 0.0:

@@ -8,6 +8,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.formats.cells import cells_of, is_missing, is_value
 from orchestrator.records.formats.heading import UNIT_KEYS, Heading
 from orchestrator.records.formats.heads import head_of
+from orchestrator.records.formats.labview import is_labview, with_rasters
 from orchestrator.records.formats.source import MAXIMUM_CHANNELS, Head
 from orchestrator.records.formats.text_file import TextFile
 from orchestrator.records.stamps import is_stamp
@@ -104,6 +105,8 @@ def detect(file: TextFile, header: int | None = None) -> Dialect:
         heads = [Head(f"#{n + 1}", "", kind) for n, kind in enumerate(kinds)]
     else:
         heads = [_head(name, unit, kind) for name, unit, kind in zip(names, units, kinds, strict=True)]
+    if is_labview(preamble):
+        heads = with_rasters(heads, preamble)
     texts = frozenset(place for place in range(width) if _is_text_column(rows, place, decimal))
     has_units = any(units) and names is not None
     return Dialect(

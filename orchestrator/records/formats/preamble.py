@@ -40,6 +40,9 @@ def _of_line(line: str, separator: str) -> float | None:
         number = _VALUE.search(behind.replace(separator, " ") if separator in ";\t|" else behind)
         if number is None or re.search(r"[^\s:=,;|\t\".]", behind[: _start_of(behind)]):
             continue
+        numbers = {cell for cell in behind.split(separator) if is_number(cell, ".")} if separator in "\t;|" else set()
+        if len(numbers) > 1:
+            continue  # channels of several rates
         text = number[1].rstrip(".,")
         text = text.replace(",", ".") if text.count(",") == 1 and "." not in text else text
         if not is_number(text, "."):

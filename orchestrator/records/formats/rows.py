@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from orchestrator.records.formats.cells import cells_of, is_missing, is_value
 from orchestrator.records.formats.dialect import Dialect
+from orchestrator.records.formats.labview import refuse_segment
 from orchestrator.records.formats.text_file import TextFile, count_of
 
 # The start of a line that may be no row: no digit, sign, point or quote; blank lines, too.
@@ -98,6 +99,7 @@ class TableRows:
         for number, entry in enumerate(text.split("\n"), start=line + 1):
             if not entry.strip():
                 continue
+            refuse_segment(entry, number, self.file.path)
             odd = _ODD.match(entry) is not None or len(cells_of(entry, separator)) != width
             if odd and self._is_remark(cells_of(entry, separator)):
                 self.left_out[number], self.broken = _plain(entry), True

@@ -45,14 +45,15 @@ class TextSource(RecordSource):
         """Return a column as ``load`` does, with NaN or NaT where there is no value."""
         return self._read([place], strict=False)[0]
 
-    def within(self, rows: slice, raster: int) -> "TextSource":
+    def within(self, rows: slice, raster: int) -> RecordSource:
         """Return some rows; what stands in others is not looked at, and rows keep their numbers in messages."""
-        del raster
+        if self.heads[-1].raster:
+            return super().within(rows, raster)
         return TextSource(self._file, self._dialect, self._rows, rows)
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """Return the values of some columns."""
-        return self._read(places, strict=True)
+        return self._rastered(places) if self.heads[-1].raster else self._read(places, strict=True)
 
     def _read(self, places: Sequence[int], strict: bool) -> list[NDArray[Any]]:
         """Return columns; ``strict``: what is no value is refused, else it is missing."""
@@ -74,6 +75,14 @@ class TextSource(RecordSource):
         for column in stamps.values():
             column.check()
         return [out[p][:size].view("datetime64[ns]") if p in stamps else out[p][:size] for p in places]
+
+    def _rastered(self, places: Sequence[int]) -> list[NDArray[Any]]:
+        """Return columns of which each raster ends where its own time does."""
+        clocks = {head.raster: n for n, head in enumerate(self.heads) if head.name == "time"}
+        asked = sorted({*places, *clocks.values()})
+        values = dict(zip(asked, self._read(asked, strict=True), strict=True))
+        kept = {raster: np.isfinite(values[clock]) for raster, clock in clocks.items()}
+        return [values[place][kept.get(self.heads[place].raster, _ALL)] for place in places]
 
     def label(self, place: int) -> str:
         """Return what the file calls a column."""

@@ -1,0 +1,88 @@
+"""Logs that were merged from several topics: a row has the cells of one topic, or of all in every so many rows.
+
+Each topic is a raster of its own then, with the times of its rows, as channel groups of MDF are.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.records.checks import LARGEST_SHARE_MISSING
+from orchestrator.records.formats.source import Head, RecordSource
+
+TOGETHER = 0.1  # of the rows of a column: with fewer that another one fills, too, they are two topics
+EVEN = 0.9  # of the distances between a column's rows: with more of them equal it has a raster of its own
+
+
+def has_topics(values: Mapping[int, NDArray[Any]], places: Sequence[int]) -> bool:
+    """Return whether channels (n,) of one raster may be several topics: more is missing than a record may lack."""
+    shares = [float(np.mean(_filled(values[place]))) for place in places]
+    return min(shares, default=1.0) < 1.0 - LARGEST_SHARE_MISSING
+
+
+def split_topics(source: RecordSource, time: int, places: Sequence[int], main: int) -> RecordSource | None:
+    """Return a file with a raster for each topic; None: its channels are one.
+
+    Args:
+        source: whose channels are all of one raster.
+        time: place of the time.
+        places: of the channels that are wanted.
+        main: place of the channel whose topic the time belongs to.
+    """
+    filled = {place: _filled(values) for place, values in zip(places, source.load(places), strict=True)}
+    topics: list[list[int]] = []
+    for place in places:
+        same = next((topic for topic in topics if _agree(filled[topic[0]], filled[place])), None)
+        if same is None:
+            topics.append([place])
+        else:
+            same.append(place)
+    if len(topics) < 2 or any(not filled[topic[0]].any() for topic in topics):
+        return None
+    topics.sort(key=lambda topic: main not in topic)
+    rows = [np.logical_or.reduce([filled[place] for place in topic]) for topic in topics]
+    return _Topics(source, time, topics, rows)
+
+
+def _filled(values: NDArray[Any]) -> NDArray[np.bool_]:
+    return ~np.isnat(values) if values.dtype.kind == "M" else ~np.isnan(values)
+
+
+def _agree(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> bool:
+    """Return whether two columns are of one topic: neither apart from each other, nor one in every so many rows."""
+    few, many = sorted((first, second), key=np.count_nonzero)
+    together = np.count_nonzero(few & many)
+    if together < TOGETHER * np.count_nonzero(few):
+        return False
+    steps = np.diff(np.flatnonzero(few[many]))
+    usual = float(np.median(steps)) if steps.size else 1.0
+    return usual == 1.0 or float(np.mean(steps == usual)) < EVEN
+
+
+class _Topics(RecordSource):
+    """A file with a raster for each topic; the times of the further ones are channels behind those of the file."""
+
+    def __init__(self, source: RecordSource, time: int, topics: list[list[int]], rows: list[NDArray[np.bool_]]) -> None:
+        self._source, self._time, self._rows = source, time, rows
+        of = {place: number for number, topic in enumerate(topics) for place in topic}
+        heads = [replace(head, raster=of.get(place, 0)) for place, head in enumerate(source.heads)]
+        for number, topic in enumerate(topics[1:], start=1):
+            label = source.heads[topic[0]].full or source.heads[topic[0]].name
+            heads.append(replace(source.heads[time], name="time", raster=number, full=f"time of {label}"))
+        self.heads: Sequence[Head] = heads
+        self.rate, self.broken = source.rate, source.broken
+
+    @property
+    def dialect(self) -> str:  # type: ignore[override]
+        """Return what was detected."""
+        return f"{self._source.dialect}, {len(self._rows)} topics with rows of their own"
+
+    def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
+        """Return the values of some channels, in the rows of their topics."""
+        own = [place if place < len(self._source.heads) else self._time for place in places]
+        distinct = sorted(set(own))
+        values = dict(zip(distinct, self._source.load(distinct), strict=True))
+        return [values[place][self._rows[self.heads[asked].raster]] for asked, place in zip(places, own, strict=True)]
