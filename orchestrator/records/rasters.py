@@ -35,7 +35,7 @@ def bring_to_motor(
     """
     main, raster, notes = source.heads[places["theta_m"]], 0.0, []
     table = dict(table)
-    for name in list(table):
+    for name in sorted(table, key=lambda name: name == "u"):  # rows without a torque go once all columns have them
         place = places.get(name)
         if place is None or (source.heads[place].raster == main.raster and table[name].size == table["time"].size):
             continue
