@@ -18,6 +18,7 @@ from typing import Any
 from orchestrator.engine.cases import Case, Outcome, Status, Value
 from orchestrator.engine.work import MESSAGE_LENGTH, Work, evaluate, one_line
 from orchestrator.errors import OrchestratorError, SimulationError
+from orchestrator.shared.isolation.limits import PATIENCE
 from orchestrator.shared.operating_system import memory_usage, set_limits, write_at
 
 ORPHAN_MARGIN = 30.0
@@ -83,7 +84,7 @@ def open_worker(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]
     def run(cases: Sequence[Case]) -> list[Any]:
         found: list[list[Any]] = []
         spent, begin = False, time.monotonic()
-        limit = assignment.time_limit + BATCH_TIME + ORPHAN_MARGIN
+        limit = PATIENCE * (assignment.time_limit + BATCH_TIME) + ORPHAN_MARGIN
         faulthandler.dump_traceback_later(limit, exit=True, file=silence)
         for case in cases:
             write_at(place, _COUNT.pack(len(found)), 0)

@@ -35,11 +35,12 @@ def check_parameters(system: System, cases: DesignCases, ignored: frozenset[str]
     problems: dict[str, Problem] = {}
     if set(cases.names) <= ignored:
         return
+    structural = _structural(system)
     for index in range(min(len(cases), CHECKED_CASES)):
         for name, value in cases[index].parameters.items():
             if name not in ignored and name not in problems and value is not None:
                 variable = system.variable(name)
-                if variable is not None and name in _structural(system):
+                if variable is not None and name in structural:
                     _, text = coerce_value(variable, value)
                 else:
                     _, text = system.start_value(name, value)

@@ -4,6 +4,7 @@
 |---|---|---|---|
 | whether a process runs | yes | yes | unknown: it counts as running |
 | memory and threads of a process | yes | unknown: 0 | unknown: 0 |
+| what a process has waited for a processor | yes | unknown: 0 | unknown: 0 |
 | limits of memory, processor time, files | yes | yes | none |
 | peak memory of a child that has ended | yes | yes | unknown: 0 |
 | symbolic links, and removal of an open file | yes | yes | Windows: no |
@@ -73,6 +74,14 @@ def resident_memory(pid: int) -> tuple[int, int]:
         return int(fields[21]) * mmap.PAGESIZE, int(fields[17])
     except (OSError, IndexError, ValueError):
         return 0, 0
+
+
+def processor_wait(pid: int) -> float:
+    """Return how long a process has waited for a processor that others had [s]; 0 where the system does not tell."""
+    try:
+        return int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
+    except (OSError, IndexError, ValueError):
+        return 0.0
 
 
 def memory_usage() -> int:

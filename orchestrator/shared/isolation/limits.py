@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 MEBIBYTE = 1 << 20
+PATIENCE = 5.0
+"""Times a limit that a child may take by the clock on the wall, where it waits for a processor all the while."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ import math
 import socket
 import struct
 import sys
-import time
 from collections.abc import Callable
 from typing import Any, get_args
 
@@ -23,6 +22,7 @@ _KINDS = {b"d": 8, b"q": 8, b"?": 1}  # bytes of a number, by its kind as NumPy 
 _MOST_AXES = 8
 SLICE = 0.05
 Tick = Callable[[], None]
+Over = Callable[[], bool]
 
 
 class WireError(Exception):
@@ -93,54 +93,54 @@ def _unpack(code: int, data: memoryview) -> Any:
     return np.frombuffer(body, kind.decode()).reshape(shape).copy()
 
 
-def send(link: socket.socket, data: bytes, deadline: float = math.inf, tick: Tick = lambda: None) -> None:
+def send(link: socket.socket, data: bytes, is_over: Over | None = None, tick: Tick = lambda: None) -> None:
     """Send one frame; ``tick`` is called every ``SLICE`` seconds while waiting."""
     rest = memoryview(_LENGTH.pack(len(data)) + data)
-    link.settimeout(None if deadline == math.inf else SLICE)
+    link.settimeout(None if is_over is None else SLICE)
     while rest:
         try:
             rest = rest[link.send(rest) :]
         except TimeoutError:
-            _wait(deadline, tick)
+            _wait(is_over, tick)
         except OSError:
             raise ClosedError("the other end has hung up") from None
 
 
-def receive(link: socket.socket, most: int, deadline: float = math.inf, tick: Tick = lambda: None) -> bytes:
+def receive(link: socket.socket, most: int, is_over: Over | None = None, tick: Tick = lambda: None) -> bytes:
     """Return one frame of at most ``most`` bytes; arguments and errors as those of ``send``.
 
     Args:
-        deadline: on the monotonic clock [s].
+        is_over: whether the time that there was is over; None: it never is.
     """
-    (length,) = _LENGTH.unpack(_exactly(link, _LENGTH.size, deadline, tick))
+    (length,) = _LENGTH.unpack(_exactly(link, _LENGTH.size, is_over, tick))
     if length > most:
         raise WireError(f"a message must have at most {most} bytes, but has {length}")
-    return bytes(_exactly(link, length, deadline, tick))
+    return bytes(_exactly(link, length, is_over, tick))
 
 
-def _exactly(link: socket.socket, count: int, deadline: float, tick: Tick) -> bytearray:
-    link.settimeout(None if deadline == math.inf else SLICE)
+def _exactly(link: socket.socket, count: int, is_over: Over | None, tick: Tick) -> bytearray:
+    link.settimeout(None if is_over is None else SLICE)
     # Grown as bytes come: a length alone must not take memory.
     data = bytearray()
     while len(data) < count:
         try:
             piece = link.recv(min(count - len(data), 1 << 20))
         except TimeoutError:
-            _wait(deadline, tick)
+            _wait(is_over, tick)
             continue
         except OSError:
             piece = b""
         if not piece:
             raise ClosedError("the other end has hung up")
         data += piece
-        if time.monotonic() > deadline:
+        if is_over is not None and is_over():
             raise LateError("too late")
     return data
 
 
-def _wait(deadline: float, tick: Tick) -> None:
+def _wait(is_over: Over | None, tick: Tick) -> None:
     tick()
-    if time.monotonic() > deadline:
+    if is_over is not None and is_over():
         raise LateError("too late")
 
 

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from orchestrator.shared.isolation import jail as jail_module
 from orchestrator.shared.isolation.jail import Jail, Limits
 from orchestrator.shared.isolation.scratch import PREFIX, Scratch
 from orchestrator.shared.isolation.walls import support
-from orchestrator.shared.operating_system import alive
+from orchestrator.shared.operating_system import alive, processor_wait
 from tests.support.engine_process import wait_until_gone
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the limits are those of Linux")
@@ -210,3 +211,37 @@ def test_a_child_dies_with_its_parent_and_the_next_run_cleans_up() -> None:
     scratch._swept.clear()
     with Scratch() as fresh:
         assert list(place.iterdir()) == [fresh.path]
+
+
+@pytest.mark.parametrize(("share", "seconds", "ends"), [(1.0, 1.5, False), (0.0, 1.5, True), (1.0, 60.0, True)])
+def test_what_waits_for_a_processor_has_more_time_but_not_for_ever(
+    monkeypatch: pytest.MonkeyPatch, share: float, seconds: float, ends: bool
+) -> None:
+    monkeypatch.setattr(jail_module, "processor_wait", lambda pid: share * time.monotonic())
+    begin = time.monotonic()
+    with Jail(ENTRY, "x", limits=Limits(time=0.5)) as jail:
+        jail.start()
+        if ends:
+            with pytest.raises(ChildError) as error:
+                jail.call(["sleep", seconds])
+            assert error.value.reason == "time"
+            assert time.monotonic() - begin < 30.0
+        else:
+            jail.call(["sleep", seconds])
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not tell")
+def test_the_system_tells_how_long_a_process_waits_for_a_processor() -> None:
+    busy = "import os, time\nos.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\nwhile True: pass"
+    children = [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(3)]
+    try:
+        before = processor_wait(children[0].pid)
+        while processor_wait(children[0].pid) < before + 0.2:
+            assert children[0].poll() is None
+            time.sleep(0.05)
+        assert processor_wait(os.getpid()) < time.monotonic()
+    finally:
+        for child in children:
+            child.kill()
+            child.wait()
+    assert processor_wait(2**22 + 1) == 0.0
