@@ -18,11 +18,7 @@
             └── ChatteringError   events that do not come to an end at one time
 """
 
-
-def _one_line(text: str) -> str:
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(text.split()))
+from orchestrator.plain_text import plain_text
 
 
 class OrchestratorError(Exception):
@@ -37,7 +33,7 @@ class OrchestratorError(Exception):
     """
 
     def __init__(self, text: str = "", *arguments: str) -> None:
-        super().__init__(_one_line(text))
+        super().__init__(plain_text(text if text.isprintable() else " ".join(text.split())))
         self.arguments = arguments
 
 

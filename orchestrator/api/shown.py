@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, ClassVar
 
+from orchestrator.plain_text import plain_text
 from orchestrator.shared.output import stage_output, write_result
 
 
@@ -102,15 +103,23 @@ class Result:
         return place / "report.html"
 
     def __str__(self) -> str:
-        return "\n".join(_text(block) for block in self.blocks())
+        return "\n".join(_text(plain_block(block)) for block in self.blocks())
 
     def _repr_html_(self) -> str:
-        return "\n".join(_html(block) for block in self.blocks())
+        return "\n".join(_html(plain_block(block)) for block in self.blocks())
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:
     """Make a table from any sequences of texts."""
     return TextTable(title, tuple(columns), tuple(tuple(row) for row in rows))
+
+
+def plain_block(block: Block) -> Block:
+    """Return a line or a table in which names and messages steer nothing; see ``plain_text``."""
+    if isinstance(block, str):
+        return plain_text(block)
+    rows = tuple(tuple(map(plain_text, row)) for row in block.rows)
+    return TextTable(plain_text(block.title), tuple(map(plain_text, block.columns)), rows)
 
 
 def _text(block: Block) -> str:

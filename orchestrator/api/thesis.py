@@ -47,10 +47,12 @@ class ThesisResult(Result):
         t = self.table
         note = (
             f"Quadratic map through the table: largest deviation {t.largest_deviation:.4f} rad. "
-            f"Mean error {t.mean_error_percent:.2f} %, MSE {t.mse:.3e} (printed {published.MSE_TABLE:.3e}).\n"
+            f"Mean error {t.mean_error_percent:.2f} %, MSE {t.mse:.3e} (printed {published.MSE_TABLE:.3e})."
+        )
+        tests = (
             f"The thesis's 100 random tests: mean error {published.MEAN_ERROR_100_TESTS} %, "
             f"MSE {published.MSE_100_TESTS:.5e}; its simulations cannot be repeated, for its filter is told the size "
-            '(erratum 6). A sweep of the experiment "thesis" runs our own on the same sizes.\n'
+            '(erratum 6). A sweep of the experiment "thesis" runs our own on the same sizes.'
         )
         errors = [(str(e.number), e.where, e.printed, e.right, e.shown_by) for e in self.errata]
         others = [(o.who, o.method, o.figure) for o in published.OTHERS]
@@ -58,6 +60,7 @@ class ThesisResult(Result):
             self._gains(),
             self._sizes(),
             note,
+            tests,
             table("Errata", ("", "where", "printed", "right", "shown by"), errors),
             table(
                 "Results of others that the thesis compares itself with (as it quotes them)",

@@ -26,6 +26,7 @@ from orchestrator.checking.probing.statuses import PENDING, DiscardedError, Stat
 from orchestrator.checking.process import Process
 from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, OutputError
+from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.isolation.scratch import Scratch
@@ -87,6 +88,7 @@ def check_dynamic(
     several = len(d.interfaces) > 1
     with Scratch("check") as scratch:
         fmu = scratch.path / "fmu"
+        name_folder(fmu, "the FMU")
         try:
             files.extract(fmu)
         except OSError as error:
@@ -171,7 +173,9 @@ class _Watcher:
         message = _ADDRESS.sub("0x...", message.replace(f"{self.fmu}/", ""))
         if (rule, message) not in self._said and len(self.findings) < _MOST_FINDINGS:
             self._said.add((rule, message))
-            self.findings.append(Finding(rule, path or f"({self.interface}{self.probe})", f"{message} {when}".rstrip()))
+            self.findings.append(
+                Finding(rule, path or f"({self.interface}{self.probe})", plain_text(f"{message} {when}".rstrip()))
+            )
 
     def _report_end(self, error: ChildError, function: str) -> None:
         where = f"during {function}" if function else f"in the probe `{self.probe}`"

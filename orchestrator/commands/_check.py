@@ -17,13 +17,14 @@ from orchestrator.checking.formats.code_quality import as_code_quality
 from orchestrator.checking.formats.github import as_annotations, as_summary
 from orchestrator.checking.formats.junit import as_junit
 from orchestrator.checking.formats.sarif import as_sarif
-from orchestrator.checking.formats.text import as_lines, as_results, plain
+from orchestrator.checking.formats.text import as_lines, as_results
 from orchestrator.checking.mending.members import UnmendableError
 from orchestrator.checking.mending.mend import Repair, mend_fmu
 from orchestrator.checking.policy import FILE_NAME, Policy
 from orchestrator.checking.verdict import Verdict, baseline_of
 from orchestrator.commands._trust import add_trust, positive
 from orchestrator.errors import FmuError, InputError, OutputError
+from orchestrator.plain_text import plain_text
 from orchestrator.shared.isolation.archives import ArchiveLimits
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
 from orchestrator.shared.output import write_whole
@@ -108,12 +109,12 @@ def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
         try:
             repair = mend_fmu(path, target, check_options(args).archive)
         except UnmendableError as error:  # the check says the same as a finding
-            print(plain(f"{path}: not mended: {error}"))
+            print(plain_text(f"{path}: not mended: {error}"))
             repair = Repair((), ())
         if repair.done:
-            print(plain(f"{path}: mended as {target}"))
+            print(plain_text(f"{path}: mended as {target}"))
         for line in (*repair.done, *(f"not mended: {text}" for text in repair.left)):
-            print(plain(f"  {line}"))
+            print(plain_text(f"  {line}"))
         found.append(target if repair.done else path)
     return found
 

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
-from orchestrator.api.shown import Block
+from orchestrator.api.shown import Block, plain_block
 from orchestrator.commands._lines import PIPE_WIDTH, fold
 
 
 def print_blocks(blocks: Sequence[Block]) -> None:
     """Print what a result shows of itself: lines as they are, tables by ``print_table``."""
-    for block in blocks:
+    for block in map(plain_block, blocks):
         if isinstance(block, str):
             sys.stdout.write(f"{fold(block, sys.stdout)}\n")
         else:

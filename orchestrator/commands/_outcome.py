@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, TextIO, cast
 
 from orchestrator.commands._lines import fold
-from orchestrator.commands._parser import one_line, word_error
+from orchestrator.commands._parser import word_error
 from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.plain_text import plain_text
 from orchestrator.shared.stopping import stop_in_words
 
 
@@ -26,7 +27,7 @@ def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
         sys.stdout.flush()
         return code
     except OrchestratorError as error:
-        _say(f"error: {one_line(word_error(error, flags))}")
+        _say(f"error: {plain_text(word_error(error, flags))}")
         return 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
         text = word_error(interruption, flags)
@@ -36,7 +37,7 @@ def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
     except BrokenPipeError:
         raise  # whoever read the output has gone: the program ends without a word
     except (OSError, MemoryError) as error:  # no descriptors, no memory, a full disk behind standard output
-        _say(f"error: {one_line(str(error) or 'out of memory')}")
+        _say(f"error: {plain_text(str(error) or 'out of memory')}")
         return 1
 
 

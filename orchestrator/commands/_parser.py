@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from orchestrator.commands._lines import fold
+from orchestrator.plain_text import plain_text
 
 LARGEST_WHOLE_NUMBER = 10**18
 # What argparse says of an argument, and how that is said here.
@@ -33,7 +34,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where help is, and exit with 2."""
-        self.exit(2, fold(f"error: {one_line(_word_message(message))}; see {self.prog} --help", sys.stderr) + "\n")
+        self.exit(2, fold(f"error: {plain_text(_word_message(message))}; see {self.prog} --help", sys.stderr) + "\n")
 
 
 def _whole(text: str) -> int:
@@ -63,11 +64,6 @@ def _path(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("must be a path, but is empty")
     return Path(text)
-
-
-def one_line(message: str) -> str:
-    """Return a message whose line breaks and control characters are written out."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
 
 
 def flags_of(parser: argparse.ArgumentParser) -> dict[str, str]:

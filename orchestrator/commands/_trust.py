@@ -4,6 +4,7 @@ import argparse
 import sys
 
 from orchestrator.commands._parser import number
+from orchestrator.plain_text import plain_text
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.operating_system import LIMITS
 
@@ -31,4 +32,4 @@ def note_missing_walls() -> None:
 
 def note(text: str) -> None:
     """Write a line for the user to know, to the standard error stream."""
-    sys.stderr.write(f"note: {text}\n")
+    sys.stderr.write(f"note: {plain_text(text)}\n")

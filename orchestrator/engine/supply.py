@@ -8,7 +8,8 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from orchestrator.errors import FmuError, OutputError
+from orchestrator.errors import OutputError
+from orchestrator.plain_text import name_folder
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.scratch import Scratch
 
@@ -39,16 +40,15 @@ class Supply:
         file = target.with_suffix(".fmu")
         if target.exists() or (file.exists() and not unpacked):
             return target if unpacked else file
+        name_folder(target, f"the FMU of {name}")
+        name_folder(file, f"the FMU of {name}")
         try:
             file.write_bytes(content)
         except OSError as error:
             raise OutputError(f"files of a sweep must be copied to {self.folder}, but: {error.strerror}") from None
         if not unpacked:
             return file
-        try:
-            unpack(file, target)
-        except FmuError as error:
-            raise FmuError(str(error).replace(str(file), f"the one of {name}")) from None
+        unpack(file, target)
         file.unlink()
         return target
 

@@ -18,6 +18,7 @@ from typing import Any
 from orchestrator.engine.cases import Case, Outcome, Status, Value
 from orchestrator.engine.work import MESSAGE_LENGTH, Work, evaluate, one_line
 from orchestrator.errors import OrchestratorError, SimulationError
+from orchestrator.plain_text import plain_text
 from orchestrator.shared.isolation.limits import PATIENCE
 from orchestrator.shared.operating_system import memory_usage, set_limits, write_at
 
@@ -133,5 +134,5 @@ def _outcome(entry: Any, case: Case, columns: int) -> Outcome | None:
             status = Status(word)
             wanted = columns if status is Status.DONE else 0
             if len(values) == wanted and all(v is None or isinstance(v, Value) for v in values):
-                return Outcome(index, status, text, tuple(values))
+                return Outcome(index, status, plain_text(text), tuple(values))
     return None

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from orchestrator.errors import ConnectionMismatchError, ScenarioError
-from orchestrator.master.values import one_line
+from orchestrator.plain_text import plain_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,6 @@ def raise_problems(problems: list[Problem], origin: str = "", *arguments: str) -
     """Raise one error that names all ``problems``; none, no error."""
     if not problems:
         return
-    text = one_line((f"{origin}: " if origin else "") + "; ".join(str(p) for p in problems))
+    text = plain_text((f"{origin}: " if origin else "") + "; ".join(str(p) for p in problems))
     kind = ConnectionMismatchError if all(p.mismatch for p in problems) else ScenarioError
     raise kind(text, *arguments)

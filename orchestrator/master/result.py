@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.master.values import one_line
+from orchestrator.plain_text import plain_text
 
 LOOPS = PYTHON, MACHINE_CODE = "Python", "machine code"
 
@@ -84,7 +84,7 @@ def read_remarks(claimed: object) -> tuple[RunRemark, ...]:
     for entry in claimed[:MOST_REMARKS] if isinstance(claimed, list) else ():
         match entry:
             case [str() as instance, str() as text, int() as count]:
-                found.append(RunRemark(instance, one_line(text[:LONGEST_REMARK]), count))
+                found.append(RunRemark(instance, plain_text(text[:LONGEST_REMARK]), count))
     return tuple(found)
 
 

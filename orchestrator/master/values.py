@@ -10,11 +10,6 @@ _INT32 = -(2**31), 2**31 - 1
 """Whole numbers that every type of them can hold, save for those that a variable's limits say are longer."""
 
 
-def one_line(text: str) -> str:
-    """Return ``text`` with what would break the line, or steer a terminal, written as escapes."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
-
-
 def nearest(name: str, known: list[str]) -> str:
     """Return a hint such as ``; did you mean 'theta_m'?``, or nothing when no name is near."""
     close = difflib.get_close_matches(name, known, n=1)

@@ -18,7 +18,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from orchestrator.paired.cosimulation import LoopRun
-from orchestrator.shared.drawing import BLUE, GREY, ORANGE, shade_gap
+from orchestrator.shared.drawing import BLUE, GREY, ORANGE, label_text, shade_gap
 
 Array = NDArray[np.float64]
 MOST_POINTS = 2000  # of a noise level: more are a blot, and take minutes
@@ -172,8 +172,8 @@ def draw_signals(path: Path, time: Array, signals: Mapping[str, Array], units: M
     for axis, unit in zip(axes, names, strict=True):
         for name, values in signals.items():
             if units[name] == unit:
-                axis.plot(time, values, linewidth=1.0, label=name)
-        axis.set_ylabel(f"[{unit}]" if unit else "")
+                axis.plot(time, values, linewidth=1.0, label=label_text(name))
+        axis.set_ylabel(label_text(f"[{unit}]") if unit else "")
         axis.grid(alpha=0.25)
         axis.legend(fontsize=8)
         axis.margins(x=0.0)

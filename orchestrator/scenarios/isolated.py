@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import ChildError, FmuError, OrchestratorError, SimulationError, SlaveError
+from orchestrator.errors import ChildError, FmuError, SimulationError, SlaveError
 from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.ours import is_ours
@@ -21,6 +21,7 @@ from orchestrator.master.algorithms import step_count
 from orchestrator.master.compiled import prepare
 from orchestrator.master.result import LOOPS, Recording, Statistics, read_events, read_remarks
 from orchestrator.master.system import System
+from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.inside import UnpackedRun
 from orchestrator.shared.isolation.archives import unpack
@@ -65,7 +66,7 @@ def describe_walls(system: System, safety: Safety) -> WallsFound:
     foreign = foreign_fmus(system)
     walls, behind = support(), bool(foreign) and not safety.trust
     return WallsFound(
-        foreign_fmus=tuple(str(path) for path in foreign),
+        foreign_fmus=tuple(plain_text(str(path)) for path in foreign),
         own_process=behind,
         landlock=walls.landlock if behind else None,
         seccomp=walls.seccomp if behind else None,
@@ -116,6 +117,7 @@ def unpack_system(system: System) -> Iterator[tuple[System, Scratch, dict[str, s
                 except FmuError as error:
                     raise FmuError(f"$.instances.{instance.name}: {error}") from None
                 origins[str(folder)] = str(factory.path)
+                name_folder(folder, factory.path)
             instances.append(replace(instance, create=replace(factory, path=folder)))
         yield replace(system, instances=tuple(instances)), scratch, origins
 
@@ -140,14 +142,8 @@ def _in_processes(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Re
             description = without_feed(factory.description)
             made = RemoteFactory(factory.path, description, limits, walls)
             instances.append(replace(instance, model=description.model, create=made))
-        try:
-            with replace(scenario, system=replace(system, instances=tuple(instances))).session() as session:
-                return session.run(allow_early_end=True)
-        except OrchestratorError as error:
-            text = str(error)
-            for folder, origin in origins.items():
-                text = text.replace(folder, origin)
-            raise type(error)(text, *error.arguments) from None
+        with replace(scenario, system=replace(system, instances=tuple(instances))).session() as session:
+            return session.run(allow_early_end=True)
 
 
 def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Recording:
@@ -156,7 +152,7 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
     steps = step_count(scenario.start, scenario.stop, scenario.algorithm.step)
     shape = (len(scenario.record), steps + 1)
     limits = replace(limits, memory=limits.memory + 24 * shape[0] * shape[1])
-    with unpack_system(scenario.system) as (system, scratch, origins):
+    with unpack_system(scenario.system) as (system, scratch, _):
         job = UnpackedRun(system, scenario.record, scenario.algorithm, scenario.stop, scenario.start)
         names = ", ".join(map(str, foreign)) or "the scenario"
         prepare()
@@ -171,11 +167,6 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
                     raise SlaveError(f"{error}{jail.describe_printed()}") from None
         except ChildError as error:
             raise SimulationError(f"{names}: {_word_error(error, time)}", "time_limit") from None
-        except OrchestratorError as error:
-            text = str(error)
-            for folder, origin in origins.items():
-                text = text.replace(folder, origin)
-            raise type(error)(text, *error.arguments) from None
     return _result(answer, scenario, shape, names)
 
 

@@ -25,7 +25,8 @@ from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import Value, Variable
 from orchestrator.master.result import Recording
 from orchestrator.master.system import ClockConnection, Connection, Instance, Quantity, SignalSource, System
-from orchestrator.master.values import coerce_value, one_line
+from orchestrator.master.values import coerce_value
+from orchestrator.plain_text import plain_text
 from orchestrator.scenarios.conversion import convert_table, convert_what_fits
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.file_format import (
@@ -101,7 +102,7 @@ def load_scenario(path: Path) -> Scenario:
         found = system.problems() + system.record_problems(tuple(top.record))
         problems += [p for p in found if not any(f"'{name}." in p.text for name in unread)]
     if reader.lacking and not problems:
-        raise FmuError(one_line(f"{path}: {'; '.join(map(str, reader.lacking))}"))
+        raise FmuError(plain_text(f"{path}: {'; '.join(map(str, reader.lacking))}"))
     raise_problems([*problems, *reader.lacking], str(path))
     assert algorithm is not None
     return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))

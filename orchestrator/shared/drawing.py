@@ -5,7 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.plain_text import plain_text
+
 BLUE, ORANGE, GREY, SHADE = "#2166ac", "#d6604d", "#555555", "#f4d58d"
+
+
+def label_text(name: str) -> str:
+    """Return a name of others as a figure takes it: plain, and no formula."""
+    return plain_text(name).replace("$", r"\$")
 
 
 def shade_gap(axis: Any, time: NDArray[np.float64], contact: NDArray[Any], label: str | None = None) -> None:

@@ -18,6 +18,7 @@ PARTS = (
     "orchestrator/__init__.py",
     "orchestrator/__main__.py",
     "orchestrator/errors.py",
+    "orchestrator/plain_text.py",
     "orchestrator/building/__init__.py",
     "orchestrator/building/archive.py",
     "orchestrator/building/launcher.py",

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from orchestrator.checking.formats.text import plain
 from orchestrator.checking.rules import Severity
 from orchestrator.checking.verdict import Verdict, artifact
+from orchestrator.plain_text import plain_text
 
 _SEVERITIES: Mapping[Severity, str] = {"error": "major", "warning": "minor", "info": "info"}
 
@@ -15,7 +15,7 @@ def as_code_quality(verdicts: Sequence[Verdict]) -> str:
     """Write the issues that the baseline does not have."""
     issues = [
         {
-            "description": plain(f"{issue.finding.message} ({issue.finding.path})"),
+            "description": plain_text(f"{issue.finding.message} ({issue.finding.path})"),
             "check_name": issue.finding.rule,
             "fingerprint": issue.fingerprint,
             "severity": _SEVERITIES[issue.severity],

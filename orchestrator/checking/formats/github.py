@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from orchestrator.checking.findings import SEVERITIES
-from orchestrator.checking.formats.text import plain
 from orchestrator.checking.rules import Severity
 from orchestrator.checking.verdict import Issue, Verdict, artifact
+from orchestrator.plain_text import plain_text
 
 MOST_ANNOTATIONS = 10
 """Of each level; GitHub shows no more of a step."""
@@ -28,8 +28,8 @@ def as_annotations(verdicts: Sequence[Verdict]) -> list[str]:
         seen[level] += 1
         if seen[level] <= MOST_ANNOTATIONS:
             f = issue.finding
-            file, title = (_property(plain(text)) for text in (artifact(verdict.fmu), f.rule))
-            text = _escape(plain(f"{f.path}: {f.message} -> {f.advice}"))
+            file, title = (_property(plain_text(text)) for text in (artifact(verdict.fmu), f.rule))
+            text = _escape(plain_text(f"{f.path}: {f.message} -> {f.advice}"))
             lines.append(f"::{level} file={file},title={title}::{text}")
     return lines
 
@@ -72,4 +72,4 @@ def _property(text: str) -> str:
 def _cell(text: str) -> str:
     for character, written in (("&", "&amp;"), ("<", "&lt;"), ("|", "&#124;"), ("`", "&#96;"), ("[", "&#91;")):
         text = text.replace(character, written)
-    return plain(text)
+    return plain_text(text)

@@ -11,9 +11,9 @@ from urllib.parse import quote
 import msgspec
 
 from orchestrator.checking.findings import FmuFindings
-from orchestrator.checking.formats.text import plain
 from orchestrator.checking.rules import RULES, TEXTS, VERSIONS, Rule, Severity
 from orchestrator.checking.verdict import Issue, Verdict, artifact
+from orchestrator.plain_text import plain_text
 from orchestrator.shared.version import __version__
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
@@ -85,7 +85,7 @@ def _result(verdict: Verdict, issue: Issue, index: Mapping[str, int]) -> dict[st
         "ruleId": f.rule,
         "ruleIndex": index[f.rule],
         "level": _LEVELS[issue.severity],
-        "message": {"text": plain(f"{f.message} ({f.path})" if f.path else f.message)},
+        "message": {"text": plain_text(f"{f.message} ({f.path})" if f.path else f.message)},
         "locations": [_location(verdict.report, f.path)],
         "partialFingerprints": {FINGERPRINT: issue.fingerprint},
     }
@@ -98,7 +98,7 @@ def _location(report: FmuFindings, path: str) -> dict[str, Any]:
     uri = quote(artifact(report.fmu))
     place: dict[str, Any] = {"physicalLocation": {"artifactLocation": {"uri": uri}, "region": {"startLine": 1}}}
     if path:
-        place["logicalLocations"] = [{"fullyQualifiedName": plain(path)}]
+        place["logicalLocations"] = [{"fullyQualifiedName": plain_text(path)}]
     return place
 
 
@@ -106,7 +106,7 @@ def _not_run(report: FmuFindings, rule: str, reason: str) -> dict[str, Any]:
     return {
         "level": "note",
         "descriptor": {"id": rule},
-        "message": {"text": plain(f"not run: {reason}")},
+        "message": {"text": plain_text(f"not run: {reason}")},
         "locations": [_location(report, "")],
     }
 

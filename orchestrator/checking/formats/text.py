@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from orchestrator.checking.findings import SEVERITIES, FmuFindings
 from orchestrator.checking.verdict import Verdict
+from orchestrator.plain_text import plain_text
 from orchestrator.shared.results import CheckedFmu, CheckFound, FindingFound, RuleFound
 
 # XML 1.0 cannot hold these, not even escaped; names in a hostile archive can.
@@ -34,12 +35,7 @@ def as_lines(verdict: Verdict) -> list[str]:
         if not issue.known:
             f = issue.finding
             lines += [f"  {issue.severity:7} {f.rule}  {f.path}", f"          {f.message}", f"          -> {f.advice}"]
-    return [plain(line) for line in lines]
-
-
-def plain(text: str) -> str:
-    """Return one line without control characters."""
-    return " ".join(text.translate(FORBIDDEN).splitlines())
+    return [plain_text(line) for line in lines]
 
 
 def as_results(verdicts: Sequence[Verdict]) -> CheckFound:

@@ -17,6 +17,7 @@ from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.report.open_test_data import open_test_data
 from orchestrator.diagnosis.result import DiagnosisOutcome, SignalMisfit, TestMisfit
 from orchestrator.diagnosis.selection.outcome import SearchResult
+from orchestrator.shared.drawing import label_text
 
 Array = NDArray[np.float64]
 STAGES = ("nominal", "refitted", "corrected")
@@ -167,7 +168,7 @@ def draw_signals(path: Path, problem: FmuProblem, stages: Mapping[str, Array], t
             below = after if label == last else before
             residual = (data.outputs[:, k] - y[:, k]) / problem.noise[k]
             below.plot(data.time, residual, color=colour, linewidth=0.7, label=label)
-        above.set_ylabel(f"{name} [{problem.units.get(name, '1')}]")
+        above.set_ylabel(label_text(f"{name} [{problem.units.get(name, '1')}]"))
         before.set_ylabel("residual / noise")
         after.set_ylabel("residual / noise")
         for axis in (above, before, after):

@@ -18,6 +18,7 @@ from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.diagnosis.settings import FmuSettings
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
 from orchestrator.master.result import MOST_REMARKS, RunRemark, read_remarks
+from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.jail import Jail
@@ -78,6 +79,7 @@ class Runner:
         try:
             _compile_loop()
             for name, folder in self._folders.items():
+                name_folder(folder, self.system.members[name])
                 unpack(system.members[name], folder)
             begun = time.monotonic()
             self._threads[0].submit(self._jail).result()
@@ -89,7 +91,7 @@ class Runner:
             ) from None
         except OrchestratorError as error:
             self.close()
-            raise FmuError(self._with_paths(error)) from None
+            raise FmuError(str(error)) from None
         except BaseException:
             self.close()
             raise
@@ -189,7 +191,7 @@ class Runner:
                     self._run_chunk([k], batch, results)
             return
         except OrchestratorError as error:
-            raise SlaveError(self._with_paths(error)) from None
+            raise SlaveError(str(error)) from None
         if threading.get_ident() not in self._warm:  # it includes what the child loads
             self._first = max(self._first, time.monotonic() - begun)
         for k, rows in zip(chunk, self._read_answer(answer, runs, steps), strict=True):
@@ -221,7 +223,7 @@ class Runner:
             good = isinstance(rows, np.ndarray) and rows.shape == shape and rows.dtype == np.float64
             results.append(rows if good else None)
             if not good and isinstance(reason, str) and reason:
-                self.reason = self._with_paths(reason)
+                self.reason = plain_text(reason)
         mine = threading.get_ident()
         self._spent += seconds
         if mine in self._warm:  # the first answer of a child includes what it loads
@@ -248,13 +250,6 @@ class Runner:
             f"{names.get(r.instance, r.instance)}: {r.text} ({r.count} times in {self.runs} runs)"
             for r in self._remarks.values()
         )
-
-    def _with_paths(self, error: object) -> str:
-        """Return a message with FMUs in place of the folders that they lie in here."""
-        text = str(error)
-        for name, folder in reversed(self._folders.items()):
-            text = text.replace(str(folder), str(self.system.members[name]))
-        return text
 
     def _drop(self) -> None:
         """Close this thread's jail."""

@@ -21,6 +21,7 @@ from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, System
 from orchestrator.master.units import resolve
 from orchestrator.master.values import nearest
+from orchestrator.plain_text import name_folder
 from orchestrator.scenarios.scenario import Scenario
 from orchestrator.scenarios.ssp.arrays import expand_arrays
 from orchestrator.scenarios.ssp.common import (
@@ -67,6 +68,7 @@ def open_ssp(
     with Scratch("ssp") as scratch:
         try:
             unpack(path, scratch.path / "content")
+            name_folder(scratch.path / "content", path)
         except FmuError as error:
             raise ScenarioError(str(error).replace("`fmu`", "`ssp`")) from None
         yield _scenario(path, scratch.path / "content", inputs or {}, step, simultaneous, events)
@@ -269,7 +271,7 @@ def _descriptions(structure: Structure, path: Path, events: bool) -> dict[str, F
             found[name] = known[file, exchange]
             size.add(len(found[name].model.variables), name)
         except FmuError as error:
-            raise FmuError(f"{path}: {name}: {str(error).replace(str(file), file.name)}") from None
+            raise FmuError(f"{path}: {name}: {error}") from None
     return found
 
 
@@ -334,7 +336,7 @@ def _configured(
             found[name] = read_configured(file, values, events, exchange)[0] if values else description
             size.add(len(found[name].model.variables), name)
         except FmuError as error:
-            raise FmuError(f"{path}: {name}: {str(error).replace(str(file), file.name)}") from None
+            raise FmuError(f"{path}: {name}: {error}") from None
     return found
 
 

@@ -10,9 +10,10 @@ import tempfile
 from pathlib import Path
 
 from orchestrator.errors import OutputError
+from orchestrator.plain_text import SCRATCH
 from orchestrator.shared.operating_system import alive, disk_usage, is_own
 
-PREFIX = "backlash-cosim-"
+PREFIX = SCRATCH
 _swept: set[str] = set()
 
 
