@@ -16,6 +16,7 @@ from orchestrator.diagnosis.data.records import check_record
 from orchestrator.diagnosis.report.misfit_on_test_data import misfit_on_record
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
+from orchestrator.estimation.zeros import set_zeros
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
@@ -157,7 +158,7 @@ def _of_an_fmu(
 
 def comparable_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
     """Return a record that the model can be compared with."""
-    record = as_record(given, model, **reading)
+    record = set_zeros(as_record(given, model, **reading), model)
     check_record(record)
     check_plausible(record, model)
     return record

@@ -5,6 +5,7 @@ from typing import Any
 
 from orchestrator.api.records import as_record
 from orchestrator.errors import ScenarioError
+from orchestrator.estimation.zeros import set_zeros
 from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
@@ -16,7 +17,7 @@ def plausible_record(record: Record | Path | str, model: Model, motor_only: bool
     measured = measured.without_load_encoder() if motor_only else measured
     if measured.has_torque:  # without one the plant plays no part
         check_plausible(measured, model)
-    return measured
+    return set_zeros(measured, model)
 
 
 def require_linear(model: Model) -> None:

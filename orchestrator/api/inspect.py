@@ -25,6 +25,7 @@ from orchestrator.estimation.inspection.sufficiency import SEEN, Sufficiency, su
 from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.estimation.methods import two_encoders
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
+from orchestrator.estimation.zeros import set_zeros
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.record import Record
 from orchestrator.shared.results.estimate import ExcitationFound, RecordFound
@@ -219,6 +220,7 @@ def inspect(
     measured = as_record(record, base, torque_needed=False, part=part, resample=resample, rate=rate)
     machine, origin, more = _machine(measured, base, given=model is not None, sure=not assumed)
     assumed = (*assumed, *more)
+    measured = set_zeros(measured, machine)
     with np.errstate(all="ignore"):
         enough = sufficiency(measured, machine)
         effects = visible_effects(measured, machine)

@@ -1,0 +1,49 @@
+"""Encoders whose zeros lie anywhere: a drivetrain does not care, but sums of many turns and filters do."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from orchestrator.estimation.signals import shaft_signals
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+from orchestrator.records.units import TURN
+
+FAR_TWIST = 0.03  # rad of the load between the encoders' zeros, which no fit takes for an offset of sensors
+FAR_ANGLE = 100.0  # rad from zero, beyond which whole turns are left out
+TAIL = 0.02  # of the rows: flanks are where all others lie
+
+
+def set_zeros(record: Record, model: Model) -> Record:
+    """Return a record of a ``Drivetrain`` whose encoders' zeros lie near each other and near the record, with a note.
+
+    The load's angle, and one that is alone, loses whole turns, so that what follows a turn stays where it is. The
+    motor's zero goes to the middle of the play, where it lies outside: an offset as large is no property of sensors.
+    """
+    if model.fmu != "Drivetrain":
+        return record
+    filled = record.fill_missing()
+    if record.theta_l is None or filled.theta_l is None:
+        return _shift(record, TURN * _far_turns(filled.theta_m), 0.0)
+    load = TURN * _far_turns(filled.theta_l)
+    filled = _shift(filled, 0.0, load)
+    shaft = shaft_signals(filled, model)
+    unwound = shaft.twist - shaft.torque / model.parameters["k"].value
+    low, high = np.quantile(unwound, (TAIL, 1.0 - TAIL))
+    centre = 0.5 * float(low + high)
+    lies_within = abs(centre) <= max(FAR_TWIST, 0.5 * float(high - low))
+    return _shift(record, 0.0 if lies_within else centre * model.parameters["i"].value, load)
+
+
+def _far_turns(angle: np.ndarray) -> int:
+    middle = float(np.median(angle))
+    return round(middle / TURN) if abs(middle) > FAR_ANGLE else 0
+
+
+def _shift(record: Record, motor: float, load: float) -> Record:
+    if motor == 0.0 and load == 0.0:
+        return record
+    shifts = [f"{name} from {shift:.9g} rad" for name, shift in (("theta_m", motor), ("theta_l", load)) if shift]
+    note = f"encoders' zeros lie elsewhere: angles count {' and '.join(shifts)} on"
+    theta_l = None if record.theta_l is None else record.theta_l - load
+    return replace(record, theta_m=record.theta_m - motor, theta_l=theta_l, notes=(*record.notes, note))
