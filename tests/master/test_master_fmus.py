@@ -183,7 +183,7 @@ def test_damaged_and_missing_archives(tmp_path: Path, fmus) -> None:
     with pytest.raises(FmuError):
         make_slave("plant", broken)
     broken.write_bytes(content[:5000])
-    with pytest.raises(FmuError, match="readable zip archive"):
+    with pytest.raises(FmuError, match="intact zip archive"):
         read_description(broken)
     with pytest.raises(FmuError, match=r"must hold a modelDescription\.xml"):
         read_description(archive(tmp_path / "empty.fmu", {"a": b""}))
