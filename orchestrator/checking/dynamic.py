@@ -14,13 +14,22 @@ from orchestrator.checking.probing import (
     probes,
     probes_3,
     probes_compare,
+    probes_dependencies,
     probes_derivatives,
+    probes_driven,
+    probes_life,
     probes_misuse,
+    probes_promises,
     probes_reference,
+    probes_restore,
+    probes_states,
+    probes_steps,
+    probes_values,
     trajectory,
 )
 from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.describing import make_job
+from orchestrator.checking.probing.interfaces import InterfaceRun, compare_interfaces
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import PENDING, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.process import Process
@@ -33,13 +42,18 @@ from orchestrator.shared.isolation.scratch import Scratch
 
 _PROBES: dict[str, probes.Probe] = {
     "life cycle": probes.life_cycle,
-    "inputs": probes.inputs,
+    "inputs": probes_driven.inputs,
     "determinism": probes_compare.determinism,
-    "setting": probes.setting,
+    "setting": probes_driven.setting,
+    "values": probes_values.values,
     "instances": probes_compare.instances,
-    "reset": probes_compare.reset,
-    "state": probes_compare.state,
-    "variable steps": probes_compare.variable_steps,
+    "reset": probes_restore.reset,
+    "state": probes_restore.state,
+    "variable steps": probes_steps.variable_steps,
+    "inner steps": probes_steps.inner_steps,
+    "time": probes_steps.own_time,
+    "states": probes_states.states,
+    "dependencies": probes_dependencies.dependencies,
     "derivatives": probes_derivatives.derivatives,
     "early return": probes_3.early_return,
     "intermediate update": probes_3.intermediate,
@@ -47,6 +61,10 @@ _PROBES: dict[str, probes.Probe] = {
     "configuration": probes_3.structure,
     "reference": probes_reference.reference,
     "memory": probes.memory,
+    "promises": probes_promises.promises,
+    "end": probes_life.ending,
+    "silence": probes_life.silence,
+    "another start": probes_life.another_start,
     "misuse": probes_misuse.misuse,
 }
 PROBES: dict[Version, tuple[str, ...]] = {
@@ -55,6 +73,7 @@ PROBES: dict[Version, tuple[str, ...]] = {
 }
 _MOST_FINDINGS = 10_000
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,16}\b")
+_TWO = 2
 
 
 def obstacle(d: Description, files: FmuFiles) -> str:
@@ -85,6 +104,7 @@ def check_dynamic(
     """
     findings: list[Finding] = []
     executions: list[Execution] = []
+    runs: list[InterfaceRun] = []
     several = len(d.interfaces) > 1
     with Scratch("check") as scratch:
         fmu = scratch.path / "fmu"
@@ -110,6 +130,10 @@ def check_dynamic(
                 found += _Watcher(fmu, limits, walls, interface.kind if several else "").run(job, ("reference",))
             findings += found
             executions.append(Execution(interface.kind, first.stages))
+            runs += [] if first.run_seen is None else [first.run_seen]
+            if len(runs) == _TWO and interface.kind != "ScheduledExecution":
+                first.probe = "interfaces"
+                first.stages["interfaces"] = compare_interfaces(runs[0], runs[1], first.add)
     return findings, tuple(executions)
 
 
@@ -123,12 +147,14 @@ class _Watcher:
         self._said: set[tuple[str, str]] = set()
         self.probe = "load"
         self.stages: dict[str, str] = {}
+        self.run_seen: InterfaceRun | None = None
+        """The run of the interface with moving inputs, once there is one."""
 
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
         before = _snapshot(self.fmu)
         with Process(self._start) as process:
-            library = Library(process, job.version, job.variables, self._add)
+            library = Library(process, job.version, job.variables, self.add)
             try:
                 self._probes(library, job, names)
             except ChildError as error:
@@ -146,12 +172,12 @@ class _Watcher:
     def _probes(self, library: Library, job: ProbeJob, names: tuple[str, ...]) -> None:
         problem = library.load(job.library)
         if problem:
-            self._add("load.library", f"the library must load, but: {problem}")
+            self.add("load.library", f"the library must load, but: {problem}")
             return
-        probes.load(library, self._add)
+        probes.load(library, self.add)
         self.stages["load"] = ""
         single = "canBeInstantiatedOnlyOncePerProcess" in job.flags
-        context = probes.Context(trajectory.Bench(job, library, self._add), self._add, single=single)
+        context = probes.Context(trajectory.Bench(job, library, self.add), self.add, single=single)
         for self.probe in names:
             try:
                 probes.carry_out(_PROBES[self.probe], context)
@@ -161,11 +187,12 @@ class _Watcher:
             except TerminatedError:
                 pass  # the slave ended this run earlier than the undisturbed one: nothing to compare
             except StatusError as error:
-                self._add(_rule_of(error), str(error))
+                self.add(_rule_of(error), str(error))
                 return
             self.stages[self.probe] = ""
+            self.run_seen = InterfaceRun(context.bench.job, context.plain)
 
-    def _add(self, rule: str, message: str, path: str = "", when: str = "") -> None:
+    def add(self, rule: str, message: str, path: str = "", when: str = "") -> None:
         """Take a finding, unless the same was found before; ``when`` is the first time that it was.
 
         What differs from run to run is left out, so that a baseline knows the finding again: the folder, addresses.
@@ -180,18 +207,18 @@ class _Watcher:
     def _report_end(self, error: ChildError, function: str) -> None:
         where = f"during {function}" if function else f"in the probe `{self.probe}`"
         if self.probe == "misuse" and function and error.reason not in ("memory", "disk"):
-            self._add("misuse.crash", f"a call that is to be refused must return, but {error} {where}")
+            self.add("misuse.crash", f"a call that is to be refused must return, but {error} {where}")
         elif error.reason == "time":
-            self._add("limits.time", f"a call must take at most {self.limits.time:g} s, but took longer {where}")
+            self.add("limits.time", f"a call must take at most {self.limits.time:g} s, but took longer {where}")
         elif error.reason == "memory":
             allowed = self.limits.memory >> 20
-            self._add("limits.memory", f"the process must use at most {allowed} MiB, but used more {where}")
+            self.add("limits.memory", f"the process must use at most {allowed} MiB, but used more {where}")
         elif error.reason == "disk":
-            self._add("limits.output", f"text and files must stay below {self.limits.disk >> 20} MiB, but do not")
+            self.add("limits.output", f"text and files must stay below {self.limits.disk >> 20} MiB, but do not")
         elif function:
-            self._add("run.crash", f"no call must end the process, but {error} {where}")
+            self.add("run.crash", f"no call must end the process, but {error} {where}")
         else:
-            self._add("run.failed", f"the probe `{self.probe}` must end, but {error} ({error.said})")
+            self.add("run.failed", f"the probe `{self.probe}` must end, but {error} ({error.said})")
 
     def _report_skipped(self, names: tuple[str, ...]) -> None:
         """Say what was not reached, and why."""
@@ -199,25 +226,25 @@ class _Watcher:
         ended = f"the run ended in the probe `{self.probe}`"
         self.stages |= dict.fromkeys(missing, ended)
         if missing[1:] or "load" not in self.stages:
-            self._add("run.skipped", f"not carried out after that: {', '.join(missing[1:] or missing)}")
+            self.add("run.skipped", f"not carried out after that: {', '.join(missing[1:] or missing)}")
 
     def _report_remains(self, before: dict[str, tuple[int, int]], jail: Jail, left: bool) -> None:
         self.probe = "afterwards"
         written = _files(jail.scratch, "tmp")
         if written:
-            self._add("files.written", f"the FMU must write no files, but wrote {', '.join(written[:5])}", written[0])
+            self.add("files.written", f"the FMU must write no files, but wrote {', '.join(written[:5])}", written[0])
         after = _snapshot(self.fmu)
         changed = sorted(k for k in before.keys() | after.keys() if before.get(k) != after.get(k))
         if changed:
-            self._add(
+            self.add(
                 "files.changed", f"the FMU must leave its files alone, but changed {', '.join(changed[:5])}", changed[0]
             )
         if jail.output_size() >= self.limits.output or any(
             os.lstat(jail.scratch / name).st_size >= self.limits.output for name in written
         ):
-            self._add("limits.output", f"text and files must stay below {self.limits.output >> 20} MiB, but do not")
+            self.add("limits.output", f"text and files must stay below {self.limits.output >> 20} MiB, but do not")
         if left:
-            self._add("process.left", "no process must outlive the FMU, but one did (it has been killed)")
+            self.add("process.left", "no process must outlive the FMU, but one did (it has been killed)")
 
 
 def _rule_of(error: StatusError) -> str:

@@ -42,6 +42,7 @@ class Finding:
         return RULES[self.rule].advice
 
 
+_NOTHING = "the FMU has nothing that it applies to"
 Outcome = Literal["passed", "failed", "not run"]
 
 
@@ -121,7 +122,7 @@ class FmuFindings:
             reasons.append(self.stages[stage])
         if "" in reasons:
             return RuleOutcome(rule, "passed")
-        return RuleOutcome(rule, "not run", reasons[0] if reasons else self.not_executed)
+        return RuleOutcome(rule, "not run", reasons[0] if reasons else self.not_executed or _NOTHING)
 
     def count(self, severity: str) -> int:
         """Number of findings of one severity."""

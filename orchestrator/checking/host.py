@@ -70,7 +70,8 @@ class Host:
         self._states: dict[int, c_void_p] = {}
         self._number = 0
         self._messages: list[str] = []
-        self._errors = 0
+        self._errors = self._noted = 0
+        self._note = ""
         self._function = ""
         self._left = ""
         self._updates: list[list[Any]] = []
@@ -84,16 +85,24 @@ class Host:
 
     def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, message: int, *values: Any) -> None:
         self._errors += status in _ERRORS
-        self._take(fill_in(message, values))
+        self._take(fill_in(message, values), status)
 
     def _log_3(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
         self._errors += status in _ERRORS
-        self._take((message or b"").decode("utf-8", "replace").strip())
+        self._take((message or b"").decode("utf-8", "replace").strip(), status)
 
-    def _take(self, text: str) -> None:
+    def _take(self, text: str, status: int) -> None:
         """Keep a message, the last few of a call."""
+        if status == 0:
+            self._note = self._note if self._noted else text[:200]
+            self._noted += 1
         if text:
             self._messages = [*self._messages[1 - _MESSAGES :], text[:200]]
+
+    def notes(self) -> list[Any]:
+        """How many messages with the status OK there were since the last call, and the first of them."""
+        found, self._noted = [self._noted, self._note], 0
+        return found
 
     def _count(self, change: int) -> None:
         self._locks += change
@@ -116,7 +125,7 @@ class Host:
         value = self._foreign(function)
         return None if value is None else value[:_LONGEST_TEXT].decode("utf-8", "replace")
 
-    def instantiate_2(self, name: str, kind: int, guid: str, resources: str) -> list[Any]:
+    def instantiate_2(self, name: str, kind: int, guid: str, resources: str, logging: bool = True) -> list[Any]:
         """Make an instance of FMI 2.0; return its number (``None``: the FMU returned null) and what it logged.
 
         Args:
@@ -130,12 +139,13 @@ class Host:
         callbacks = _Callbacks(self._logger, allocate, free, None, None)
         self._messages = []
         head = (name.encode(), kind, guid.encode(), resources.encode())
-        component = self._foreign("fmi2Instantiate", *head, ctypes.byref(callbacks), 0, 1)
+        component = self._foreign("fmi2Instantiate", *head, ctypes.byref(callbacks), 0, int(logging))
         return self._make(component, callbacks)
 
     def instantiate_3(
-        self, function: str, name: str, token: str, resources: str | None, flags: list[bool], required: list[int]
-    ) -> list[Any]:
+        self, function: str, name: str, token: str, resources: str | None, flags: list[bool], required: list[int],
+        logging: bool = True,
+    ) -> list[Any]:  # fmt: skip
         """Make an instance of FMI 3.0; return its number (``None``: the FMU returned null) and what it logged.
 
         Returns:
@@ -147,7 +157,7 @@ class Host:
             token.encode(),
             None if resources is None else resources.encode(),
             c_bool(False),
-            c_bool(True),
+            c_bool(logging),
         )
         rest: tuple[Any, ...] = ()
         if function.endswith("CoSimulation"):

@@ -123,8 +123,11 @@ FMI3_Export fmi3Status fmi3SetFloat64(fmi3Instance i, const fmi3ValueReference r
 #ifdef FAULT_set_effect
                 s->hidden = 0.25;
 #endif
+                if (!early) return refuse(b, "it is fixed");
                 s->e = value; break;
-            case P: memcpy(s->p, in + at, used * sizeof *in); break;
+            case P:
+                if (!early) return refuse(b, "it is fixed");
+                memcpy(s->p, in + at, used * sizeof *in); break;
             default: return refuse(b, "cannot be set");
         }
         at += used;
@@ -132,6 +135,7 @@ FMI3_Export fmi3Status fmi3SetFloat64(fmi3Instance i, const fmi3ValueReference r
     return fmi3OK;
 }
 
+#define FIXED(b) if ((b)->mode != INSTANTIATED && (b)->mode != INITIALISATION) return refuse((b), "it is fixed")
 #define ONE(type, name, reference, field) \
 FMI3_Export fmi3Status fmi3Get##name(fmi3Instance i, const fmi3ValueReference r[], size_t n, type out[], size_t nOut) { \
     Ball *b = i; \
@@ -140,18 +144,18 @@ FMI3_Export fmi3Status fmi3Get##name(fmi3Instance i, const fmi3ValueReference r[
 } \
 FMI3_Export fmi3Status fmi3Set##name(fmi3Instance i, const fmi3ValueReference r[], size_t n, const type in[], size_t nIn)
 
-ONE(fmi3Float32, Float32, r[k] == SMALL, b->s.small) { if (r[0] == SMALL) ((Ball *)i)->s.small = in[0]; return fmi3OK; }
+ONE(fmi3Float32, Float32, r[k] == SMALL, b->s.small) { FIXED((Ball *)i); if (r[0] == SMALL) ((Ball *)i)->s.small = in[0]; return fmi3OK; }
 ONE(fmi3Int32, Int32, r[k] == BOUNCES || r[k] == COUNT, r[k] == BOUNCES ? b->s.bounces : b->s.count) {
     Ball *b = i;
     if (r[0] != BOUNCES || (b->mode != INSTANTIATED && b->mode != INITIALISATION)) return refuse(b, "cannot be set");
     b->s.bounces = in[0];
     return fmi3OK;
 }
-ONE(fmi3Boolean, Boolean, r[k] == FLAG, b->s.flag) { ((Ball *)i)->s.flag = in[0]; return fmi3OK; }
-ONE(fmi3Int64, Int64, r[k] == MODE, b->s.mode) { ((Ball *)i)->s.mode = in[0]; return fmi3OK; }
+ONE(fmi3Boolean, Boolean, r[k] == FLAG, b->s.flag) { FIXED((Ball *)i); ((Ball *)i)->s.flag = in[0]; return fmi3OK; }
+ONE(fmi3Int64, Int64, r[k] == MODE, b->s.mode) { FIXED((Ball *)i); ((Ball *)i)->s.mode = in[0]; return fmi3OK; }
 ONE(fmi3UInt64, UInt64, r[k] == N || r[k] == BIG, r[k] == N ? b->s.n : b->s.big) {
     Ball *b = i;
-    if (r[0] == BIG) { b->s.big = in[0]; return fmi3OK; }
+    if (r[0] == BIG) { FIXED(b); b->s.big = in[0]; return fmi3OK; }
     if (r[0] != N || b->mode != CONFIGURATION) return refuse(b, "only in configuration mode");
     if (in[0] > SIZE) return refuse(b, "too many");
 #ifndef FAULT_configuration_value
@@ -178,6 +182,7 @@ FMI3_Export fmi3Status fmi3GetString(fmi3Instance i, const fmi3ValueReference r[
     return fmi3OK;
 }
 FMI3_Export fmi3Status fmi3SetString(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3String in[], size_t nIn) {
+    FIXED((Ball *)i);
     for (size_t k = 0; k < n; k++) snprintf(((Ball *)i)->s.label, TEXT, "%s", in[k]);
     return fmi3OK;
 }

@@ -303,6 +303,7 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[]) {
     Instance *self = c;
+    if (self->phase > INITIALISING) return refuse(self, "a fixed parameter cannot be set now");
     for (size_t i = 0; i < n; i++) {
         if (vr[i] == 1) self->s.gain = value[i];
         else if (vr[i] == 2) self->s.mode = value[i];
@@ -323,6 +324,7 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[]) {
     Instance *self = c;
+    if (self->phase > INITIALISING) return refuse(self, "a fixed parameter cannot be set now");
     for (size_t i = 0; i < n; i++) {
         if (vr[i] != 0) return refuse(self, "fmi2SetBoolean: the variable cannot be set");
         self->s.enabled = value[i];
@@ -344,6 +346,7 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[]) {
     Instance *self = c;
+    if (self->phase > INITIALISING) return refuse(self, "a fixed parameter cannot be set now");
     for (size_t i = 0; i < n; i++) {
         if (vr[i] != 0 || !value[i]) return refuse(self, "fmi2SetString: the variable cannot be set");
         snprintf(self->s.label, sizeof self->s.label, "%s", value[i]);

@@ -107,6 +107,8 @@ class Library:
     def renew(self) -> None:
         """Load the library anew in another process; its instances and states are gone."""
         self._host.renew()
+        self.ended = False
+        self.current = ""
         self.load(self._path)
 
     def _ask(self, doing: str, *request: Any) -> Any:
@@ -195,6 +197,13 @@ class Library:
             case [list() as rows, int() as locks] if all(isinstance(r, list) and len(r) == 8 for r in rows):
                 return rows, locks
         raise odd("an intermediate update")
+
+    def notes(self) -> tuple[int, str]:
+        """Messages that are neither warnings nor errors, since the last call: how many, and the first."""
+        match self._ask("", "notes"):
+            case [int() as count, str() as first]:
+                return count, first[:200]
+        raise odd("the logger")
 
     def resident(self) -> int:
         """Resident memory of the child in bytes, as the system tells; 0 where it does not."""

@@ -20,7 +20,9 @@ class CoSimulation2(Driver):
 
     @classmethod
     def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
-        return library.make(cls.maker, "instantiate_2", name, cls.kind, token, job.resources)
+        return library.make(
+            cls.maker, "instantiate_2", name, cls.kind, token, job.resources, options.get("logging", True)
+        )
 
     def enter_initialisation(self, start: float, stop: float | None) -> None:
         tolerance = self.job.tolerance

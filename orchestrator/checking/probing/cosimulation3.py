@@ -1,6 +1,7 @@
 """The driver of co-simulation of FMI 3.0: steps, early return, event mode and clocks."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library
@@ -8,6 +9,7 @@ from orchestrator.checking.probing.driver import MOST_PARTS
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import DISCARD, OK, WARNING, DiscardedError, StatusError, TerminatedError
+from orchestrator.checking.probing.variables import ProbedVariable
 
 _MOST_RETURNS = 1000
 _SMALL = 1e-9
@@ -34,7 +36,17 @@ class CoSimulation3(EventDriver):
         events = options.get("events", "hasEventMode" in job.flags)
         flags = [events, options.get("early", True), options.get("intermediate", False)]
         required = [v.reference for v in job.variables if v.intermediate] if flags[2] else []
-        return library.make(cls.maker, "instantiate_3", cls.maker, name, token, job.resources, flags, required)
+        return library.make(
+            cls.maker,
+            "instantiate_3",
+            cls.maker,
+            name,
+            token,
+            job.resources,
+            flags,
+            required,
+            options.get("logging", True),
+        )
 
     def enter_initialisation(self, start: float, stop: float | None) -> None:
         enter_initialisation_3(self, start, stop)
@@ -93,6 +105,16 @@ class CoSimulation3(EventDriver):
         if terminate:
             raise TerminatedError
         return bool(event), float(last) if early else goal
+
+    def set_discrete(self, values: Mapping[ProbedVariable, Sequence[Any]], t: float) -> None:
+        if not self.events:
+            super().set_discrete(values, t)
+            return
+        when = f"at t = {t:g}"
+        self.call("EnterEventMode", when=when)
+        super().set_discrete(values, t)
+        self.settle(t, when)
+        self.call("EnterStepMode", when=when)
 
     def _may_return_early(self) -> bool:
         flags = {"mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate"}

@@ -1,12 +1,13 @@
 """From the description of an FMU to what is to be run."""
 
 import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from orchestrator.checking.description import DescribedVariable, Description, Interface, number
 from orchestrator.checking.layered import ReferenceResult
-from orchestrator.checking.probing.job import ProbedClock, ProbeJob
+from orchestrator.checking.probing.job import ProbedClock, ProbedUnknown, ProbeJob
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.shared.isolation.limits import Limits
 
@@ -17,6 +18,7 @@ _FLAGS = (
     "canGetAndSetFMUstate", "canSerializeFMUstate", "canGetAndSetFMUState", "canSerializeFMUState",
     "canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess", "canRunAsynchronuously",
     "providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives",
+    "canInterpolateInputs", "providesPerElementDependencies", "providesEvaluateDiscreteStates",
     "hasEventMode", "mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate",
 )  # fmt: skip
 
@@ -39,7 +41,9 @@ def make_job(
     version, folder = d.dialect.version, fmu / "resources"
     resources = folder.as_uri() if version == "2.0" else f"{folder}/" if folder.is_dir() else None
     known = [v for v in d.variables if v.reference is not None and v.kind]
-    variables = tuple(p for p in (_variable_of_job(d, v) for v in known) if 0 < p.size <= _MOST_VALUES)
+    probed = [(v, _variable_of_job(d, v)) for v in known]
+    variables = tuple(p for _, p in probed if 0 < p.size <= _MOST_VALUES)
+    by_index = {v.index: p for v, p in probed if 0 < p.size <= _MOST_VALUES}
     return ProbeJob(
         version=version,
         interface=interface.kind,
@@ -50,9 +54,11 @@ def make_job(
         clocks=tuple(_clock(v) for v in known if v.kind == "Clock"),
         states=_count(d, [d.variable(u.variable) for u in d.derivatives]),
         indicators=_indicators(d),
-        rates=frozenset(
-            v.reference for u in d.derivatives if (v := d.variable(u.variable)) and v.reference is not None
-        ),
+        state_variables=_states(d, by_index),
+        rate_variables=tuple(p for u in d.derivatives if (p := _probed(d, u.variable, by_index)) is not None),
+        unknowns=tuple(_unknowns(d, by_index)),
+        may_jump=frozenset(v.reference for v in known if v.reference is not None and v.flag("reinit")),
+        categories=tuple(e.get("name", "") for e in d.root.findall("LogCategories/Category")),
         output_order=int(number(interface.element.get("maxOutputDerivativeOrder"), "Integer") or 0),
         start=start,
         stop=stop,
@@ -64,6 +70,39 @@ def make_job(
         flags=frozenset(f for f in _FLAGS if interface.flag(f)),
         reference=reference,
     )
+
+
+def _probed(d: Description, identity: int | None, by_index: Mapping[int, ProbedVariable]) -> ProbedVariable | None:
+    v = d.variable(identity)
+    return None if v is None else by_index.get(v.index)
+
+
+def _states(d: Description, by_index: Mapping[int, ProbedVariable]) -> tuple[ProbedVariable, ...] | None:
+    found = []
+    for u in d.derivatives:
+        rate = d.variable(u.variable)
+        if rate is None:
+            return None
+        state = _probed(d, int(number(rate.own.get("derivative"), "Integer") or 0), by_index)
+        if state is None or _probed(d, u.variable, by_index) is None:
+            return None
+        found.append(state)
+    return tuple(found)
+
+
+def _unknowns(d: Description, by_index: Mapping[int, ProbedVariable]) -> Iterator[ProbedUnknown]:
+    for section, entries in (("output", d.outputs), ("rate", d.derivatives), ("initial", d.initial_unknowns)):
+        for entry in entries:
+            v = _probed(d, entry.variable, by_index)
+            if v is None or v.clocks or v.base == "Clock":
+                continue
+            if entry.dependencies is None:
+                yield ProbedUnknown(section, v, None, ())
+                continue
+            knowns = [_probed(d, number, by_index) for number in entry.dependencies]
+            kinds = entry.kinds or ()
+            if None not in knowns and len(kinds) in (0, len(knowns)):
+                yield ProbedUnknown(section, v, tuple(k for k in knowns if k is not None), kinds)
 
 
 def _or(value: float | None, default: float) -> float:
@@ -99,8 +138,15 @@ def _variable_of_job(d: Description, v: DescribedVariable) -> ProbedVariable:
         size=size,
         clocks=v.clocks or (),
         intermediate=v.flag("intermediateUpdate"),
+        items=_items(d, v) if v.kind == "Enumeration" else (),
+        most_bytes=int(number(v.attributes.get("maxSize"), "Integer") or 0) or None,
         extents=tuple(-1 - e.reference if e.reference is not None else e.size or 0 for e in v.dimensions),
     )
+
+
+def _items(d: Description, v: DescribedVariable) -> tuple[int, ...]:
+    declared = next((t for t in d.types if t.name == v.own.get("declaredType")), None)
+    return () if declared is None else tuple(value for _, value in declared.items if value is not None)
 
 
 def _starts(v: DescribedVariable, base: str, size: int, second: bool) -> tuple[Any, ...] | None:
@@ -143,4 +189,5 @@ def _clock(v: DescribedVariable) -> ProbedClock:
         shift=float(shift) if shift is not None else (0.0 if periodic else None),
         priority=int(number(v.attributes.get("priority"), "Integer") or 0),
         clocks=v.clocks or (),
+        fraction=v.flag("supportsFraction"),
     )

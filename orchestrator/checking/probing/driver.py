@@ -1,6 +1,6 @@
 """An instance with the sequence of calls of its interface: what probes do is the same for all of them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library
@@ -13,7 +13,7 @@ Report = Callable[..., None]
 _CTYPES = {
     "2.0": {"Real": "double", "Integer": "int", "Boolean": "int", "String": "text"},
     "3.0": {
-        "Float64": "double", "Float32": "float", "Boolean": "bool", "String": "text", "Clock": "bool",
+        "Float64": "double", "Float32": "float", "Boolean": "uint8", "String": "text", "Clock": "bool",
         **{f"{sign}Int{bits}": f"{sign.lower()}int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)},
     },
 }  # fmt: skip
@@ -29,8 +29,10 @@ class Driver(FmuInstance):
 
     Attributes:
         report: called with rule, message, path and the time of the first one in words (``when``).
+        driven: whether inputs that are not continuous change in its runs.
     """
 
+    driven = False
     maker = ""
 
     def __init__(self, library: Library, number: int, job: ProbeJob, report: Report) -> None:
@@ -100,6 +102,12 @@ class Driver(FmuInstance):
             if v.clocks:
                 found[i] = list(held.get(v.reference, [None] * v.size))
         return [value for i in range(len(variables)) for value in found[i]]
+
+    def set_discrete(self, values: Mapping[ProbedVariable, Sequence[Any]], t: float) -> None:
+        """Write inputs and tunable parameters of any type at the communication point ``t`` [s]."""
+        for base in dict.fromkeys(v.base for v in values):
+            group = [v for v in values if v.base == base]
+            self.set(group, [x for v in group for x in values[v]], f"at t = {t:g}")
 
     def enter_initialisation(self, start: float, stop: float | None) -> None:
         """From a new or reset instance into initialisation, for an experiment from ``start`` to ``stop`` [s]."""

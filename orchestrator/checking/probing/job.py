@@ -17,6 +17,7 @@ class ProbedClock:
         interval, shift: [s]; None where the FMU has to be asked.
         priority: smaller is more urgent.
         clocks: value references of clocks that must tick for this one to tick.
+        fraction: whether its interval can be had as a fraction.
     """
 
     name: str
@@ -27,6 +28,23 @@ class ProbedClock:
     shift: float | None
     priority: int = 0
     clocks: tuple[int, ...] = ()
+    fraction: bool = False
+
+
+@dataclass(frozen=True)
+class ProbedUnknown:
+    """An entry of ModelStructure.
+
+    Attributes:
+        section: "output", "rate" or "initial".
+        knowns: the variables that it depends on as the description says; None where it depends on all.
+        kinds: how it depends on each of them; empty where that is not said.
+    """
+
+    section: str
+    variable: ProbedVariable
+    knowns: tuple[ProbedVariable, ...] | None
+    kinds: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -39,7 +57,11 @@ class ProbeJob:
         resources: the folder of resources as the version hands it over; None when there is none.
         states: number of continuous states, None when the FMU has to be asked.
         indicators: number of event indicators, likewise.
-        rates: value references of the derivatives of states.
+        state_variables: the variables of the states in the order of the description, None where one cannot be told.
+        rate_variables: their derivatives, in the same order.
+        unknowns: the entries of ModelStructure whose variables can be read.
+        may_jump: value references of the states that an event may change.
+        categories: of log messages.
         output_order: up to which order outputs have derivatives over time.
         start, stop, step: the experiment in s; ``stop`` is None when the FMU does not say.
         steps: number of communication steps of a test run.
@@ -58,7 +80,11 @@ class ProbeJob:
     clocks: tuple[ProbedClock, ...]
     states: int | None
     indicators: int | None
-    rates: frozenset[int]
+    state_variables: tuple[ProbedVariable, ...] | None
+    rate_variables: tuple[ProbedVariable, ...]
+    unknowns: tuple[ProbedUnknown, ...]
+    may_jump: frozenset[int]
+    categories: tuple[str, ...]
     output_order: int
     start: float
     stop: float | None
@@ -90,6 +116,11 @@ class ProbeJob:
         open_ = [v for v in self.variables if v.base != "Clock"]
         chosen = [v for v in open_ if v.causality == "output"]
         return chosen or [v for v in open_ if v.causality == "local" and not v.clocks]
+
+    @property
+    def time_variable(self) -> ProbedVariable | None:
+        """The independent variable, where it can be read as a number."""
+        return next((v for v in self.variables if v.causality == "independent" and v.real and v.size == 1), None)
 
     def labels(self) -> list[str]:
         """Names of the recorded values."""

@@ -5,6 +5,7 @@ Steps of an embedded pair of order 2 (Heun) with order 1 (Euler) are short enoug
 """
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library
@@ -13,11 +14,13 @@ from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import DISCARD, StatusError, TerminatedError
+from orchestrator.checking.probing.variables import ProbedVariable
 
 _TOLERANCE = 1e-3
 _MOST_STEPS = 300
 _LOCATED = 1e-5
 _SMALL = 1e-9
+_JUMP = 1e-6  # of the size of a state: less is what a solver or a projection may do
 _DERIVATIVES = {"2.0": "GetDerivatives", "3.0": "GetContinuousStateDerivatives"}
 
 
@@ -27,9 +30,13 @@ class ModelExchange(EventDriver):
     @classmethod
     def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
         if job.version == "2.0":
-            return library.make("fmi2Instantiate", "instantiate_2", name, 0, token, job.resources)
+            return library.make(
+                "fmi2Instantiate", "instantiate_2", name, 0, token, job.resources, options.get("logging", True)
+            )
         function = "fmi3InstantiateModelExchange"
-        return library.make(function, "instantiate_3", function, name, token, job.resources, [], [])
+        return library.make(
+            function, "instantiate_3", function, name, token, job.resources, [], [], options.get("logging", True)
+        )
 
     def enter_initialisation(self, start: float, stop: float | None) -> None:
         if self.job.version == "2.0":
@@ -67,6 +74,23 @@ class ModelExchange(EventDriver):
         (values,) = self.call(function, ("out", "double", count), ("size", count), when=when)
         return list(values)
 
+    def continuous_states(self) -> list[float]:
+        """The vector of states."""
+        return self._values("GetContinuousStates", "states", "")
+
+    def set_continuous_states(self, x: Sequence[float]) -> None:
+        """Write the vector of states."""
+        if x:
+            self.call("SetContinuousStates", ("in", "double", list(x)), ("size", len(x)))
+
+    def rates(self) -> list[float]:
+        """The derivatives of the states."""
+        return self._values(_DERIVATIVES[self.job.version], "states", "")
+
+    def nominal_values(self) -> list[float]:
+        """The nominal values of the states, as the FMU says."""
+        return self._values("GetNominalsOfContinuousStates", "states", "")
+
     def _signs(self, when: str) -> list[bool]:
         return [z > 0.0 for z in self._values("GetEventIndicators", "indicators", when)]
 
@@ -82,6 +106,12 @@ class ModelExchange(EventDriver):
         answers = self.call_many(requests, when)
         signs = [z > 0.0 for z in answers[-1][0]] if self.memory["indicators"] else []
         return (list(answers[2][0]) if x else []), signs
+
+    def set_discrete(self, values: Mapping[ProbedVariable, Sequence[Any]], t: float) -> None:
+        when = f"at t = {t:g}"
+        self.call("EnterEventMode", when=when)
+        super().set_discrete(values, t)
+        self._leave_event_mode(t, when)
 
     def advance(self, t: float, size: float, when: str = "") -> None:
         end, h = t + size, min(self.memory.get("h") or size, size)
@@ -166,7 +196,33 @@ class ModelExchange(EventDriver):
     def _event(self, t: float, when: str) -> list[float]:
         """Handle an event; the states after it."""
         self.call("EnterEventMode", when=when)
-        self.settle(t, when)
+        return self._leave_event_mode(t, when)
+
+    def _leave_event_mode(self, t: float, when: str) -> list[float]:
+        """Update the discrete states and go back to continuous time; the states after it."""
+        before = self._values("GetContinuousStates", "states", when)
+        outcomes = self.settle(t, when)
         self.call("EnterContinuousTimeMode", when=when)
         self.memory["signs"] = self._signs(when)
-        return self._values("GetContinuousStates", "states", when)
+        after = self._values("GetContinuousStates", "states", when)
+        self._judge_event(before, after, any(o.states_changed for o in outcomes), when)
+        return after
+
+    def _judge_event(self, before: list[float], after: list[float], told: bool, when: str) -> None:
+        """What an event did to the states must be told, and be foreseen in the description."""
+        nominals = self.memory["nominals"]
+        pairs = zip(before, after, nominals, strict=True)
+        jumped = [i for i, (a, b, n) in enumerate(pairs) if abs(b - a) > _JUMP * max(abs(a), n)]
+        if not jumped:
+            return
+        variables = [v for v in self.job.state_variables or () for _ in range(v.size)]
+        names = [f"`{variables[i].name}`" if len(variables) == len(before) else f"number {i + 1}" for i in jumped]
+        if not told:
+            text = f"an event that changes states must say so, but one changes {', '.join(names[:5])} and does not"
+            self.report("event.states-changed", text, when=when)
+        elif len(variables) == len(before):
+            for i in jumped:
+                if variables[i].reference not in self.job.may_jump:
+                    name = variables[i].name
+                    text = f"an event must change states with reinit only, but one changes `{name}`"
+                    self.report("event.reinit", text, name, when)

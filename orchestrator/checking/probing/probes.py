@@ -1,4 +1,4 @@
-"""Probes of one running FMU: life cycle, inputs, reference result, memory.
+"""Probes of one running FMU: life cycle, memory, and what all probes share.
 
 A probe that cannot be carried out on an FMU raises ``SkippedError`` with the reason; the ones after it go on.
 """
@@ -10,9 +10,11 @@ from typing import Any
 
 from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.movement import distinct
 from orchestrator.checking.probing.statuses import DISCARD, DiscardedError, StatusError, TerminatedError
-from orchestrator.checking.probing.trajectory import Bench, Difference, compare, excitation
-from orchestrator.checking.probing.variables import ProbedVariable, finite
+from orchestrator.checking.probing.trajectory import Bench, Difference, compare
+from orchestrator.checking.probing.variables import ProbedVariable, finite, shown
 from orchestrator.shared.stopwatch import Stopwatch
 
 _LEAK_PER_INSTANCE = 256 * 1024
@@ -20,6 +22,9 @@ _LEAK_PER_STEP = 8 * 1024
 _LEAK_AT_LEAST = 512 * 1024
 _FEWEST_STEPS = 10
 _SMALL = 1e-3
+_MOST_NARROW = 200
+_BEGINNING = "in initialisation mode"
+_MOST_ITEMS = 10
 
 
 @dataclass
@@ -30,14 +35,18 @@ class Context:
         report: called with rule, message, path and the time of the first one in words (``when``).
         trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
             cannot be repeated, so that nothing can be compared with it.
+    plain: the same with parameters and start values as in the file, likewise.
         single: whether a second instance is known not to work.
-        remarked: rules of warnings that have been reported.
+        resets: whether a reset has worked so far.
+    remarked: rules of warnings that have been reported.
     """
 
     bench: Bench
     report: Callable[..., None]
     trace: list[list[Any]] | None = None
+    plain: list[list[Any]] | None = None
     single: bool = False
+    resets: bool = True
     remarked: set[str] = field(default_factory=set)
 
     @property
@@ -98,13 +107,15 @@ def load(library: Library, report: Callable[..., None]) -> None:
 def life_cycle(context: Context) -> None:
     """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value."""
     bench, job = context.bench, context.bench.job
-    outputs = job.outputs()
+    outputs = watched(job)
     with bench.instance(initialised=False) as driver:
         driver.enter_initialisation(job.start, job.stop)
         _start_values(context, driver)
-        driver.exit_initialisation()
         complaints: set[str] = set()
-        _look(context, outputs, driver.read(outputs, "after initialisation"), "after initialisation", complaints)
+        narrow = [v for v in outputs if not v.numeric or v.items]
+        look(context, narrow, driver.read(narrow, _BEGINNING), _BEGINNING, complaints)
+        driver.exit_initialisation()
+        look(context, outputs, driver.read(outputs, "after initialisation"), "after initialisation", complaints)
         budget = Stopwatch(job.budget)
         for n in range(job.steps):
             t = job.start + n * job.step
@@ -123,15 +134,15 @@ def life_cycle(context: Context) -> None:
                 bench.job = replace(job, steps=max(n, 1))
                 break
             when = f"at t = {t + job.step:g}"
-            _look(context, outputs, driver.read(outputs, when), when, complaints)
+            look(context, outputs, driver.read(outputs, when), when, complaints)
             if budget.over and n + 1 >= _FEWEST_STEPS:
                 bench.job = replace(job, steps=n + 1)
                 break
         driver.terminate()
-        _remarks(context, driver)
+        remarks(context, driver)
 
 
-def _remarks(context: Context, driver: Driver) -> None:
+def remarks(context: Context, driver: Driver) -> None:
     """Report warnings, and errors that were logged while calls went well, each kind once."""
     prefix = context.bench.library.names.prefix
     wanted = {"run.warning": f"return {prefix}OK", "run.logged-error": "log errors only when they fail"}
@@ -150,15 +161,14 @@ def _start_values(context: Context, driver: Driver) -> None:
         for v in context.bench.job.variables
         if v.start is not None and not v.clocks and (v.causality in known or v.initial == "exact")
     ]
-    found = iter(driver.read(fixed, "in initialisation mode"))
+    found = iter(driver.read(fixed, _BEGINNING))
     for v in fixed:
         wrong = []
         for label, wanted in zip(v.labels, v.start or (), strict=True):
             value = next(found)
             _string(context, v, value)
             if value is not None and not _close(value, wanted):
-                shown, should = (x.decode("utf-8", "replace") if isinstance(x, bytes) else x for x in (value, wanted))
-                wrong.append(f"`{label}` must start at {should!r} as the XML says, but starts at {shown!r}")
+                wrong.append(f"`{label}` must start at {shown(wanted)} as the XML says, but starts at {shown(value)}")
         if wrong:
             more = f" ({len(wrong) - 1} more of its {v.size} elements differ too)" if wrong[1:] else ""
             context.report("value.start", wrong[0] + more, v.name)
@@ -175,85 +185,53 @@ def _string(context: Context, v: ProbedVariable, value: Any) -> None:
         context.report("value.string", f"`{v.name}`, of type {v.base}, must not be null, but is", v.name)
 
 
-def _look(context: Context, outputs: list[ProbedVariable], values: list[Any], when: str, complaints: set[str]) -> None:
-    """Complain once about each output that is not finite or not in its range."""
-    owners = [v for v in outputs for _ in range(v.size)]
+def watched(job: ProbeJob) -> list[ProbedVariable]:
+    """What a run is judged by: the outputs, and other variables whose values can be none of their type."""
+    outputs = job.outputs()
+    narrow = [v for v in job.variables if not v.clocks and (v.items or v.base in ("Boolean", "String", "Binary"))]
+    return distinct([*outputs, *narrow[:_MOST_NARROW]])
+
+
+def look(context: Context, variables: list[ProbedVariable], values: list[Any], when: str, complaints: set[str]) -> None:
+    """Complain once about each variable whose value is not finite, not in its range or not of its type."""
+    owners = [v for v in variables for _ in range(v.size)]
     for v, value in zip(owners, values, strict=True):
         if v.name in complaints or (value is None and v.clocks):
             continue
-        if not finite(value):
+        fault = _fault(v, value)
+        if fault is not None:
             complaints.add(v.name)
-            context.report("value.not-finite", f"`{v.name}` must be finite, but is {value} {when}", v.name)
-        elif v.numeric:
-            slack = 1e-9 * max(abs(value), 1.0)
-            low = v.minimum is not None and value < v.minimum - slack
-            if low or (v.maximum is not None and value > v.maximum + slack):
-                complaints.add(v.name)
-                message = f"`{v.name}` must lie in [{v.minimum}, {v.maximum}], but is {value} {when}"
-                context.report("value.out-of-range", message, v.name)
+            context.report(fault[0], f"`{v.name}` {fault[1]} {when}", v.name)
         _string(context, v, value)
 
 
-def inputs(context: Context) -> None:
-    """Run with moving inputs; what is recorded is what the later probes compare with."""
-    bench = context.bench
-    refused = None
-    with bench.instance() as driver:
-        for v in bench.job.inputs():
-            try:
-                driver.set([v], excitation(v, 0.0, bench.duration))
-            except StatusError as error:
-                refused = f"{error} for `{v.name}`, which was set within its bounds"
-                break
-    if refused is not None:
-        context.report("run.input-refused", refused)
-        bench.excited = False
+def _fault(v: ProbedVariable, value: Any) -> tuple[str, str] | None:
+    """The rule that a value breaks, and how."""
+    if not finite(value):
+        return "value.not-finite", f"must be finite, but is {value}"
+    if v.items and value not in v.items:
+        items = ", ".join(map(str, v.items[:_MOST_ITEMS]))
+        return "value.item", f"must be one of the items {items} of its type, but is {value}"
+    if v.base == "Boolean" and value not in (0, 1):
+        return "value.boolean", f"must be true (1) or false (0), but is {value}"
+    if v.base == "Binary" and v.most_bytes is not None and value is not None and len(value) > v.most_bytes:
+        return "value.binary-size", f"must have at most maxSize = {v.most_bytes} bytes, but has {len(value)}"
+    if v.base == "String" and value is not None and not _is_text(value):
+        return "value.text", f"must be UTF-8, but is {shown(value)}"
+    if v.numeric and v.causality in ("output", "local"):
+        slack = 1e-9 * max(abs(value), 1.0)
+        low = v.minimum is not None and value < v.minimum - slack
+        if low or (v.maximum is not None and value > v.maximum + slack):
+            return "value.out-of-range", f"must lie in [{v.minimum}, {v.maximum}], but is {value}"
+    return None
+
+
+def _is_text(value: bytes) -> bool:
     try:
-        with bench.instance() as driver:
-            context.trace = bench.run(driver)
-            _remarks(context, driver)
-    except DiscardedError as error:
-        if error.again or not bench.excited:
-            raise
-        bench.excited = False  # the life cycle was possible with the start values
-        with bench.instance() as driver:
-            context.trace = bench.run(driver)
-
-
-def setting(context: Context) -> None:
-    """Set everything that can be set to its start value: accepted, and without effect.
-
-    Inputs are set in initialisation mode: before it, FMI 2.0 allows that for variables with ``initial`` only.
-    """
-    bench, job = context.bench, context.bench.job
-    settable = [v for v in job.variables if _settable(v)]
-    with bench.instance(initialised=False) as driver:
-        entered = False
-        for v in sorted(settable, key=lambda v: v.causality == "input"):
-            if v.causality == "input" and not entered:
-                driver.enter_initialisation(job.start, job.stop)
-                entered = True
-            try:
-                driver.set([v], v.start or (), f"for `{v.name}`, set to its start value,")
-            except StatusError as error:
-                rule = "value.set" if v.causality in ("input", "parameter") else "value.set-initial"
-                context.report(rule, str(error), v.name)
-                return
-        if context.trace is None:
-            return
-        if not entered:
-            driver.enter_initialisation(job.start, job.stop)
-        driver.exit_initialisation()
-        difference = context.compare(context.trace, bench.run(driver))
-    if difference is not None:
-        context.report_difference("value.set", "a run must not change when start values are set", difference)
-
-
-def _settable(v: ProbedVariable) -> bool:
-    """Whether the standard allows to set the variable before initialisation."""
-    if v.start is None or v.variability == "constant" or v.clocks or v.causality == "structuralParameter":
+        value.decode("utf-8")
+    except UnicodeDecodeError:
         return False
-    return v.initial == "exact" or v.causality == "input"
+    return True
 
 
 def memory(context: Context) -> None:
@@ -265,7 +243,7 @@ def memory(context: Context) -> None:
     budget = Stopwatch(4.0 * job.budget)
     cycles, before = 0, None
     for n in range(0 if context.single else 30):
-        with bench.instance():
+        with bench.instance(moved=False):
             pass
         if n == 9:
             before = resident()
@@ -277,7 +255,7 @@ def memory(context: Context) -> None:
         context.report(
             "resources.instance-leak", f"an instance must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
         )
-    with bench.instance() as driver:
+    with bench.instance(moved=False) as driver:
         quarter = max(job.steps // 4, 1)
         bench.run(driver, 0, quarter, excited=False)
         before = resident()

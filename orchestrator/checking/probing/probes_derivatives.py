@@ -10,15 +10,20 @@ from itertools import pairwise
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.points import Point, points
 from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.slopes import TOLERANCE as _TOLERANCE
+from orchestrator.checking.probing.slopes import count_far
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.variables import ProbedVariable
 
 _MOST = 20  # unknowns, and knowns
-_FEW_STEPS = 5
-_TOLERANCE = 0.1
 _CHANGE = 1e-4
 _EXACT = 1e-6
+_LINEAR = 1e-6
+_PARTIAL = 0.05  # of an entry
+_SMALL = 1e-4  # of the largest entry of a row
+_SMOOTH = 0.01
 _FUNCTIONS = {"2.0": "GetRealOutputDerivatives", "3.0": "GetOutputDerivatives"}
 Matrix = list[list[float]]
 
@@ -31,12 +36,13 @@ def derivatives(context: Context) -> None:
     if job.interface == "ScheduledExecution" or not (job.output_order or directional or adjoint):
         raise SkippedError("the flags promise no derivatives")
     outputs = [v for v in job.outputs() if v.causality == "output" and _smooth(v)][:_MOST]
-    rates = [v for v in job.variables if v.reference in job.rates and _smooth(v)] if _follows(context) else []
-    unknowns, knowns = [*outputs, *rates][:_MOST], [v for v in job.inputs() if _smooth(v)][:_MOST]
+    rates = [v for v in job.rate_variables if _smooth(v)] if _follows(context) else []
+    unknowns = [*outputs, *rates][:_MOST]
+    knowns = [v for v in job.inputs() if _smooth(v)][:_MOST] if context.bench.excited else []
     try:
         if job.output_order and outputs:
             _outputs(context, outputs)
-        if (directional or adjoint) and unknowns and knowns:
+        if (directional or adjoint) and unknowns:
             _partial(context, unknowns, knowns, directional, adjoint)
     except StatusError as error:
         if "Derivative" not in error.function:
@@ -73,15 +79,13 @@ def _outputs(context: Context, outputs: list[ProbedVariable]) -> None:
         if not all(_within(row[i], v) for row in rows):
             continue  # a finding already
         slopes = [(b[i] - a[i]) / job.step for a, b in pairwise(rows)]
-        off = [_off(x[i], s, r) for x, s, r in zip(found[1:], slopes, slopes[1:], strict=False)]
-        largest = max(map(abs, slopes), default=0.0)
-        far = sum(not x <= _TOLERANCE * largest for x in off)
+        far = count_far([x[i] for x in found], slopes)
         absent = sum(not math.isfinite(x[i]) for x in found)
         if absent:
             message = f"the first derivative of `{v.name}` must be finite, but {absent} of {len(found)} are not"
             context.report("derivative.value", message, v.name)
-        elif far > len(off) / 2:
-            text = f"is off by more than {_TOLERANCE:.0%} of its largest slope at {far} of {len(off)} points"
+        elif far > (len(slopes) - 1) / 2:
+            text = f"is off by more than {_TOLERANCE:.0%} of its largest slope at {far} of {len(slopes) - 1} points"
             message = f"the first derivative of `{v.name}` must be that of the output, but {text}"
             context.report("derivative.value", message, v.name)
 
@@ -92,41 +96,111 @@ def _within(value: float, v: ProbedVariable) -> bool:
     return math.isfinite(value) and low <= value <= high
 
 
-def _off(x: float, before: float, after: float) -> float:
-    """How far a derivative is from the slopes on both sides; NaN where it is none."""
-    bend = abs(after - before)
-    return max(min(abs(x - before), abs(x - after)) - bend, 0.0) if math.isfinite(x) else math.nan
-
-
 def _partial(
-    context: Context, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], directional: bool, adjoint: bool
+    context: Context, unknowns: list[ProbedVariable], inputs: list[ProbedVariable], directional: bool, adjoint: bool
 ) -> None:
-    """The matrix of partial derivatives, by columns, by rows and by small changes."""
-    bench, job = context.bench, context.bench.job
+    """The matrix of partial derivatives, by columns, by rows and by small changes, at points of a driven run."""
+    bench = context.bench
     with bench.instance() as driver:
-        bench.run(driver, 0, min(_FEW_STEPS, job.steps))
-        columns: Matrix = []
-        if directional:
-            found = [_sensitivities(driver, "Directional", unknowns, knowns, k) for k in range(len(knowns))]
-            columns = [list(row) for row in zip(*found, strict=True)]
-        rows = [_sensitivities(driver, "Adjoint", unknowns, knowns, k) for k in range(len(unknowns))] if adjoint else []
-        changes = _by_changes(driver, unknowns, knowns) if _follows(context) else []
-    if rows and columns and _differs(rows, columns, _EXACT):
-        where = _where(rows, columns, unknowns, knowns)
+        for point in points(bench, driver):
+            knowns = [*inputs, *(v for v in point.states if _smooth(v))][:_MOST]
+            if not knowns:
+                return
+            matrices = {}
+            if directional:
+                matrices["directional"] = _columns(context, point, unknowns, knowns)
+            if adjoint:
+                matrices["adjoint"] = _rows(context, point, unknowns, knowns)
+            if _judge(context, point, matrices, (unknowns, knowns)):
+                return
+
+
+def _judge(
+    context: Context,
+    point: Point,
+    matrices: dict[str, Matrix],
+    variables: tuple[list[ProbedVariable], list[ProbedVariable]],
+) -> bool:
+    """Hold the matrices against each other, and against small changes. Return whether something was reported."""
+    when = f"at t = {point.time:g}"
+    if len(matrices) > 1 and _differs(matrices["adjoint"], matrices["directional"], _EXACT):
+        where = _where(matrices["adjoint"], matrices["directional"], *variables)
         message = f"adjoint derivatives must be the directional ones transposed, but {where}"
-        context.report("derivative.adjoint", message)
-    for name, matrix in (("directional", columns), ("adjoint", rows)):
-        if matrix and changes and _differs(matrix, changes, _TOLERANCE):
-            where = _where(matrix, changes, unknowns, knowns)
-            context.report("derivative.value", f"{name} derivatives must be those of small changes, but {where}")
+        context.report("derivative.adjoint", message, "", when)
+        return True
+    if context.trace is None:
+        return False  # runs cannot be repeated, so small changes show nothing
+    changes, wider = _by_changes(point, *variables, 1.0), _by_changes(point, *variables, 3.0)
+    # How an output that is a state depends on that state itself is nothing that tools agree on. And between steps
+    # only what reacts at once can be seen: a derivative may be that over the next step.
+    own = [[u.key == k.key for k in variables[1]] for u in variables[0]]
+    counts = [
+        [not o and _agree(b, c) and (b != 0.0 or _follows(context)) for o, b, c in zip(p, r, w, strict=True)]
+        for p, r, w in zip(own, changes, wider, strict=True)
+    ]
+    changes = _masked(changes, counts)
+    for name, whole in matrices.items():
+        matrix = _masked(whole, counts)
+        if _is_off(matrix, changes):
+            where = _where(matrix, changes, *variables)
+            message = f"{name} derivatives must be those of small changes, but {where}"
+            context.report("derivative.value", message, "", when)
+            return True
+    return False
+
+
+def _masked(matrix: Matrix, counts: list[list[bool]]) -> Matrix:
+    """A matrix with zeros where entries do not count."""
+    return [[x if c else 0.0 for x, c in zip(r, s, strict=True)] for r, s in zip(matrix, counts, strict=True)]
+
+
+def _columns(context: Context, point: Point, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]) -> Matrix:
+    """The matrix by directional derivatives."""
+    units = [[float(k == at) for k in range(len(knowns))] for at in range(len(knowns))]
+    columns = [_sensitivities(point.driver, "Directional", unknowns, knowns, seed) for seed in units]
+    matrix = [list(row) for row in zip(*columns, strict=True)]
+    seed = _mixed(len(knowns))
+    found = _sensitivities(point.driver, "Directional", unknowns, knowns, seed)
+    wanted = [sum(a * b for a, b in zip(row, seed, strict=True)) for row in matrix]
+    _judge_mixed(context, "directional", found, wanted, unknowns)
+    return matrix
+
+
+def _rows(context: Context, point: Point, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]) -> Matrix:
+    """The matrix by adjoint derivatives."""
+    units = [[float(k == at) for k in range(len(unknowns))] for at in range(len(unknowns))]
+    matrix = [_sensitivities(point.driver, "Adjoint", unknowns, knowns, seed) for seed in units]
+    seed = _mixed(len(unknowns))
+    found = _sensitivities(point.driver, "Adjoint", unknowns, knowns, seed)
+    wanted = [sum(a * b for a, b in zip(column, seed, strict=True)) for column in zip(*matrix, strict=True)]
+    _judge_mixed(context, "adjoint", found, wanted, knowns)
+    return matrix
+
+
+def _mixed(count: int) -> list[float]:
+    """A seed of several directions at once, each of another size."""
+    return [(-1.0) ** k * (1.7 + 0.3 * k) for k in range(count)]
+
+
+def _judge_mixed(
+    context: Context, kind: str, found: list[float], wanted: list[float], variables: list[ProbedVariable]
+) -> None:
+    """What comes for a mixed seed is the sum of what comes for its parts."""
+    size = max((abs(x) for x in wanted if math.isfinite(x)), default=0.0)
+    for v, a, b in zip(variables, found, wanted, strict=True):
+        if math.isfinite(b) and not abs(a - b) <= _LINEAR * size:
+            text = f"{kind} derivatives must be linear in the seed, but that of `{v.name}` is not"
+            context.report(
+                "derivative.value", text, v.name, f"({a:.6g} instead of {b:.6g} for a seed of several values)"
+            )
+            return
 
 
 def _sensitivities(
-    driver: Driver, kind: str, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], at: int
+    driver: Driver, kind: str, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], seed: list[float]
 ) -> list[float]:
-    """A column of the matrix (directional) or a row of it (adjoint)."""
-    seeded, asked = (knowns, unknowns) if kind == "Directional" else (unknowns, knowns)
-    seed = [1.0 if k == at else 0.0 for k in range(len(seeded))]
+    """The product of the matrix with a seed of the knowns (directional), or of a seed of the unknowns with it."""
+    asked = unknowns if kind == "Directional" else knowns
     lists = [x for group in (unknowns, knowns) for x in (_references(group), ("size", len(group)))]
     if driver.job.version == "2.0":
         tail: list[Any] = [("in", "double", seed), ("out", "double", len(asked))]
@@ -141,25 +215,42 @@ def _references(variables: Sequence[ProbedVariable]) -> tuple[str, str, list[int
     return ("in", "uint32", [v.reference for v in variables])
 
 
-def _by_changes(driver: Driver, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]) -> Matrix:
-    """Central differences about the start values of the inputs, all of which stay within their bounds."""
+def _by_changes(point: Point, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], width: float) -> Matrix:
+    """Central differences about the values at a point, all of which stay within their bounds.
+
+    Args:
+        width: of the changes, in multiples of the usual one.
+    """
     columns = []
-    base = {v.reference: float((v.start or (0.0,))[0]) for v in knowns}
     for v in knowns:
-        driver.set([v], [base[v.reference]])
-    for v in knowns:
-        size = _CHANGE * (v.nominal or max(abs(base[v.reference]), 1.0))
-        low, high = base[v.reference] - size, base[v.reference] + size
+        base = point.get(v)
+        size = width * _CHANGE * (v.nominal or max(abs(base), 1.0))
+        low, high = base - size, base + size
         low = low if v.minimum is None else max(low, v.minimum)
         high = high if v.maximum is None else min(high, v.maximum)
         ends = []
         for value in (low, high):
-            driver.set([v], [value])
-            ends.append(driver.read(unknowns))
-        driver.set([v], [base[v.reference]])
-        width = high - low
-        columns.append([(b - a) / width if width else math.nan for a, b in zip(*ends, strict=True)])
+            point.put(v, value)
+            ends.append(point.driver.read(unknowns))
+        point.put(v, base)
+        span = high - low
+        columns.append([(b - a) / span if span else math.nan for a, b in zip(*ends, strict=True)])
     return [list(row) for row in zip(*columns, strict=True)]
+
+
+def _agree(narrow: float, wide: float) -> bool:
+    """Whether differences over two widths agree: where they do not, there is a kink, or the noise of a solver."""
+    return abs(narrow - wide) <= _SMOOTH * max(abs(narrow), abs(wide)) + _LINEAR
+
+
+def _is_off(matrix: Matrix, changes: Matrix) -> bool:
+    """Whether an entry is far from the slope of small changes, beside it and in its row."""
+    for row, slopes in zip(matrix, changes, strict=True):
+        size = max(map(abs, slopes), default=0.0)
+        for x, y in zip(row, slopes, strict=True):
+            if not abs(x - y) <= _PARTIAL * max(abs(x), abs(y)) + _SMALL * size:
+                return True
+    return False
 
 
 def _differs(a: Matrix, b: Matrix, tolerance: float) -> bool:

@@ -3,8 +3,9 @@
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.movement import moved
 from orchestrator.checking.probing.probes import Context
-from orchestrator.checking.probing.statuses import OK, WARNING
+from orchestrator.checking.probing.statuses import OK, WARNING, StatusError
 
 _NOT_REFUSED = (OK, WARNING)
 
@@ -13,11 +14,14 @@ def misuse(context: Context) -> None:
     """Wrong token, a step too early, a negative step, an unknown value reference, values too many, and more."""
     bench, job = context.bench, context.bench.job
     prefix = bench.library.names.prefix
-    bench.prepare()
-    number = bench.driver.make(bench.library, "instance", "{a guid of another model}", job)
-    if number is not None:
-        bench.library.free(number)
-        context.report("misuse.guid", f"{prefix}Instantiate must refuse a wrong token, but accepts it")
+    for token, what in _wrong_tokens(job.token):
+        bench.prepare()
+        number = bench.driver.make(bench.library, "instance", token, job)
+        if number is not None:
+            bench.library.free(number)
+            context.report("misuse.guid", f"{prefix}Instantiate must refuse {what}, but accepts it")
+            break
+    _set_fixed(context)
     if job.interface == "CoSimulation":
         _steps(context)
     with bench.instance() as driver:
@@ -28,6 +32,45 @@ def misuse(context: Context) -> None:
             context.report("misuse.value-reference", message)
     if job.version == "3.0":
         _of_version_3(context)
+
+
+def _wrong_tokens(token: str) -> list[tuple[str, str]]:
+    """Tokens that are not that of the description, and what they are."""
+    changed = "".join(chr(ord(c) ^ 1) if c.isalnum() and i > len(token) // 2 else c for i, c in enumerate(token))
+    found = [
+        ("{a guid of another model}", "a wrong token"),
+        (token + "x", "its token with a letter more"),
+        (token[:-1], "its token without the last letter"),
+        (changed, "a token whose last letters are others"),
+        (token.swapcase(), "its token in other capitals"),
+        ("", "an empty token"),
+    ]
+    return [(text, what) for text, what in found if text != token]
+
+
+def _set_fixed(context: Context) -> None:
+    """Fixed parameters and constants must not be set between steps."""
+    bench, job = context.bench, context.bench.job
+    if job.interface == "ScheduledExecution":
+        return
+    fixed = [v for v in job.variables if v.causality == "parameter" and v.variability == "fixed" and v.start]
+    constant = [v for v in job.variables if v.variability == "constant" and v.start]
+    chosen = list({v.base: v for v in reversed(fixed)}.values()) + constant[:1]
+    for v in chosen:
+        value = moved(v, v.start or ())
+        if value is None:
+            continue
+        with bench.instance() as driver:
+            bench.run(driver, 0, 1)
+            try:
+                driver.set([v], value)
+            except StatusError:
+                continue
+            what = "constant" if v.variability == "constant" else "fixed parameter"
+            name = f"{bench.library.names.prefix}Set{v.base}"
+            message = f"{name} must refuse to set the {what} `{v.name}` between steps, but does not"
+            context.report("misuse.set-fixed", message, v.name)
+            return
 
 
 def _get(driver: Driver, base: str, references: list[int], size: int) -> int:

@@ -13,7 +13,9 @@ class ScheduledExecution(EventDriver):
 
     @classmethod
     def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
-        return library.make(cls.maker, "instantiate_3", cls.maker, name, token, job.resources, [], [])
+        return library.make(
+            cls.maker, "instantiate_3", cls.maker, name, token, job.resources, [], [], options.get("logging", True)
+        )
 
     def enter_initialisation(self, start: float, stop: float | None) -> None:
         enter_initialisation_3(self, start, stop)

@@ -15,10 +15,13 @@ from orchestrator.checking.probing.cosimulation3 import CoSimulation3
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.model_exchange import ModelExchange
+from orchestrator.checking.probing.movement import Movement, moved
 from orchestrator.checking.probing.scheduled import ScheduledExecution
 from orchestrator.checking.probing.statuses import StatusError
-from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.probing.variables import ProbedVariable, shown
 
+_SWITCHED = (0.2, 0.55, 0.7, 0.85)
+"""Shares of a run at which inputs change that are not continuous: away from the start value, and back."""
 _DRIVERS: dict[tuple[str, str], type[Driver]] = {
     ("2.0", "CoSimulation"): CoSimulation2,
     ("2.0", "ModelExchange"): ModelExchange,
@@ -33,7 +36,8 @@ class Bench:
 
     Attributes:
         report: called with rule, message, path and the time of the first one in words (``when``).
-        excited: whether inputs are moved in runs that are compared.
+        excited: whether floating point inputs are moved in runs that are compared.
+        movement: what else is changed in them; nothing before the probe ``inputs`` has found what the FMU takes.
     """
 
     def __init__(self, job: ProbeJob, library: Library, report: Callable[..., None]) -> None:
@@ -41,6 +45,7 @@ class Bench:
         self.library = library
         self.report = report
         self.excited = True
+        self.movement = Movement()
         self._once = "canBeInstantiatedOnlyOncePerProcess" in job.flags
         self._used = False
 
@@ -56,8 +61,14 @@ class Bench:
         return _DRIVERS[self.job.version, self.job.interface]
 
     @contextmanager
-    def instance(self, initialised: bool = True, name: str = "instance", **options: bool) -> Iterator[Driver]:
-        """An instance, at its first communication point when ``initialised``."""
+    def instance(
+        self, initialised: bool = True, name: str = "instance", moved: bool = True, **options: bool
+    ) -> Iterator[Driver]:
+        """An instance, at its first communication point when ``initialised``.
+
+        Args:
+            moved: whether it starts from the values of ``movement``, not from those of the file.
+        """
         self.prepare()
         number = self.driver.make(self.library, name, self.job.token, self.job, **options)
         if number is None:
@@ -68,18 +79,49 @@ class Bench:
         made.options(**options)
         try:
             if initialised:
-                made.initialise()
+                self.begin(made, moved)
             yield made
         finally:
             made.free()
 
+    def begin(self, driver: Driver, moved: bool = True) -> None:
+        """Bring a new or reset instance to the first communication point."""
+        driver.driven = moved
+        if moved:
+            self.place(driver, inputs=False)
+        driver.enter_initialisation(self.job.start, self.job.stop)
+        if moved:
+            self.place(driver, inputs=True)
+        driver.exit_initialisation()
+
+    def place(self, driver: Driver, inputs: bool) -> None:
+        """Set the values of the movement, those of inputs or all others, a type at a time."""
+        values = self.movement.values
+        for base in dict.fromkeys(v.base for v in values):
+            group = self.movement.of_type(base, inputs)
+            driver.set(group, [x for v in group for x in values[v]], "to values within their limits")
+
     def excite(self, driver: Driver, t: float, phase: float = 0.0) -> None:
-        """Set the floating point inputs to a smooth signal inside their bounds, so that something happens."""
+        """Set the inputs to signals inside their bounds, so that something happens.
+
+        Floating point ones are smooth; the others change in the middle of the run.
+        """
         inputs = self.job.inputs() if self.excited else []
         for base in dict.fromkeys(v.base for v in inputs):
             group = [v for v in inputs if v.base == base]
             values = [x for v in group for x in excitation(v, t - self.job.start, self.duration, phase)]
             driver.set(group, values, f"at t = {t:g}")
+        self._switch(driver, t, phase)
+
+    def _switch(self, driver: Driver, t: float, phase: float) -> None:
+        """Set the inputs of other types where they change."""
+        share = (t - self.job.start) / self.duration
+        turns = [n for n, at in enumerate(_SWITCHED) if abs(share - at) * self.job.steps < 0.5]
+        if not driver.driven or not self.movement.inputs or not turns:
+            return
+        which = turns[0] + (phase != 0.0)
+        chosen = {v: moved(v, v.start or (), which // 2) if which % 2 == 0 else v.start for v in self.movement.inputs}
+        driver.set_discrete({v: x for v, x in chosen.items() if x is not None}, t)
 
     @property
     def duration(self) -> float:
@@ -104,14 +146,18 @@ class Bench:
 
 
 def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0) -> list[float]:
-    """A sine of two periods over the run around each start value, a tenth of the nominal value high.
+    """A sine of nearly two periods over the run beside each start value, a tenth of the nominal value high.
+
+    It is beside the start value so that what integrates an input is not back where it began at any time.
 
     Args:
         duration: of the run [s].
     """
     low = -math.inf if v.minimum is None else v.minimum
     high = math.inf if v.maximum is None else v.maximum
-    wave = math.sin(4.0 * math.pi * t / duration + phase + 0.3)
+    wave = 0.4 + math.sin(3.7 * math.pi * t / duration + phase + 0.3)
+    if low >= high:
+        return [low] * v.size
     starts = [float(x) for x in v.start or (0.0,) * v.size]
     return [min(max(x + 0.1 * (v.nominal or max(abs(x), 1.0)) * wave, low), high) for x in starts]
 
@@ -144,7 +190,7 @@ def compare(a: list[list[Any]], b: list[list[Any]], names: Sequence[str]) -> Dif
     for n, (x, y) in enumerate(zip(a, b, strict=True)):
         for name, p, q in zip(names, x, y, strict=True):
             if not same(p, q):
-                return Difference(f"`{name}` in step {n + 1} is {q!r} instead of {p!r}", _largest(a, b))
+                return Difference(f"`{name}` in step {n + 1} is {shown(q)} instead of {shown(p)}", _largest(a, b))
     return None
 
 

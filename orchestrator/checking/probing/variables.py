@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+_LONGEST = 60
+
 
 @dataclass(frozen=True)
 class ProbedVariable:
@@ -17,6 +19,8 @@ class ProbedVariable:
         clocks: value references of its clocks; it is accessed while one of them ticks.
         intermediate: whether it can be accessed in intermediate updates.
         extents: its dimensions: a size, or minus one less the value reference of the parameter that has it.
+        items: the values of an enumeration; empty for other types.
+        most_bytes: of a binary, None where the description does not say.
     """
 
     name: str
@@ -33,6 +37,8 @@ class ProbedVariable:
     clocks: tuple[int, ...] = ()
     intermediate: bool = False
     extents: tuple[int, ...] = ()
+    items: tuple[int, ...] = ()
+    most_bytes: int | None = None
 
     def resize(self, sizes: Mapping[int, int]) -> "ProbedVariable":
         """The variable after structural parameters have changed."""
@@ -50,9 +56,24 @@ class ProbedVariable:
         return self.real or "Int" in self.base
 
     @property
+    def key(self) -> tuple[str, int]:
+        """What aliases share: the type and the value reference."""
+        return self.base, self.reference
+
+    @property
     def labels(self) -> list[str]:
         """A name for each of its values."""
         return [self.name] if self.size == 1 else [f"{self.name}[{i}]" for i in range(self.size)]
+
+
+def shown(value: Any) -> str:
+    """A value as a reader of the description knows it."""
+    if isinstance(value, bytes):
+        text = value.decode("utf-8", "backslashreplace")
+        return f'"{text[:_LONGEST]}"'
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "null" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
 def finite(value: Any) -> bool:

@@ -1,0 +1,98 @@
+"""Points of a driven run at which a system is looked at: what can be changed there, and how the rest answers."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.model_exchange import ModelExchange
+from orchestrator.checking.probing.movement import distinct, scale_of
+from orchestrator.checking.probing.statuses import TerminatedError
+from orchestrator.checking.probing.trajectory import Bench
+from orchestrator.checking.probing.variables import ProbedVariable
+
+_SHARES = (0.1, 0.45, 0.75)
+"""Shares of a run at which it is looked at: away from its start, and at different phases of the inputs."""
+_PUSH = (0.5, -0.9, 1.3)
+"""By how many of their scales continuous states are pushed there in model exchange."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A driven run that rests at a communication point; in model exchange the states are pushed off their path.
+
+    Attributes:
+        number: of the point, from 0.
+        time: [s].
+    """
+
+    driver: Driver
+    number: int
+    time: float
+
+    @property
+    def states(self) -> tuple[ProbedVariable, ...]:
+        """The scalar variables of the continuous states that can be set here; none in co-simulation."""
+        return state_vector(self.driver)
+
+    def get(self, v: ProbedVariable) -> float:
+        """A number at this point."""
+        return float(self.driver.get([v])[0])
+
+    def put(self, v: ProbedVariable, value: float) -> None:
+        """Set an input, or a state by the whole vector of states."""
+        states = self.states
+        if v not in states:
+            self.driver.set([v], [value])
+            return
+        assert isinstance(self.driver, ModelExchange)
+        x = self.driver.continuous_states()
+        x[states.index(v)] = value
+        self.driver.set_continuous_states(x)
+
+
+def state_vector(driver: Driver) -> tuple[ProbedVariable, ...]:
+    """The variables of the vector of states, where each is a scalar of its own."""
+    variables = driver.job.state_variables
+    if not isinstance(driver, ModelExchange) or not variables or any(v.size != 1 for v in variables):
+        return ()
+    return variables if len(distinct(variables)) == len(variables) == driver.memory["states"] else ()
+
+
+def points(bench: Bench, driver: Driver) -> Iterator[Point]:
+    """Go through a driven run and rest at some of its points.
+
+    Args:
+        driver: at the start of the run.
+    """
+    job = bench.job
+    done = 0
+    for number, share in enumerate(_SHARES):
+        goal = max(int(share * job.steps), min(number, job.steps - 1))
+        try:
+            bench.run(driver, done, goal)
+        except TerminatedError:
+            return
+        done = max(done, goal)
+        t = job.start + done * job.step
+        bench.excite(driver, t)
+        if not isinstance(driver, ModelExchange):
+            yield Point(driver, number, t)
+            continue
+        x = driver.continuous_states()
+        driver.set_continuous_states(_pushed(driver, x, number))
+        yield Point(driver, number, t)
+        driver.set_continuous_states(x)
+
+
+def _pushed(driver: ModelExchange, x: Sequence[float], number: int) -> list[float]:
+    """States off their path, different ones by different amounts."""
+    variables = state_vector(driver)
+    found = []
+    for i, value in enumerate(x):
+        v = variables[i] if variables else None
+        size = 0.1 * float(driver.memory["nominals"][i]) if v is None else scale_of(v, value)
+        pushed = value + _PUSH[number % len(_PUSH)] * size * (1.0 + 0.1 * (i % 7))
+        low = -float("inf") if v is None or v.minimum is None else v.minimum
+        high = float("inf") if v is None or v.maximum is None else v.maximum
+        found.append(pushed if low <= pushed <= high else value)
+    return found

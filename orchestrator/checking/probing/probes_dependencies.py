@@ -1,0 +1,246 @@
+"""The probe of dependencies: what reacts at once to what, held against ModelStructure."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.job import ProbedUnknown
+from orchestrator.checking.probing.model_exchange import ModelExchange
+from orchestrator.checking.probing.movement import Values, moved
+from orchestrator.checking.probing.points import Point, points
+from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.statuses import StatusError, TerminatedError
+from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.shared.stopwatch import Stopwatch
+
+_MOST_KNOWNS = 40
+_MOST_UNKNOWNS = 100
+_PATIENCE = 2.0  # budgets of a run
+_SEEN = 1e-6  # of the size of a value: less is what an algebraic loop leaves
+_SPREAD = 0.01  # of a quotient: more is no constant
+_LINEAR = ("constant", "fixed")
+Key = tuple[str, int]
+
+
+def dependencies(context: Context) -> None:
+    """Change one known after the other, in initialisation and at points of a driven run, and see what reacts."""
+    job = context.bench.job
+    if job.interface == "ScheduledExecution":
+        raise SkippedError("the interface has no communication points")
+    declared = [u for u in job.unknowns if u.knowns is not None]
+    if not declared:
+        raise SkippedError("the description lists no dependencies")
+    measured = _Measured(context)
+    budget = Stopwatch(_PATIENCE * job.budget)
+    if context.trace is not None:
+        _in_run(context, measured, budget)
+    _in_initialisation(context, measured, budget)
+    measured.report()
+
+
+class _Measured:
+    """What was seen of each pair of an unknown and a known."""
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        self.missing: dict[tuple[str, str], str] = {}
+        self.tried: dict[tuple[str, str, str], int] = {}
+        self.reacted: set[tuple[str, str, str]] = set()
+        self.quotients: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
+
+    def look(
+        self, unknowns: Sequence[ProbedUnknown], v: ProbedVariable, rows: list[list[Any]], change: float | None, at: str
+    ) -> None:
+        """Take the values of unknowns before and while a known has another value.
+
+        Args:
+            change: of the known; None where it is no number.
+        """
+        position = 0
+        for u in unknowns:
+            before, during = (row[position : position + u.variable.size] for row in rows)
+            position += u.variable.size
+            if u.variable.key == v.key or u.knowns is None:
+                continue
+            name = (u.section, u.variable.name, v.name)
+            self.tried[name] = self.tried.get(name, 0) + 1
+            listed = v.key in {k.key for k in u.knowns}
+            if any(_reacts(u.variable, a, b) for a, b in zip(before, during, strict=True)):
+                self.reacted.add(name)
+                if not listed:
+                    self.missing.setdefault((u.variable.name, v.name), f"{at} ({_WHERE[u.section]})")
+            if listed and change and u.variable.real and u.variable.size == 1 and math.isfinite(during[0]):
+                noise = 1e-12 * max(abs(before[0]), abs(during[0])) / abs(change)
+                self.quotients.setdefault(name, []).append(((during[0] - before[0]) / change, noise))
+
+    def report(self) -> None:
+        """Hold what was seen against the description."""
+        for (unknown, known), where in self.missing.items():
+            text = f"`{unknown}` reacts to `{known}` at once, so its dependencies must list it, but do not"
+            self.context.report("dependency.missing", text, unknown, f"in {where}")
+        for u in self.context.bench.job.unknowns:
+            name = u.variable.name
+            for known, kind in zip(u.knowns or (), u.kinds, strict=False):
+                found = self.quotients.get((u.section, name, known.name), [])
+                if kind in _LINEAR and _spread(found):
+                    low, high = min(q for q, _ in found), max(q for q, _ in found)
+                    text = f"`{name}` must follow `{known.name}` by a {kind} factor, as dependenciesKind says"
+                    self.context.report("dependency.kind", f"{text}, but by {low:.4g} to {high:.4g}", name)
+        silent = [
+            f"`{u.variable.name}` on `{known.name}`"
+            for u in self.context.bench.job.unknowns
+            if u.knowns is not None and len(u.knowns) <= _FEW_LISTED
+            for known in u.knowns
+            if (pair := (u.section, u.variable.name, known.name)) not in self.reacted
+            and self.tried.get(pair, 0) >= _OFTEN
+            and known.real
+            and u.variable.real
+        ]
+        if silent:
+            more = f" and {len(silent) - 8} more" if len(silent) > 8 else ""
+            text = f"a dependency that is listed must be one, but none was seen of {', '.join(silent[:8])}{more}"
+            self.context.report("dependency.superfluous", text)
+
+
+_FEW_LISTED = 12  # more are taken for the list of all knowns, which tools write where they know nothing
+_OFTEN = 3
+_WHERE = {"output": "Outputs", "rate": "Derivatives", "initial": "InitialUnknowns"}
+
+
+def _reacts(v: ProbedVariable, a: Any, b: Any) -> bool:
+    if isinstance(a, float) and isinstance(b, float):
+        size = max(abs(a), abs(b), 1e-6 * (v.nominal or 1.0))
+        return math.isfinite(a) and math.isfinite(b) and abs(a - b) > _SEEN * size
+    return bool(a != b)
+
+
+def _spread(found: Sequence[tuple[float, float]]) -> bool:
+    """Whether quotients differ by more than their noise."""
+    if len(found) < 2:
+        return False
+    low, high = min(found), max(found)
+    size = max(abs(low[0]), abs(high[0]))
+    return high[0] - low[0] > _SPREAD * size + 10.0 * max(noise for _, noise in found)
+
+
+def _in_run(context: Context, measured: _Measured, budget: Stopwatch) -> None:
+    """At points of a driven run: outputs, and in model exchange derivatives, by inputs and states."""
+    bench, job = context.bench, context.bench.job
+    sections = ("output", "rate") if job.interface == "ModelExchange" else ("output",)
+    unknowns = [u for u in job.unknowns if u.section in sections and u.knowns is not None][:_MOST_UNKNOWNS]
+    if not unknowns:
+        return
+    inputs = [v for v in bench.movement.values if v.causality == "input" and v.size == 1]
+    smooth = [v for v in inputs if v in job.inputs()] if bench.excited else []
+    others = [v for v in inputs if v not in smooth]
+    try:
+        with bench.instance() as driver:
+            for point in points(bench, driver):
+                knowns = [*smooth, *(v for v in point.states if v.real)][:_MOST_KNOWNS]
+                for v in knowns:
+                    _push(measured, point, unknowns, v)
+                    if budget.over:
+                        return
+                _switch(measured, point, unknowns, others[:_MOST_KNOWNS])
+    except (StatusError, TerminatedError):
+        return  # a point at which the FMU does not take a value, which is its right
+
+
+def _push(measured: _Measured, point: Point, unknowns: Sequence[ProbedUnknown], v: ProbedVariable) -> None:
+    """A number to both sides."""
+    base = point.get(v)
+    variables = [u.variable for u in unknowns]
+    for which in (0, 1):
+        other = moved(v, (base,), which)
+        if other is None:
+            continue
+        before = point.driver.read(variables)
+        point.put(v, other[0])
+        during = point.driver.read(variables)
+        point.put(v, base)
+        if _equal_rows(before, point.driver.read(variables)):
+            measured.look(unknowns, v, [before, during], other[0] - base, f"t = {point.time:g}")
+
+
+def _equal_rows(a: Sequence[Any], b: Sequence[Any]) -> bool:
+    return all(x == y or (x != x and y != y) for x, y in zip(a, b, strict=True))  # noqa: PLR0124 (NaN)
+
+
+def _switch(
+    measured: _Measured, point: Point, unknowns: Sequence[ProbedUnknown], inputs: Sequence[ProbedVariable]
+) -> None:
+    """Inputs of other types, in event mode where there is one."""
+    if not inputs:
+        return
+    driver = point.driver
+    leave = _enter_event_mode(driver)
+    variables = [u.variable for u in unknowns]
+    for v in inputs:
+        base = driver.get([v])
+        other = moved(v, base, 0)
+        if other is None:
+            continue
+        before = driver.read(variables)
+        driver.set([v], other)
+        during = driver.read(variables)
+        driver.set([v], base)
+        if _equal_rows(before, driver.read(variables)):
+            measured.look(unknowns, v, [before, during], None, f"t = {point.time:g}")
+    if leave:
+        driver.settle(point.time, "at a point of a run")  # type: ignore[attr-defined]
+        driver.call(leave)
+
+
+def _enter_event_mode(driver: Driver) -> str:
+    """The function that leaves it; empty where there is none."""
+    if isinstance(driver, ModelExchange):
+        driver.call("EnterEventMode")
+        return "EnterContinuousTimeMode"
+    if driver.job.version == "3.0" and getattr(driver, "events", False):
+        driver.call("EnterEventMode")
+        return "EnterStepMode"
+    return ""
+
+
+def _in_initialisation(context: Context, measured: _Measured, budget: Stopwatch) -> None:
+    """In initialisation mode: the initial unknowns, by inputs, parameters and start values."""
+    bench, job = context.bench, context.bench.job
+    unknowns = [u for u in job.unknowns if u.section == "initial" and u.knowns is not None][:_MOST_UNKNOWNS]
+    movement = bench.movement.values
+    knowns = sorted(movement, key=lambda v: v.causality != "input")[:_MOST_KNOWNS]
+    if not unknowns or not knowns:
+        return
+    for which in (0, 1, 2):
+        try:
+            with bench.instance(initialised=False) as driver:
+                if which:
+                    bench.place(driver, inputs=False)
+                driver.enter_initialisation(job.start, job.stop)
+                if which:
+                    bench.place(driver, inputs=True)
+                _initial(measured, driver, unknowns, knowns, (movement, which), budget)
+        except StatusError:
+            return  # not every tool takes values in initialisation mode again and again
+
+
+def _initial(
+    measured: _Measured, driver: Driver, unknowns: Sequence[ProbedUnknown], knowns: Sequence[ProbedVariable],
+    at: tuple[Mapping[ProbedVariable, Values], int], budget: Stopwatch,
+) -> None:  # fmt: skip
+    movement, which = at
+    variables = [u.variable for u in unknowns]
+    for v in knowns:
+        base = movement[v] if which else (v.start or ())
+        other = moved(v, base, which)
+        if other is None:
+            continue
+        before = driver.read(variables)
+        driver.set([v], other)
+        during = driver.read(variables)
+        driver.set([v], base)
+        if _equal_rows(before, driver.read(variables)):
+            change = other[0] - base[0] if v.real and v.size == 1 else None
+            measured.look(unknowns, v, [before, during], change, "initialisation mode")
+        if budget.over:
+            return

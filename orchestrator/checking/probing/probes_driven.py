@@ -1,0 +1,149 @@
+"""The driven run: what it changes is found here, and it is what the later probes compare with."""
+
+from collections.abc import Sequence
+
+from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.movement import Movement, distinct, moved, settable
+from orchestrator.checking.probing.probes import Context, look, remarks, watched
+from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
+from orchestrator.checking.probing.trajectory import excitation
+from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.errors import ChildError
+from orchestrator.shared.stopwatch import Stopwatch
+
+_MOST_TRIALS = 24
+_MOST_CRASHES = 3
+_PATIENCE = 4.0  # budgets of a run for finding what an FMU takes
+
+
+def inputs(context: Context) -> None:
+    """Run with moving inputs, parameters and start values; what is recorded is what the later probes compare with."""
+    bench = context.bench
+    refused = None
+    with bench.instance() as driver:
+        for v in bench.job.inputs():
+            try:
+                driver.set([v], excitation(v, 0.0, bench.duration))
+            except StatusError as error:
+                refused = f"{error} for `{v.name}`, which was set within its bounds"
+                break
+    if refused is not None:
+        context.report("run.input-refused", refused)
+        bench.excited = False
+    try:
+        with bench.instance() as driver:
+            context.plain = bench.run(driver)
+            remarks(context, driver)
+    except DiscardedError as error:
+        if error.again or not bench.excited:
+            raise
+        bench.excited = False  # the life cycle was possible with the start values
+        with bench.instance() as driver:
+            context.plain = bench.run(driver)
+    context.trace = context.plain
+    _Search(context).find()
+
+
+class _Search:
+    """Looks for what can be changed in a run without that the FMU refuses it, a type at a time."""
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        self.bench = context.bench
+        self.trials = self.crashes = 0
+        self.budget = Stopwatch(_PATIENCE * context.bench.job.budget)
+
+    def find(self) -> None:
+        """Leave the movement in the bench, and its run in the context."""
+        groups = _groups(self.bench.job)
+        everything = [v for group in groups for v in group]
+        if not everything or self._works(everything):
+            return
+        accepted: list[ProbedVariable] = []
+        for group in groups:
+            accepted = self._add(accepted, group)
+        if not self._works(accepted):
+            self.bench.movement = Movement()
+            self.context.trace = self.context.plain
+
+    def _add(self, accepted: list[ProbedVariable], group: Sequence[ProbedVariable]) -> list[ProbedVariable]:
+        """What of a group can be moved with the others: all of it, or of its halves."""
+        if not group or self.trials >= _MOST_TRIALS or self.crashes >= _MOST_CRASHES or self.budget.over:
+            return accepted
+        if self._works([*accepted, *group]):
+            return [*accepted, *group]
+        if len(group) == 1:
+            return accepted
+        half = len(group) // 2
+        return self._add(self._add(accepted, group[:half]), group[half:])
+
+    def _works(self, variables: Sequence[ProbedVariable]) -> bool:
+        """Whether a whole run can be done while these variables are moved."""
+        self.trials += 1
+        bench = self.bench
+        values = {v: x for v in variables if (x := moved(v, v.start or ())) is not None}
+        switched = tuple(v for v in values if v.causality == "input" and not (v.real and v in bench.job.inputs()))
+        bench.movement = Movement(values, switched if bench.excited else ())
+        # Numbers may leave their range, or have no solution, where a model is taken away from its file's values.
+        watch = [v for v in watched(bench.job) if v.items or not v.numeric]
+        complaints: set[str] = set()
+        try:
+            with bench.instance() as driver:
+                before = driver.read(watch, "after initialisation")
+                trace = bench.run(driver)
+                after = driver.read(watch, "at the end")
+        except (StatusError, DiscardedError, TerminatedError):
+            return False
+        except ChildError as error:
+            self.crashes += 1
+            if len(values) == 1:
+                (v,) = values
+                text = f"no value within the limits must end the process, but {error} with another value of `{v.name}`"
+                self.context.report("run.moved-crash", text, v.name)
+            bench.library.renew()
+            return False
+        self.context.trace = trace
+        for values_read, when in ((before, "with other values"), (after, "at the end of a run with other values")):
+            look(self.context, watch, values_read, when, complaints)
+        return True
+
+
+def _groups(job: ProbeJob) -> list[list[ProbedVariable]]:
+    """What can be moved, by kind and type: inputs, then parameters, then start values."""
+    chosen = [v for v in distinct(job.variables) if settable(v) and moved(v, v.start or ()) is not None]
+    found: dict[tuple[int, str], list[ProbedVariable]] = {}
+    for v in chosen:
+        if job.interface == "ScheduledExecution" and v.causality == "input":
+            continue
+        rank = ("input", "parameter").index(v.causality) if v.causality in ("input", "parameter") else 2
+        found.setdefault((rank, "enumeration" if v.items else v.base), []).append(v)
+    return [found[key] for key in sorted(found, key=lambda k: (k[0], not k[1].startswith(("Real", "Float")), k[1]))]
+
+
+def setting(context: Context) -> None:
+    """Set everything that can be set to its start value: accepted, and without effect.
+
+    Inputs are set in initialisation mode: before it, FMI 2.0 allows that for variables with ``initial`` only.
+    """
+    bench, job = context.bench, context.bench.job
+    chosen = [v for v in job.variables if settable(v)]
+    with bench.instance(initialised=False) as driver:
+        entered = False
+        for v in sorted(chosen, key=lambda v: v.causality == "input"):
+            if v.causality == "input" and not entered:
+                driver.enter_initialisation(job.start, job.stop)
+                entered = True
+            try:
+                driver.set([v], v.start or (), f"for `{v.name}`, set to its start value,")
+            except StatusError as error:
+                rule = "value.set" if v.causality in ("input", "parameter") else "value.set-initial"
+                context.report(rule, str(error), v.name)
+                return
+        if context.plain is None:
+            return
+        if not entered:
+            driver.enter_initialisation(job.start, job.stop)
+        driver.exit_initialisation()
+        difference = context.compare(context.plain, bench.run(driver))
+    if difference is not None:
+        context.report_difference("value.set", "a run must not change when start values are set", difference)

@@ -1,0 +1,106 @@
+"""Probes of what a life has beside steps: its end, another start time, and silence where logging is off."""
+
+from dataclasses import replace
+from typing import Any
+
+from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
+
+_FEW_STEPS = 3
+_LATER = 10  # steps
+_NEAR = 1e-6
+
+
+def ending(context: Context) -> None:
+    """After the end values can still be read, and a reset leads to another life."""
+    bench, job = context.bench, context.bench.job
+    variables = [v for v in job.variables if not v.clocks and v.base != "Clock" and v.causality == "output"]
+    firsts = list({v.base: v for v in reversed(variables)}.values())
+    with bench.instance() as driver:
+        _steps(context, driver)
+        driver.terminate()
+        for v in firsts:
+            try:
+                driver.get([v], "after Terminate")
+            except StatusError as error:
+                context.report("ended.get", str(error), v.name)
+                break
+    if not context.resets:
+        return
+    with bench.instance() as driver:
+        _steps(context, driver)
+        driver.terminate()
+        try:
+            driver.reset()
+            bench.begin(driver)
+            _steps(context, driver)
+        except StatusError as error:
+            context.report("run.reset", f"{error}, after Terminate and Reset")
+
+
+def _steps(context: Context, driver: Driver) -> None:
+    context.bench.run(driver, 0, min(_FEW_STEPS, context.bench.job.steps))
+
+
+def silence(context: Context) -> None:
+    """Without logging, at instantiation or switched off later, nothing is logged that is neither warning nor error."""
+    bench, job = context.bench, context.bench.job
+    for how in ("loggingOn = false", "SetDebugLogging(false)"):
+        with bench.instance(initialised=False, logging=how != "loggingOn = false") as driver:
+            if how != "loggingOn = false":
+                kind = "bool" if job.version == "3.0" else "int"
+                arguments: list[Any] = [(kind, 0), ("size", 0), ("in", "text", [])]
+                try:
+                    driver.call("SetDebugLogging", *arguments)
+                except StatusError as error:
+                    context.report("promise.refused", f"{error}, for every FMU has it")
+                    return
+            bench.library.notes()
+            bench.begin(driver)
+            bench.run(driver, 0, job.steps)
+            driver.terminate()
+            count, first = bench.library.notes()
+        if count:
+            text = f"nothing must be logged with {how}, but {count} messages are, the first: {first}"
+            context.report("log.off", text)
+            return
+
+
+def another_start(context: Context) -> None:
+    """An experiment that begins at another time than the default one begins there."""
+    bench, job = context.bench, context.bench.job
+    try:
+        for steps in (_LATER, -_LATER):
+            begin = job.start + steps * job.step
+            bench.job = replace(job, start=begin, stop=None if job.stop is None else job.stop + steps * job.step)
+            if not _begins(context, begin):
+                return
+    finally:
+        bench.job = job
+
+
+def _begins(context: Context, begin: float) -> bool:
+    """Whether an experiment begins at ``begin`` [s]; it is reported where it does not."""
+    when = f"of an experiment from t = {begin:g}"
+    try:
+        with context.bench.instance() as driver:
+            found = _time(context, driver)
+            _steps(context, driver)
+    except StatusError as error:
+        if not error.rule:  # a model may have events at times of its own
+            context.report("start.time", f"an experiment must be able to begin at any time, but {error}", "", when)
+        return False
+    except (DiscardedError, TerminatedError):
+        return False
+    if found is not None and abs(found - begin) > _NEAR * max(abs(begin), context.bench.job.step):
+        name = context.bench.job.time_variable.name if context.bench.job.time_variable is not None else ""
+        text = f"`{name}` must be the start time after initialisation, but is {found:g}"
+        context.report("start.time", text, name, when)
+        return False
+    return True
+
+
+def _time(context: Context, driver: Driver) -> float | None:
+    v = context.bench.job.time_variable
+    return None if v is None else float(driver.read([v])[0])

@@ -1,0 +1,235 @@
+"""The probe of promises: what a flag or a list of the description promises is called once.
+
+What is promised is a table: of each line the flag, the versions, where it is called, the function, and what it means.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.events import EventDriver
+from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.model_exchange import ModelExchange
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.variables import ProbedVariable
+
+_MOST = 20
+_FEW_STEPS = 5
+_REACHED = 1e-9
+Call = tuple[str, list[Any]]
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What is promised.
+
+    Attributes:
+        word: the flag or the list of the description.
+        moment: "new", "initialisation", "event" or "run".
+        calls: the calls that must be accepted then, for a job; none where nothing is promised.
+    """
+
+    word: str
+    moment: str
+    calls: Callable[[ProbeJob], list[Call]]
+
+
+def _categories(job: ProbeJob) -> list[Call]:
+    names = [c.encode() for c in job.categories]
+    kind = "bool" if job.version == "3.0" else "int"
+    chosen = [("size", len(names)), ("in", "text", names)]
+    calls: list[Call] = [("SetDebugLogging", [(kind, 1), ("size", 1), ("in", "text", [name])]) for name in names]
+    return [*calls[:_MOST], ("SetDebugLogging", [(kind, 1), *chosen]), ("SetDebugLogging", [(kind, 0), *chosen])]
+
+
+def _input_derivatives(job: ProbeJob) -> list[Call]:
+    inputs = [v.reference for v in job.inputs() if v.base == "Real"][:_MOST]
+    if job.version != "2.0" or "canInterpolateInputs" not in job.flags:
+        return []
+    return [
+        ("SetRealInputDerivatives", [("in", "uint32", [r]), ("size", 1), ("in", "int32", [1]), ("in", "double", [0.0])])
+        for r in inputs
+    ]
+
+
+def _output_derivatives(job: ProbeJob) -> list[Call]:
+    outputs = [v for v in job.outputs() if v.causality == "output" and v.base in ("Real", "Float64")]
+    chosen = [v.reference for v in outputs if v.size == 1 and v.variability == "continuous" and not v.clocks][:_MOST]
+    if job.interface != "CoSimulation" or not chosen:
+        return []
+    name = "GetRealOutputDerivatives" if job.version == "2.0" else "GetOutputDerivatives"
+    tail = [("size", len(chosen))] if job.version == "3.0" else []
+    head = [("in", "uint32", chosen), ("size", len(chosen))]
+    return [
+        (name, [*head, ("in", "int32", [order] * len(chosen)), ("out", "double", len(chosen)), *tail])
+        for order in range(2, min(job.output_order, 5) + 1)  # the first is a probe of its own
+    ]
+
+
+def _evaluate(job: ProbeJob) -> list[Call]:
+    return [("EvaluateDiscreteStates", [])] if "providesEvaluateDiscreteStates" in job.flags else []
+
+
+def _fractions(job: ProbeJob) -> list[Call]:
+    chosen = [c for c in job.clocks if c.fraction and c.causality == "input"]
+    return [
+        (
+            "GetIntervalFraction",
+            [("in", "uint32", [c.reference]), ("size", 1), *(("out", "uint64", 1),) * 2, ("out", "int", 1)],
+        )
+        for c in chosen
+    ]
+
+
+PROMISES = (
+    Promise("LogCategories", "new", _categories),
+    Promise("canInterpolateInputs", "run", _input_derivatives),
+    Promise("maxOutputDerivativeOrder", "run", _output_derivatives),
+    Promise("providesEvaluateDiscreteStates", "initialisation", _evaluate),
+    Promise("providesEvaluateDiscreteStates", "event", _evaluate),
+    Promise("supportsFraction", "initialisation", _fractions),
+)
+
+
+def promises(context: Context) -> None:
+    """Call what the flags and lists of the description promise."""
+    bench, job = context.bench, context.bench.job
+    refused: set[str] = set()
+    for promise in PROMISES:
+        calls = promise.calls(job)
+        if not calls or (promise.moment == "event" and not _has_events(job)):
+            continue
+        with bench.instance(initialised=False) as driver:
+            leave = _go(context, driver, promise.moment)
+            for function, arguments in calls:
+                try:
+                    found = driver.call(function, *arguments)
+                except StatusError as error:
+                    context.report("promise.refused", f"{error}, for {promise.word} promises it")
+                    refused.add(promise.word)
+                    break
+                _judge_fraction(context, function, arguments, found)
+            else:
+                if leave:
+                    driver.call(leave)
+    interpolates = "canInterpolateInputs" in job.flags - refused and job.version == "2.0"
+    if interpolates and job.interface == "CoSimulation":
+        _interpolation(context)
+    if "providesPerElementDependencies" in job.flags:
+        _elements(context)
+
+
+def _has_events(job: ProbeJob) -> bool:
+    return job.interface == "ModelExchange" or (job.interface == "CoSimulation" and "hasEventMode" in job.flags)
+
+
+def _go(context: Context, driver: Driver, moment: str) -> str:
+    """Bring a new instance to a moment. Return the function that leaves event mode, or nothing."""
+    job = context.bench.job
+    if moment == "new":
+        return ""
+    if moment == "initialisation":
+        driver.enter_initialisation(job.start, job.stop)
+        return ""
+    driver.initialise()
+    context.bench.run(driver, 0, 1)
+    if moment == "event":
+        driver.call("EnterEventMode")
+        assert isinstance(driver, EventDriver)
+        driver.settle(job.start + job.step, "in event mode")
+        return "EnterContinuousTimeMode" if isinstance(driver, ModelExchange) else "EnterStepMode"
+    return ""
+
+
+def _judge_fraction(context: Context, function: str, arguments: Sequence[Any], found: list[Any]) -> None:
+    """An interval as a fraction is that of the description."""
+    if function != "GetIntervalFraction":
+        return
+    job = context.bench.job
+    (counter,), (resolution,), _ = found
+    clock = next(c for c in job.clocks if c.reference == arguments[0][2][0])
+    if clock.interval and (not resolution or abs(counter / resolution - clock.interval) > 1e-6 * clock.interval):
+        text = f"the interval of `{clock.name}` must be {clock.interval:g}, but is {counter}/{resolution} as a fraction"
+        context.report("clock.interval-value", text)
+
+
+def _interpolation(context: Context) -> None:
+    """Derivatives of inputs change what comes out, where the inputs themselves do."""
+    bench, job = context.bench, context.bench.job
+    inputs = [v for v in job.inputs() if v.base == "Real" and v.variability == "continuous"][:_MOST]
+    outputs = [v for v in job.outputs() if v.real]
+    if not inputs or not outputs or not bench.excited or context.plain is None:
+        return
+    sizes = [0.5 * _change(v, bench.job.step) for v in inputs]
+    rows = []
+    for kind in ("held", "moved", "sloped"):
+        with bench.instance(moved=False) as driver:
+            for n in range(min(_FEW_STEPS, job.steps)):
+                t = job.start + n * job.step
+                starts = [float((v.start or (0.0,))[0]) for v in inputs]
+                if kind == "moved":
+                    starts = [x + s * job.step for x, s in zip(starts, sizes, strict=True)]
+                driver.set(inputs, starts)
+                if kind == "sloped":
+                    driver.call(
+                        "SetRealInputDerivatives", ("in", "uint32", [v.reference for v in inputs]),
+                        ("size", len(inputs)), ("in", "int32", [1] * len(inputs)), ("in", "double", sizes),
+                    )  # fmt: skip
+                driver.advance(t, job.step, f"at t = {t:g}")
+            driver.set(inputs, [float((v.start or (0.0,))[0]) for v in inputs])
+            rows.append(driver.read(outputs))
+    held, other, sloped = rows
+    if held == sloped and held != other:
+        text = "derivatives of inputs must change what comes out, as canInterpolateInputs says, but they change nothing"
+        context.report("promise.ignored", text)
+
+
+def _change(v: ProbedVariable, step: float) -> float:
+    """A slope of an input that stays within its bounds over a step, or 0."""
+    start = float((v.start or (0.0,))[0])
+    size = 0.1 * (v.nominal or max(abs(start), 1.0))
+    high = float("inf") if v.maximum is None else v.maximum
+    low = -float("inf") if v.minimum is None else v.minimum
+    fits = next((x for x in (size, -size) if low <= start + x <= high), 0.0)
+    return fits / step
+
+
+def _elements(context: Context) -> None:
+    """Dependencies of each element are those of ModelStructure, where both are told."""
+    job = context.bench.job
+    with context.bench.instance() as driver:
+        for u in _scalar_unknowns(job):
+            try:
+                ((count,),) = driver.call(
+                    "GetNumberOfVariableDependencies", ("uint32", u.variable.reference), ("out", "size", 1)
+                )
+                if count > 1 << 16:
+                    text = f"`{u.variable.name}` must have a number of dependencies, but has {count}"
+                    context.report("promise.dependencies", text, u.variable.name)
+                    return
+                found = driver.call(
+                    "GetVariableDependencies", ("uint32", u.variable.reference), ("out", "size", count),
+                    ("out", "uint32", count), ("out", "size", count), ("out", "int", count), ("size", count),
+                )  # fmt: skip
+            except StatusError as error:
+                context.report("promise.refused", f"{error}, for providesPerElementDependencies promises it")
+                return
+            told, listed = set(found[1]), {k.reference for k in u.knowns or ()}
+            if told != listed:
+                names = {v.reference: v.name for v in job.variables}
+                text = ", ".join(f"`{names.get(r, r)}`" for r in sorted(told ^ listed)[:5])
+                message = (
+                    f"the dependencies of `{u.variable.name}` must be those of ModelStructure, but differ by {text}"
+                )
+                context.report("promise.dependencies", message, u.variable.name)
+
+
+def _scalar_unknowns(job: ProbeJob) -> Iterator[Any]:
+    seen = 0
+    for u in job.unknowns:
+        scalar = u.variable.size == 1 and all(k.size == 1 for k in u.knowns or ())
+        if u.section != "initial" and u.knowns is not None and scalar and seen < _MOST:
+            seen += 1
+            yield u

@@ -1,0 +1,250 @@
+"""Probes of what leads an instance back: reset, and saved states, from a run that is away from its start values."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.movement import distinct, moved
+from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
+from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.trajectory import same
+from orchestrator.checking.probing.variables import ProbedVariable, shown
+
+_AMPLIFIED = 100.0
+_SMALL, _MOST_INEXACT = 1e-3, 1e-2
+_MOST_READ = 1000
+_EQUAL = 1e-9
+
+
+def readable(job: ProbeJob, locals_too: bool = True) -> list[ProbedVariable]:
+    """Variables that can be read at any time and belong to the state of an instance, a limited number of them."""
+    kinds = ("input", "parameter", "calculatedParameter", "output") + (("local",) if locals_too else ())
+    found = [v for v in job.variables if v.causality in kinds and not v.clocks and v.base != "Clock" and not v.extents]
+    found = [v for v in found if v.variability != "constant"]
+    found += [v for v in job.variables if v.causality == "parameter" and v.extents]
+    return sorted(distinct(found), key=lambda v: v.causality == "local")[:_MOST_READ]
+
+
+def _first_difference(
+    variables: Sequence[ProbedVariable], wanted: Sequence[Any], found: Sequence[Any]
+) -> tuple[ProbedVariable, str] | None:
+    labels = [(v, label) for v in variables for label in v.labels]
+    for (v, label), a, b in zip(labels, wanted, found, strict=True):
+        close = isinstance(a, float) and isinstance(b, float) and abs(a - b) <= _EQUAL * max(abs(a), abs(b))
+        if not same(a, b) and not close:
+            return v, f"`{label}` is {shown(b)} instead of {shown(a)}"
+    return None
+
+
+def reset(context: Context) -> None:
+    """A reset instance must be as a fresh one, and run as one, from the middle and from the end of a driven run."""
+    bench, job = context.bench, context.bench.job
+    if context.plain is None:
+        raise SkippedError(NOT_COMPARABLE)
+    watch = readable(job)
+    fresh = _fresh_values(context, watch)
+    with bench.instance() as driver:
+        bench.run(driver, 0, max(job.steps // 2, 1))
+        try:
+            for moment in ("in mid-run", "at the end"):
+                driver.reset()
+                bench.begin(driver, moved=False)
+                wanted = f"an instance that is reset {moment} must be as a fresh one"
+                if _differs(context, "run.reset", wanted, fresh, driver.read(fresh[0])):
+                    break
+                difference = context.compare(context.plain, bench.run(driver))
+                if difference is not None:
+                    wanted = f"an instance that is reset {moment} must run as a fresh one"
+                    context.report_difference("run.reset", wanted, difference)
+                    break
+                driver.terminate()
+            _reset_sizes(context)
+        except StatusError as error:
+            context.resets = False
+            context.report("run.reset", str(error))
+
+
+def _reset_sizes(context: Context) -> None:
+    """A reset gives arrays their sizes back."""
+    chosen = [v for v in context.bench.job.variables if v.causality == "structuralParameter" and v.base == "UInt64"]
+    sizes = {v: x for v in chosen if v.size == 1 and (x := moved(v, v.start or ())) is not None}
+    if not sizes:
+        return
+    with context.bench.instance(initialised=False) as driver:
+        try:
+            driver.call("EnterConfigurationMode")
+            for v, x in sizes.items():
+                driver.set([v], x)
+            driver.call("ExitConfigurationMode")
+        except StatusError:
+            return  # the probe of configuration mode says so
+        driver.reset()
+        wanted = [x for v in sizes for x in v.start or ()]
+        difference = _first_difference(list(sizes), wanted, driver.read(list(sizes), "after reset"))
+        if difference is not None:
+            v, text = difference
+            context.report(
+                "run.reset", f"a reset instance must have its structural parameters back, but {text}", v.name
+            )
+
+
+Snapshot = tuple[list[ProbedVariable], list[Any]]
+
+
+def _fresh_values(context: Context, watch: list[ProbedVariable]) -> Snapshot:
+    """What two fresh instances agree on after initialisation; nothing where variables cannot be read."""
+    rows = []
+    try:
+        for _ in range(2):
+            with context.bench.instance(moved=False) as driver:
+                rows.append(driver.read(watch))
+    except StatusError:
+        return [], []
+    kept: Snapshot = ([], [])
+    at = 0
+    for v in watch:
+        a, b = (row[at : at + v.size] for row in rows)
+        at += v.size
+        if all(map(same, a, b)):
+            kept[0].append(v)
+            kept[1].extend(a)
+    return kept
+
+
+def _differs(context: Context, rule: str, wanted: str, snapshot: Snapshot, found: Sequence[Any]) -> bool:
+    """Whether values are others than those of a snapshot; the first that is gets reported."""
+    difference = _first_difference(snapshot[0], snapshot[1], found)
+    if difference is None:
+        return False
+    v, text = difference
+    context.report(rule, f"{wanted}, but {text}", v.name)
+    return True
+
+
+def state(context: Context) -> None:
+    """Save in mid-run, go on, restore, go on: all values, and the rest of the run, must be the same."""
+    bench, job = context.bench, context.bench.job
+    if context.trace is None:
+        raise SkippedError(NOT_COMPARABLE)
+    if not job.saves:
+        raise SkippedError("states cannot be saved, as the flags say")
+    half = max(job.steps // 2, 1) if job.steps > 1 else 0
+    with bench.instance() as driver:
+        try:
+            first = _Restoring(context, driver, 0)
+            bench.run(driver, 0, half)
+            later = _Restoring(context, driver, half)
+            try:
+                if later.restore():
+                    first.restore_values()
+            finally:
+                driver.free_state(first.saved)
+                nulled = driver.free_state(later.saved)
+            if not nulled:
+                names = bench.library.names
+                function = names.prefix + names.free_state
+                context.report("state.free", f"{function} must set the state to null, but does not")
+        except StatusError as error:
+            context.report("state.status", str(error))
+
+
+class _Restoring:
+    """A state that is saved in a driven run, after its first ``half`` steps, and what is seen then."""
+
+    def __init__(self, context: Context, driver: Driver, half: int) -> None:
+        self.context, self.driver, self.half = context, driver, half
+        self.saved = driver.get_state()
+        job = context.bench.job
+        self.watch = readable(job, locals_too=False) + [v for v in (job.time_variable,) if v is not None]
+        self.values = driver.read(self.watch, "beside the saved state")
+        again = driver.read(self.watch, "beside the saved state")
+        if any(not same(a, b) for a, b in zip(self.values, again, strict=True)):
+            self.watch, self.values = [], []
+
+    def restore_values(self) -> None:
+        """Restore it from where the run is, and look at the values alone."""
+        self.driver.set_state(self.saved)
+        self._is_back(self.driver, "state.restore", "a restored state")
+
+    def restore(self) -> bool:
+        """Three times, for a state that is kept by reference is right the first time only; then through bytes.
+
+        Returns:
+            Whether nothing was reported.
+        """
+        bench = self.context.bench
+        for number in range(3):
+            bench.run(self.driver, self.half)
+            if number == 0:
+                self._change()
+            self.driver.set_state(self.saved)
+            if not self._is_back(self.driver, "state.restore", "a restored state"):
+                return False
+            if not self._continues(self.driver, "state.restore", "a restored state must continue as before"):
+                return False
+            self.driver.set_state(self.saved)
+        if not bench.job.serialises:
+            return True
+        data, memory = self.driver.serialise(self.saved), dict(self.driver.memory)
+        if self.context.single:
+            self._deserialise(self.driver, data, memory)
+            return True
+        with bench.instance(name="restored", moved=False) as other:
+            self._deserialise(other, data, memory)
+        return True
+
+    def _change(self) -> None:
+        """Give inputs and tunable parameters other values after the state was saved."""
+        job = self.context.bench.job
+        if job.interface == "ScheduledExecution":
+            return
+        t = job.start + job.steps * job.step
+        movement = self.context.bench.movement.values
+        chosen = [v for v in movement if v.causality == "input" or v.variability == "tunable"]
+        now = {v: self.driver.read([v]) for v in chosen if v.causality in ("input", "parameter")}
+        others = {v: x for v, value in now.items() if None not in value and (x := moved(v, value, 1)) is not None}
+        if others:
+            self.driver.set_discrete(others, t)
+
+    def _is_back(self, driver: Driver, rule: str, what: str) -> bool:
+        """Whether every value is what it was when the state was saved."""
+        found = driver.read(self.watch, "after a state was restored")
+        difference = _first_difference(self.watch, self.values, found)
+        if difference is None:
+            return True
+        v, text = difference
+        if self._slight(found):
+            self.context.report("run.inexact", f"{what} must have its values back bit for bit, but {text}", v.name)
+            return True
+        self.context.report(rule, f"{what} must have its values back before the next step, but {text}", v.name)
+        return False
+
+    def _slight(self, found: Sequence[Any]) -> bool:
+        """Whether all that differs are numbers, and by less than solvers do."""
+        for a, b in zip(self.values, found, strict=True):
+            if same(a, b):
+                continue
+            if not (isinstance(a, float) and isinstance(b, float)) or not abs(a - b) <= _SMALL * max(abs(a), abs(b)):
+                return False
+        return True
+
+    def _deserialise(self, driver: Driver, data: bytes, memory: dict[str, Any]) -> None:
+        copy = driver.deserialise(data, memory)
+        try:
+            driver.set_state(copy)
+            driver.driven = True
+            if self._is_back(driver, "state.serialise", "a serialised state"):
+                self._continues(driver, "state.serialise", "a serialised state must continue as before")
+        finally:
+            driver.free_state(copy)
+
+    def _continues(self, driver: Driver, rule: str, wanted: str) -> bool:
+        """Whether the rest of the run is as it was; a difference is reported."""
+        context = self.context
+        difference = context.compare((context.trace or [])[self.half :], context.bench.run(driver, self.half))
+        if difference is not None:
+            # A solver that starts anew errs by its tolerance, and the rest of the run multiplies that.
+            errs = _AMPLIFIED * (context.bench.job.tolerance or 0.0)
+            context.report_difference(rule, wanted, difference, min(max(errs, _SMALL), _MOST_INEXACT))
+        return difference is None

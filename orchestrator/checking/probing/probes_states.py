@@ -1,0 +1,114 @@
+"""Probes of states and their derivatives: their order, their variables and their nominal values."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+from orchestrator.checking.probing.model_exchange import ModelExchange
+from orchestrator.checking.probing.points import Point, points
+from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.slopes import is_far
+from orchestrator.checking.probing.variables import ProbedVariable
+
+_EQUAL = 1e-9
+_NEAR = 1e-3
+_MOST = 200
+
+
+def states(context: Context) -> None:
+    """States and derivatives are those of the variables that ModelStructure names, in its order."""
+    job = context.bench.job
+    if not job.state_variables:
+        raise SkippedError("the description names no continuous states")
+    if job.interface == "ModelExchange":
+        _exchange(context)
+    elif job.interface == "CoSimulation":
+        _slopes(context)
+    else:
+        raise SkippedError("the interface has no continuous states")
+
+
+def _exchange(context: Context) -> None:
+    bench, job = context.bench, context.bench.job
+    variables = job.state_variables or ()
+    with bench.instance() as driver:
+        assert isinstance(driver, ModelExchange)
+        if driver.memory["states"] != sum(v.size for v in variables):
+            raise SkippedError("the number of states is not that of the description")
+        _nominals(context, driver, variables)
+        for point in points(bench, driver):
+            if not _vector(context, point, driver, variables):
+                bench.job = replace(job, state_variables=None)  # their variables are not known then
+                return
+
+
+def _vector(context: Context, point: Point, driver: ModelExchange, variables: tuple[ProbedVariable, ...]) -> bool:
+    """States that were set are there, in the vector and by their variables; and so are the derivatives."""
+    x = driver.continuous_states()
+    nominals = driver.memory["nominals"]
+    wanted = [a + 1e-3 * n * (1.0 + 0.37 * i) for i, (a, n) in enumerate(zip(x, nominals, strict=True))]
+    owners = [v for v in variables for _ in range(v.size)]
+    wanted = [
+        a if (v.minimum is not None and w < v.minimum) or (v.maximum is not None and w > v.maximum) else w
+        for a, w, v in zip(x, wanted, owners, strict=True)
+    ]
+    driver.set_continuous_states(wanted)
+    found = driver.continuous_states()
+    rates = driver.rates()
+    named = driver.read(variables[:_MOST])
+    named_rates = driver.read(context.bench.job.rate_variables[:_MOST])
+    driver.set_continuous_states(x)
+    prefix = context.bench.library.names.prefix
+    where = f"at t = {point.time:g}"
+    for a, b, v in zip(wanted, found, owners, strict=True):
+        if abs(a - b) > _EQUAL * max(abs(a), abs(b), 1e-12):
+            text = f"{prefix}GetContinuousStates must return what was set, but returns {b:.6g} for `{v.name}`"
+            context.report("states.order", text, v.name, f"instead of {a:.6g} {where}")
+            return False
+    size = max((abs(a) for a in wanted), default=0.0)
+    for a, b, v in zip(wanted, named, owners, strict=False):
+        if abs(a - b) > _EQUAL * max(abs(a), abs(b), 1e-3 * size):
+            text = f"states must stand in the order of the description, but `{v.name}` does not have its place's value"
+            context.report("states.order", text, v.name, f"({b:.6g} instead of {a:.6g} {where})")
+            return False
+    rate_owners = [v for v in context.bench.job.rate_variables for _ in range(v.size)]
+    size = max((abs(a) for a in rates if math.isfinite(a)), default=0.0)
+    for a, b, v in zip(rates, named_rates, rate_owners, strict=False):
+        if math.isfinite(a) and not abs(a - b) <= 1e-6 * max(abs(a), abs(b), 1e-3 * size):
+            text = f"derivatives must be their variables, in the order of the description, but `{v.name}` is not"
+            context.report("states.rates", text, v.name, f"({b:.6g} instead of {a:.6g} {where})")
+            return False
+    return True
+
+
+def _nominals(context: Context, driver: ModelExchange, variables: tuple[ProbedVariable, ...]) -> None:
+    """Nominal values that the description has are those that the FMU says."""
+    owners = [v for v in variables for _ in range(v.size)]
+    for v, value in zip(owners, driver.nominal_values(), strict=True):
+        if v.nominal is not None and v.nominal > 0.0 and abs(value - v.nominal) > _NEAR * v.nominal:
+            text = f"the nominal value of `{v.name}` must be {v.nominal:g} as the description says, but is {value:g}"
+            context.report("states.nominal-differs", text, v.name)
+
+
+def _slopes(context: Context) -> None:
+    """In co-simulation the derivative of a state lies near the slopes of the steps around it."""
+    bench, job = context.bench, context.bench.job
+    pairs = [
+        (x, r)
+        for x, r in zip(job.state_variables or (), job.rate_variables, strict=True)
+        if x.size == r.size == 1 and not x.clocks and x.variability == r.variability == "continuous"
+    ][:_MOST]
+    if not pairs or context.trace is None:
+        return
+    rows = []
+    variables = [v for pair in pairs for v in pair]
+    with bench.instance() as driver:
+        for n in range(job.steps):
+            bench.run(driver, n, n + 1)
+            rows.append(driver.read(variables))
+    for i, (x, r) in enumerate(pairs):
+        path, rates = [row[2 * i] for row in rows], [row[2 * i + 1] for row in rows]
+        slopes = [(b - a) / job.step for a, b in pairwise(path)]
+        if all(map(math.isfinite, (*path, *rates))) and is_far(rates, slopes):
+            text = f"`{r.name}` must be the derivative of `{x.name}`, but is far from its slopes at most points"
+            context.report("states.slope", text, r.name)

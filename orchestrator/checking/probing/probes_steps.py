@@ -1,0 +1,151 @@
+"""Probes of communication steps: uneven ones, and steps that a slave does inside by a clock of its own."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
+from orchestrator.checking.probing.variables import ProbedVariable
+
+_FINE = 16
+"""Parts of a communication step in which the outputs are looked at, so that an inner step of a third of it is seen."""
+_LENGTH = 4  # communication steps
+_FEWEST = 3  # steps inside that must be seen
+_MULTIPLE = 0.02  # of an inner step: nearer to a multiple is one
+_STEP_TOLERANCE = 0.1
+_FEWEST_PAIRS = 10
+_TIME = 1e-3  # of a communication step
+
+
+def own_time(context: Context) -> None:
+    """The time inside is not ahead of the communication point, and does not stand still."""
+    bench, job = context.bench, context.bench.job
+    v = job.time_variable
+    if v is None or job.interface != "CoSimulation":
+        raise SkippedError("the time inside cannot be read")
+    found = job.start
+    with bench.instance() as driver:
+        for n in range(job.steps):
+            bench.run(driver, n, n + 1)
+            t = job.start + (n + 1) * job.step
+            found = float(driver.get([v])[0])
+            if found > t + _TIME * job.step:
+                text = f"`{v.name}` must not be later than the communication point after a step, but is"
+                context.report("steps.time", text, v.name, f"({found:.9g} at t = {t:.9g})")
+                return
+    if not found > job.start:
+        context.report("steps.time", f"`{v.name}` must be later after {job.steps} steps, but is not", v.name)
+
+
+def inner_steps(context: Context) -> None:
+    """Communication steps are multiples of the steps that the slave does inside, where it does steps of its own.
+
+    The outputs are looked at in small steps: those that stay as they are in some, and change in others, show a clock.
+    """
+    job = context.bench.job
+    if job.interface != "CoSimulation":
+        raise SkippedError("the interface has no steps")
+    outputs = [v for v in job.outputs() if v.real and v.size == 1 and not v.clocks and v.variability == "continuous"]
+    if not outputs or context.trace is None:
+        raise SkippedError("the FMU has no continuous outputs, or runs cannot be repeated")
+    period, error = _inner_step(context, outputs) or (0.0, 0.0)
+    if not period:
+        return
+    fewest, most = job.step / (period + error) - _MULTIPLE, job.step / (period - error) + _MULTIPLE
+    if math.floor(most) < max(math.ceil(fewest), 1):
+        text = (
+            f"communication steps must be multiples of the steps inside, but {job.step:g} s is none of {period:.3g} s"
+        )
+        context.report("steps.internal", f"{text}, at which all continuous outputs change")
+
+
+def _inner_step(context: Context, outputs: list[ProbedVariable]) -> tuple[float, float] | None:
+    """The period at which all continuous outputs change and between which none does, and its error [s], or None."""
+    job = context.bench.job
+    length = min(_LENGTH, job.steps)
+    for parts, steps in ((_FINE, length * _FINE), (1, job.steps)):
+        rows = _rows(context, outputs, job.step / parts, steps)
+        period = _period(rows, job.step / parts)
+        if period is not None:
+            return period
+    return None
+
+
+def _rows(context: Context, outputs: list[ProbedVariable], size: float, steps: int) -> list[list[Any]]:
+    """Outputs before and after each of some small steps; none where the FMU does not do them."""
+    bench, job = context.bench, context.bench.job
+    rows = []
+    try:
+        with bench.instance() as driver:
+            for n in range(steps):
+                t = job.start + n * size
+                driver.advance(t, size, f"at t = {t:g}")
+                rows.append(driver.read(outputs))
+    except (StatusError, DiscardedError, TerminatedError):
+        return []
+    return rows
+
+
+def _period(rows: Sequence[Sequence[float]], size: float) -> tuple[float, float] | None:
+    """Mean time between changes, and its error, where outputs change again and again and stay in most steps between.
+
+    Args:
+        size: of the steps between rows [s].
+    """
+    changed = [[a != b for a, b in zip(p, q, strict=True)] for p, q in pairwise(rows)]
+    moving = [any(column) for column in zip(*changed, strict=True)] if changed else []
+    if not any(moving):
+        return None
+    at = [n for n, row in enumerate(changed) if any(row)]
+    gaps = [b - a for a, b in pairwise(at)]
+    if len(at) < _FEWEST or not gaps or max(gaps) < 2 or max(gaps) - min(gaps) > 1 or min(gaps) < 1:
+        return None
+    if sum(gap == 1 for gap in gaps) > len(gaps) / 2:
+        return None
+    return size * (at[-1] - at[0]) / len(gaps), size / len(gaps)
+
+
+def variable_steps(context: Context) -> None:
+    """Uneven communication steps must hardly change what comes out at common times.
+
+    The inputs stay at their start values, for what a slave does between two values of an input is its own.
+    """
+    job = context.bench.job
+    if not job.varies:
+        raise SkippedError("canHandleVariableCommunicationStepSize is false")
+    if job.steps < _FEWEST_PAIRS * 2:
+        raise SkippedError("the run has too few steps")
+    outputs = [v for v in job.outputs() if v.real and v.size == 1 and not v.clocks]
+    pairs = job.steps // 2
+    even = _run_in_pairs(context, outputs, (1.0, 1.0))
+    try:
+        uneven = _run_in_pairs(context, outputs, (0.4, 1.0, 0.6))
+    except StatusError as error:
+        context.report("steps.variable", str(error))
+        return
+    for i, v in enumerate(outputs):
+        a, b = [r[i] for r in even], [r[i] for r in uneven]
+        # A signal that hardly moves is held to its size, where a solver's tolerance is.
+        size = max(max(a) - min(a), 0.01 * max(map(abs, a)), 1e-6 * (v.nominal or 1.0))
+        far = sum(abs(x - y) > _STEP_TOLERANCE * size for x, y in zip(a, b, strict=True))
+        if far > pairs / 2:
+            off = f"is off by more than {_STEP_TOLERANCE:.0%} of its range at {far} of {pairs} points with uneven steps"
+            message = f"`{v.name}` must hardly depend on the communication step, but {off}"
+            context.report("steps.variable", message, v.name)
+
+
+def _run_in_pairs(context: Context, outputs: list[ProbedVariable], sizes: tuple[float, ...]) -> list[list[Any]]:
+    """Outputs after every two communication steps, which are done in steps of ``sizes`` times the usual one."""
+    bench, job = context.bench, context.bench.job
+    rows = []
+    with bench.instance() as driver:
+        for n in range(job.steps // 2):
+            t, end = (job.start + m * job.step for m in (2 * n, 2 * n + 2))
+            for i, size in enumerate(sizes, 1):
+                goal = end if i == len(sizes) else t + size * job.step
+                driver.advance(t, goal - t, f"with {size:g} times the usual step at t = {t:g}")
+                t = goal
+            rows.append(driver.read(outputs))
+    return rows

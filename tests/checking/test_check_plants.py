@@ -1,0 +1,58 @@
+"""Faults that hosts meet away from start values: each is named by the rule that is meant, and a sound FMU by none."""
+
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from orchestrator.checking.check import CheckOptions, check_fmu
+from orchestrator.checking.rules import RULES
+from orchestrator.shared.isolation.limits import Limits
+from tests.support.broken_plants import BrokenPlant, broken_plants
+from tests.support.c_fmu import have_compiler
+from tests.support.plant import build_plant
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
+)
+OPTIONS = CheckOptions(limits=Limits(time=10.0))
+PLANTS = broken_plants()
+FIRST = {plant.cause: plant.name for plant in reversed(PLANTS)}
+SOUND = [
+    ("2.0", "CS ME", {}),
+    ("3.0", "CS ME", {"clock": "fraction"}),
+    ("2.0", "CS", {"flags": 'providesDirectionalDerivative="true"', "step flags": 'canInterpolateInputs="true"'}),
+    (
+        "3.0",
+        "ME",
+        {
+            "flags": 'providesDirectionalDerivatives="true" providesAdjointDerivatives="true" '
+            'providesPerElementDependencies="true" providesEvaluateDiscreteStates="true"'
+        },
+    ),
+]
+
+
+@pytest.mark.parametrize(("version", "interfaces", "changes"), SOUND, ids=lambda value: str(value)[:12])
+def test_a_sound_plant_has_no_finding(version: str, interfaces: str, changes: dict[str, str], tmp_path: Path) -> None:
+    report = check_fmu(build_plant(tmp_path / "plant.fmu", version, interfaces, "", changes), OPTIONS)
+    assert report.findings == ()
+    assert report.executed
+
+
+@pytest.mark.parametrize(
+    "plant",
+    [pytest.param(p, marks=() if FIRST[p.cause] == p.name else pytest.mark.slow) for p in PLANTS],
+    ids=lambda p: p.name,
+)
+def test_a_fault_is_named_by_its_rule(plant: BrokenPlant, tmp_path: Path) -> None:
+    report = check_fmu(plant.build(tmp_path / "plant.fmu"), OPTIONS)
+    assert plant.rule in {f.rule for f in report.findings}
+
+
+def test_each_cause_has_many_faults_of_both_versions() -> None:
+    counts = Counter((p.cause, p.version) for p in PLANTS)
+    assert min(counts.values()) >= 8
+    assert len({p.name for p in PLANTS}) == len(PLANTS)
+    assert {p.rule for p in PLANTS} <= set(RULES)
