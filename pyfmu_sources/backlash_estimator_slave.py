@@ -45,6 +45,7 @@ _SETTINGS = (
     ("offset_spread", "rad", "Standard deviation of the twist in mid-gap", 0.0),
     ("lag_spread", "1", "Relative standard deviation of the torque's time constant", 0.0),
 )
+_BEGINNING = (*_MEASURED, *(row[0] for row in (*_MODEL, *_SETTINGS)))
 _ZERO_ALLOWED = ("c", "b_m", "b_l")
 
 
@@ -58,7 +59,9 @@ class BacklashEstimator(SampledSlave):
         FmuVariable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
         FmuVariable("theta_l", "input", "rad", 0.0, "Measured load angle"),
         *(
-            FmuVariable(name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED)
+            FmuVariable(
+                name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED, starts_from=_BEGINNING
+            )
             for name, unit, text in (
                 ("alpha_hat", "rad", "Estimated half-gap"),
                 ("alpha_deviation", "rad", "Standard deviation of the estimated half-gap"),

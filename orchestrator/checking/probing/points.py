@@ -17,7 +17,7 @@ _PUSH = (0.5, -0.9, 1.3)
 
 
 @dataclass(frozen=True)
-class Point:
+class RestPoint:
     """A driven run that rests at a communication point; in model exchange the states are pushed off their path.
 
     Attributes:
@@ -58,7 +58,7 @@ def state_vector(driver: Driver) -> tuple[ProbedVariable, ...]:
     return variables if len(distinct(variables)) == len(variables) == driver.memory["states"] else ()
 
 
-def points(bench: Bench, driver: Driver) -> Iterator[Point]:
+def points(bench: Bench, driver: Driver) -> Iterator[RestPoint]:
     """Go through a driven run and rest at some of its points.
 
     Args:
@@ -76,11 +76,11 @@ def points(bench: Bench, driver: Driver) -> Iterator[Point]:
         t = job.start + done * job.step
         bench.excite(driver, t)
         if not isinstance(driver, ModelExchange):
-            yield Point(driver, number, t)
+            yield RestPoint(driver, number, t)
             continue
         x = driver.continuous_states()
         driver.set_continuous_states(_pushed(driver, x, number))
-        yield Point(driver, number, t)
+        yield RestPoint(driver, number, t)
         driver.set_continuous_states(x)
 
 

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.job import ProbedUnknown
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.movement import Values, moved
-from orchestrator.checking.probing.points import Point, points
+from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context, SkippedError
 from orchestrator.checking.probing.statuses import StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable
@@ -87,24 +88,45 @@ class _Measured:
                     low, high = min(q for q, _ in found), max(q for q, _ in found)
                     text = f"`{name}` must follow `{known.name}` by a {kind} factor, as dependenciesKind says"
                     self.context.report("dependency.kind", f"{text}, but by {low:.4g} to {high:.4g}", name)
-        silent = [
-            f"`{u.variable.name}` on `{known.name}`"
-            for u in self.context.bench.job.unknowns
-            if u.knowns is not None and len(u.knowns) <= _FEW_LISTED
-            for known in u.knowns
-            if (pair := (u.section, u.variable.name, known.name)) not in self.reacted
-            and self.tried.get(pair, 0) >= _OFTEN
-            and known.real
-            and u.variable.real
-        ]
+        self._report_silent()
+
+    def _report_silent(self) -> None:
+        """Name knowns that are listed and change nothing: at no point, and in no run."""
+        bench, trace = self.context.bench, self.context.trace
+        heard = {known for _, _, known in self.reacted}
+        often = {known for (_, _, known), count in self.tried.items() if count >= _OFTEN}
+        listed = {k.key for u in self.listing() for k in u.knowns or ()}
+        movement = bench.movement
+        states = {v.key for v in bench.job.state_variables or ()}
+        silent = []
+        for v in movement.values:
+            if v.name in heard or v.name not in often or v.key not in listed or v.key in states or not v.real:
+                continue
+            if trace is None or len(silent) >= _MOST_SILENT:
+                return
+            bench.movement = replace(movement, values={w: x for w, x in movement.values.items() if w is not v})
+            bench.held = frozenset({v.key})
+            try:
+                with bench.instance() as driver:
+                    if self.context.compare(trace, bench.run(driver)) is None:
+                        silent.append(f"`{v.name}`")
+            except (StatusError, TerminatedError):
+                continue
+            finally:
+                bench.movement, bench.held = movement, frozenset()
         if silent:
-            more = f" and {len(silent) - 8} more" if len(silent) > 8 else ""
-            text = f"a dependency that is listed must be one, but none was seen of {', '.join(silent[:8])}{more}"
-            self.context.report("dependency.superfluous", text)
+            text = f"a dependency that is listed must be one, but nothing reacts to {', '.join(silent)}"
+            self.context.report("dependency.superfluous", f"{text}, at no point and in no run")
+
+    def listing(self) -> list[ProbedUnknown]:
+        """The unknowns that name what they depend on, without those that name everything."""
+        unknowns = self.context.bench.job.unknowns
+        return [u for u in unknowns if u.knowns is not None and len(u.knowns) <= _FEW_LISTED]
 
 
 _FEW_LISTED = 12  # more are taken for the list of all knowns, which tools write where they know nothing
 _OFTEN = 3
+_MOST_SILENT = 8
 _WHERE = {"output": "Outputs", "rate": "Derivatives", "initial": "InitialUnknowns"}
 
 
@@ -147,7 +169,7 @@ def _in_run(context: Context, measured: _Measured, budget: Stopwatch) -> None:
         return  # a point at which the FMU does not take a value, which is its right
 
 
-def _push(measured: _Measured, point: Point, unknowns: Sequence[ProbedUnknown], v: ProbedVariable) -> None:
+def _push(measured: _Measured, point: RestPoint, unknowns: Sequence[ProbedUnknown], v: ProbedVariable) -> None:
     """A number to both sides."""
     base = point.get(v)
     variables = [u.variable for u in unknowns]
@@ -168,7 +190,7 @@ def _equal_rows(a: Sequence[Any], b: Sequence[Any]) -> bool:
 
 
 def _switch(
-    measured: _Measured, point: Point, unknowns: Sequence[ProbedUnknown], inputs: Sequence[ProbedVariable]
+    measured: _Measured, point: RestPoint, unknowns: Sequence[ProbedUnknown], inputs: Sequence[ProbedVariable]
 ) -> None:
     """Inputs of other types, in event mode where there is one."""
     if not inputs:

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
-from orchestrator.checking.probing.points import Point, points
+from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context, SkippedError
 from orchestrator.checking.probing.slopes import TOLERANCE as _TOLERANCE
 from orchestrator.checking.probing.slopes import count_far
@@ -117,7 +117,7 @@ def _partial(
 
 def _judge(
     context: Context,
-    point: Point,
+    point: RestPoint,
     matrices: dict[str, Matrix],
     variables: tuple[list[ProbedVariable], list[ProbedVariable]],
 ) -> bool:
@@ -154,7 +154,9 @@ def _masked(matrix: Matrix, counts: list[list[bool]]) -> Matrix:
     return [[x if c else 0.0 for x, c in zip(r, s, strict=True)] for r, s in zip(matrix, counts, strict=True)]
 
 
-def _columns(context: Context, point: Point, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]) -> Matrix:
+def _columns(
+    context: Context, point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]
+) -> Matrix:
     """The matrix by directional derivatives."""
     units = [[float(k == at) for k in range(len(knowns))] for at in range(len(knowns))]
     columns = [_sensitivities(point.driver, "Directional", unknowns, knowns, seed) for seed in units]
@@ -166,7 +168,7 @@ def _columns(context: Context, point: Point, unknowns: list[ProbedVariable], kno
     return matrix
 
 
-def _rows(context: Context, point: Point, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]) -> Matrix:
+def _rows(context: Context, point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]) -> Matrix:
     """The matrix by adjoint derivatives."""
     units = [[float(k == at) for k in range(len(unknowns))] for at in range(len(unknowns))]
     matrix = [_sensitivities(point.driver, "Adjoint", unknowns, knowns, seed) for seed in units]
@@ -215,7 +217,7 @@ def _references(variables: Sequence[ProbedVariable]) -> tuple[str, str, list[int
     return ("in", "uint32", [v.reference for v in variables])
 
 
-def _by_changes(point: Point, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], width: float) -> Matrix:
+def _by_changes(point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], width: float) -> Matrix:
     """Central differences about the values at a point, all of which stay within their bounds.
 
     Args:

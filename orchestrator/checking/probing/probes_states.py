@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 from orchestrator.checking.probing.model_exchange import ModelExchange
-from orchestrator.checking.probing.points import Point, points
+from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context, SkippedError
 from orchestrator.checking.probing.slopes import is_far
 from orchestrator.checking.probing.variables import ProbedVariable
@@ -42,7 +42,7 @@ def _exchange(context: Context) -> None:
                 return
 
 
-def _vector(context: Context, point: Point, driver: ModelExchange, variables: tuple[ProbedVariable, ...]) -> bool:
+def _vector(context: Context, point: RestPoint, driver: ModelExchange, variables: tuple[ProbedVariable, ...]) -> bool:
     """States that were set are there, in the vector and by their variables; and so are the derivatives."""
     x = driver.continuous_states()
     nominals = driver.memory["nominals"]

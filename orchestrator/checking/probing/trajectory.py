@@ -37,6 +37,7 @@ class Bench:
     Attributes:
         report: called with rule, message, path and the time of the first one in words (``when``).
         excited: whether floating point inputs are moved in runs that are compared.
+        held: what is not moved for once, by type and value reference.
         movement: what else is changed in them; nothing before the probe ``inputs`` has found what the FMU takes.
     """
 
@@ -46,6 +47,7 @@ class Bench:
         self.report = report
         self.excited = True
         self.movement = Movement()
+        self.held: frozenset[tuple[str, int]] = frozenset()
         self._once = "canBeInstantiatedOnlyOncePerProcess" in job.flags
         self._used = False
 
@@ -106,7 +108,7 @@ class Bench:
 
         Floating point ones are smooth; the others change in the middle of the run.
         """
-        inputs = self.job.inputs() if self.excited else []
+        inputs = [v for v in self.job.inputs() if v.key not in self.held] if self.excited else []
         for base in dict.fromkeys(v.base for v in inputs):
             group = [v for v in inputs if v.base == base]
             values = [x for v in group for x in excitation(v, t - self.job.start, self.duration, phase)]
