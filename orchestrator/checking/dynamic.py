@@ -128,12 +128,12 @@ def check_dynamic(
                     break
                 job = make_job(d, interface, fmu, library, reference, limits)
                 found += _Watcher(fmu, limits, walls, interface.kind if several else "").run(job, ("reference",))
-            findings += found
-            executions.append(Execution(interface.kind, first.stages))
             runs += [] if first.run_seen is None else [first.run_seen]
             if len(runs) == _TWO and interface.kind != "ScheduledExecution":
                 first.probe = "interfaces"
                 first.stages["interfaces"] = compare_interfaces(runs[0], runs[1], first.add)
+            findings += found
+            executions.append(Execution(interface.kind, first.stages))
     return findings, tuple(executions)
 
 
@@ -148,7 +148,7 @@ class _Watcher:
         self.probe = "load"
         self.stages: dict[str, str] = {}
         self.run_seen: InterfaceRun | None = None
-        """The run of the interface with moving inputs, once there is one."""
+        """The run of the interface, once there is one."""
 
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
@@ -190,7 +190,7 @@ class _Watcher:
                 self.add(_rule_of(error), str(error))
                 return
             self.stages[self.probe] = ""
-            self.run_seen = InterfaceRun(context.bench.job, context.plain)
+            self.run_seen = InterfaceRun(job, probes.watched(job), context.quiet)
 
     def add(self, rule: str, message: str, path: str = "", when: str = "") -> None:
         """Take a finding, unless the same was found before; ``when`` is the first time that it was.

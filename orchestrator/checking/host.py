@@ -72,6 +72,7 @@ class Host:
         self._messages: list[str] = []
         self._errors = self._noted = 0
         self._note = ""
+        self._updating = False
         self._function = ""
         self._left = ""
         self._updates: list[list[Any]] = []
@@ -224,13 +225,15 @@ class Host:
     ) -> None:
         instance, reads, writes, values, at = self._plan
         row = [self._function, time, wants, gives, done, early, None, None]
-        if instance in self._instances and not done:
+        if instance in self._instances and not done and not self._updating:
+            self._updating = True  # an update that comes of these calls does no calls of its own
             component = self._instances[instance][0]
             if gives and reads:
                 buffer = (c_double * len(reads))()
                 row[6] = self._access("fmi3GetFloat64", component, reads, buffer)
             if wants and writes:
                 row[7] = self._access("fmi3SetFloat64", component, writes, (c_double * len(values))(*values))
+            self._updating = False
         asked[0] = early and at == len(self._updates)
         if asked[0]:
             when[0] = time

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.variables import ProbedVariable
 
 _TOLERANCE = 0.1  # of the range of a signal: an importer's solver and that of the FMU differ by less
 _FEWEST = 10
@@ -12,10 +13,16 @@ _FEWEST = 10
 
 @dataclass(frozen=True)
 class InterfaceRun:
-    """The run of one interface with moving inputs, [step][output]; None where there is none to compare with."""
+    """The run of one interface with its inputs at their start values.
+
+    Attributes:
+        variables: what was read.
+        rows: [step][value].
+    """
 
     job: ProbeJob
-    rows: list[list[Any]] | None
+    variables: list[ProbedVariable]
+    rows: list[list[Any]]
 
 
 def compare_interfaces(a: InterfaceRun, b: InterfaceRun, report: Callable[..., None]) -> str:
@@ -24,13 +31,13 @@ def compare_interfaces(a: InterfaceRun, b: InterfaceRun, report: Callable[..., N
     Returns:
         Why they were not compared; empty when they were.
     """
-    same = a.job.steps == b.job.steps and a.job.inputs() == b.job.inputs() and a.job.outputs() == b.job.outputs()
-    if a.rows is None or b.rows is None or not same or len(a.rows) < _FEWEST or len(a.rows) != len(b.rows):
+    pairs = list(zip(a.rows, b.rows, strict=False))
+    if a.variables != b.variables or a.job.step != b.job.step or len(pairs) < _FEWEST:
         return "the runs of the two interfaces are not the same"
     position = 0
-    for v in a.job.outputs():
-        if v.real and v.size == 1 and v.variability == "continuous" and not v.clocks:
-            p, q = [row[position] for row in a.rows], [row[position] for row in b.rows]
+    for v in a.variables:
+        if v.real and v.causality == "output" and v.size == 1 and v.variability == "continuous" and not v.clocks:
+            p, q = [row[position] for row, _ in pairs], [row[position] for _, row in pairs]
             size = max(max(p) - min(p), max(q) - min(q), 0.01 * max(map(abs, p)), 1e-6 * (v.nominal or 1.0))
             far = sum(abs(x - y) > _TOLERANCE * size for x, y in zip(p, q, strict=True))
             if far > len(p) / 2:

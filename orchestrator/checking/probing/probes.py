@@ -37,7 +37,8 @@ class Context:
             cannot be repeated, so that nothing can be compared with it.
     plain: the same with parameters and start values as in the file, likewise.
         single: whether a second instance is known not to work.
-        resets: whether a reset has worked so far.
+        quiet: what was watched after each step of the life cycle, [step][value].
+    resets: whether a reset has worked so far.
     remarked: rules of warnings that have been reported.
     """
 
@@ -46,6 +47,7 @@ class Context:
     trace: list[list[Any]] | None = None
     plain: list[list[Any]] | None = None
     single: bool = False
+    quiet: list[list[Any]] = field(default_factory=list)
     resets: bool = True
     remarked: set[str] = field(default_factory=set)
 
@@ -108,6 +110,7 @@ def life_cycle(context: Context) -> None:
     """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value."""
     bench, job = context.bench, context.bench.job
     outputs = watched(job)
+    context.quiet = []
     with bench.instance(initialised=False) as driver:
         driver.enter_initialisation(job.start, job.stop)
         _start_values(context, driver)
@@ -134,7 +137,8 @@ def life_cycle(context: Context) -> None:
                 bench.job = replace(job, steps=max(n, 1))
                 break
             when = f"at t = {t + job.step:g}"
-            look(context, outputs, driver.read(outputs, when), when, complaints)
+            context.quiet.append(driver.read(outputs, when))
+            look(context, outputs, context.quiet[-1], when, complaints)
             if budget.over and n + 1 >= _FEWEST_STEPS:
                 bench.job = replace(job, steps=n + 1)
                 break

@@ -93,9 +93,10 @@ class _Measured:
     def _report_silent(self) -> None:
         """Name knowns that are listed and change nothing: at no point, and in no run."""
         bench, trace = self.context.bench, self.context.trace
-        heard = {known for _, _, known in self.reacted}
+        calculated = {v.name for v in bench.job.variables if v.causality == "calculatedParameter"}
+        heard = {known for _, unknown, known in self.reacted if unknown not in calculated}
         often = {known for (_, _, known), count in self.tried.items() if count >= _OFTEN}
-        listed = {k.key for u in self.listing() for k in u.knowns or ()}
+        listed = {k.key for u in self.listing() if u.variable.name not in calculated for k in u.knowns or ()}
         movement = bench.movement
         states = {v.key for v in bench.job.state_variables or ()}
         silent = []
@@ -116,7 +117,9 @@ class _Measured:
                 bench.movement, bench.held = movement, frozenset()
         if silent:
             text = f"a dependency that is listed must be one, but nothing reacts to {', '.join(silent)}"
-            self.context.report("dependency.superfluous", f"{text}, at no point and in no run")
+            self.context.report(
+                "dependency.superfluous", f"{text}, at no point and in no run, or calculated parameters alone"
+            )
 
     def listing(self) -> list[ProbedUnknown]:
         """The unknowns that name what they depend on, without those that name everything."""

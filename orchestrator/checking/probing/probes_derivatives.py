@@ -21,9 +21,9 @@ _MOST = 20  # unknowns, and knowns
 _CHANGE = 1e-4
 _EXACT = 1e-6
 _LINEAR = 1e-6
-_PARTIAL = 0.05  # of an entry
+_PARTIAL = 0.01  # of an entry
 _SMALL = 1e-4  # of the largest entry of a row
-_SMOOTH = 0.01
+_SMOOTH = 0.002
 _FUNCTIONS = {"2.0": "GetRealOutputDerivatives", "3.0": "GetOutputDerivatives"}
 Matrix = list[list[float]]
 

@@ -59,10 +59,11 @@ def reset(context: Context) -> None:
                     context.report_difference("run.reset", wanted, difference)
                     break
                 driver.terminate()
-            _reset_sizes(context)
         except StatusError as error:
             context.resets = False
             context.report("run.reset", str(error))
+    if context.resets:
+        _reset_sizes(context)
 
 
 def _reset_sizes(context: Context) -> None:
@@ -79,7 +80,11 @@ def _reset_sizes(context: Context) -> None:
             driver.call("ExitConfigurationMode")
         except StatusError:
             return  # the probe of configuration mode says so
-        driver.reset()
+        try:
+            driver.reset()
+        except StatusError as error:
+            context.report("run.reset", f"{error}, after an array got another size")
+            return
         wanted = [x for v in sizes for x in v.start or ()]
         difference = _first_difference(list(sizes), wanted, driver.read(list(sizes), "after reset"))
         if difference is not None:

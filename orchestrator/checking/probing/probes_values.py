@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.movement import Values, distinct, moved
 from orchestrator.checking.probing.probes import Context, SkippedError
 from orchestrator.checking.probing.statuses import StatusError
@@ -75,19 +74,22 @@ def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -
         driver.set_discrete(wanted, t)
         found = _by_variable(list(wanted), driver.read(list(wanted)))
         lost = _judge(context, wanted, found, "at a communication point")
-        if not lost:
-            _follow_tunable(context, driver, wanted)
+        followers = [v for v in job.variables if v.causality == "calculatedParameter" and v.variability == "tunable"]
+        followers = [v for v in followers if not v.clocks][:_MOST]
+        later = _by_variable(followers, driver.read(followers, "after a tunable parameter was set"))
+    parameters = {v: x for v, x in wanted.items() if v.causality == "parameter"}
+    if followers and parameters and not lost:
+        _follow_tunable(context, parameters, later)
 
 
-def _follow_tunable(context: Context, driver: Driver, values_set: Mapping[ProbedVariable, Values]) -> None:
+def _follow_tunable(
+    context: Context,
+    parameters: Mapping[ProbedVariable, Values],
+    found: Mapping[ProbedVariable, Sequence[Any]],
+) -> None:
     """Tunable calculated parameters follow tunable parameters at once."""
     bench, job = context.bench, context.bench.job
-    followers = [v for v in job.variables if v.causality == "calculatedParameter" and v.variability == "tunable"]
-    followers = [v for v in followers if not v.clocks][:_MOST]
-    parameters = {v: x for v, x in values_set.items() if v.causality == "parameter"}
-    if not followers or not parameters:
-        return
-    found = _by_variable(followers, driver.read(followers, "after a tunable parameter was set"))
+    followers = list(found)
     with bench.instance(initialised=False) as other:
         bench.place(other, inputs=False)
         for v, x in parameters.items():
