@@ -187,7 +187,7 @@ class Host:
         try:
             return getattr(self._handle, function)(*arguments)
         except SystemError as error:
-            self._take(_describe_left(error))
+            self._take(_describe_left(error), _ERRORS[0])
             return None
 
     def _status(self, function: str, *arguments: Any) -> int:
@@ -197,7 +197,7 @@ class Host:
         so the status is taken before.
         """
         returned: list[int] = []
-        call = getattr(self._handle, function)
+        call = self._handle[function]  # one of its own: a function may be called again while it runs, by a callback
         call.restype = returned.append
         try:
             call(*arguments)

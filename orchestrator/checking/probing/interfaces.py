@@ -16,7 +16,7 @@ class InterfaceRun:
     """The run of one interface with its inputs at their start values.
 
     Attributes:
-        variables: what was read.
+        variables: those that were watched, in the order of a row.
         rows: [step][value].
     """
 

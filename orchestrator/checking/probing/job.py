@@ -61,7 +61,7 @@ class ProbeJob:
         rate_variables: their derivatives, in the same order.
         unknowns: the entries of ModelStructure whose variables can be read.
         may_jump: value references of the states that an event may change.
-        categories: of log messages.
+        categories: what log messages may be of, as LogCategories names them.
         output_order: up to which order outputs have derivatives over time.
         start, stop, step: the experiment in s; ``stop`` is None when the FMU does not say.
         steps: number of communication steps of a test run.

@@ -208,7 +208,7 @@ class ModelExchange(EventDriver):
         self._judge_event(before, after, any(o.states_changed for o in outcomes), when)
         return after
 
-    def _judge_event(self, before: list[float], after: list[float], told: bool, when: str) -> None:
+    def _judge_event(self, before: list[float], after: list[float], says_so: bool, when: str) -> None:
         """What an event did to the states must be told, and be foreseen in the description."""
         nominals = self.memory["nominals"]
         pairs = zip(before, after, nominals, strict=True)
@@ -217,7 +217,7 @@ class ModelExchange(EventDriver):
             return
         variables = [v for v in self.job.state_variables or () for _ in range(v.size)]
         names = [f"`{variables[i].name}`" if len(variables) == len(before) else f"number {i + 1}" for i in jumped]
-        if not told:
+        if not says_so:
             text = f"an event that changes states must say so, but one changes {', '.join(names[:5])} and does not"
             self.report("event.states-changed", text, when=when)
         elif len(variables) == len(before):

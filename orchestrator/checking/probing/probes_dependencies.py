@@ -77,8 +77,8 @@ class _Measured:
 
     def report(self) -> None:
         """Hold what was seen against the description."""
-        for (unknown, known), where in self.missing.items():
-            text = f"`{unknown}` reacts to `{known}` at once, so its dependencies must list it, but do not"
+        for (unknown, of), where in self.missing.items():
+            text = f"`{unknown}` reacts to `{of}` at once, so its dependencies must list it, but do not"
             self.context.report("dependency.missing", text, unknown, f"in {where}")
         for u in self.context.bench.job.unknowns:
             name = u.variable.name
@@ -99,7 +99,7 @@ class _Measured:
         listed = {k.key for u in self.listing() if u.variable.name not in calculated for k in u.knowns or ()}
         movement = bench.movement
         states = {v.key for v in bench.job.state_variables or ()}
-        silent = []
+        silent: list[str] = []
         for v in movement.values:
             if v.name in heard or v.name not in often or v.key not in listed or v.key in states or not v.real:
                 continue
@@ -140,13 +140,13 @@ def _reacts(v: ProbedVariable, a: Any, b: Any) -> bool:
     return bool(a != b)
 
 
-def _spread(found: Sequence[tuple[float, float]]) -> bool:
+def _spread(quotients: Sequence[tuple[float, float]]) -> bool:
     """Whether quotients differ by more than their noise."""
-    if len(found) < 2:
+    if len(quotients) < 2:
         return False
-    low, high = min(found), max(found)
+    low, high = min(quotients), max(quotients)
     size = max(abs(low[0]), abs(high[0]))
-    return high[0] - low[0] > _SPREAD * size + 10.0 * max(noise for _, noise in found)
+    return high[0] - low[0] > _SPREAD * size + 10.0 * max(noise for _, noise in quotients)
 
 
 def _in_run(context: Context, measured: _Measured, budget: Stopwatch) -> None:

@@ -185,11 +185,11 @@ def _mixed(count: int) -> list[float]:
 
 
 def _judge_mixed(
-    context: Context, kind: str, found: list[float], wanted: list[float], variables: list[ProbedVariable]
+    context: Context, kind: str, product: list[float], wanted: list[float], variables: list[ProbedVariable]
 ) -> None:
     """What comes for a mixed seed is the sum of what comes for its parts."""
     size = max((abs(x) for x in wanted if math.isfinite(x)), default=0.0)
-    for v, a, b in zip(variables, found, wanted, strict=True):
+    for v, a, b in zip(variables, product, wanted, strict=True):
         if math.isfinite(b) and not abs(a - b) <= _LINEAR * size:
             text = f"{kind} derivatives must be linear in the seed, but that of `{v.name}` is not"
             context.report(

@@ -22,7 +22,7 @@ Call = tuple[str, list[Any]]
 
 
 @dataclass(frozen=True)
-class Promise:
+class PromisedCall:
     """What is promised.
 
     Attributes:
@@ -84,12 +84,12 @@ def _fractions(job: ProbeJob) -> list[Call]:
 
 
 PROMISES = (
-    Promise("LogCategories", "new", _categories),
-    Promise("canInterpolateInputs", "run", _input_derivatives),
-    Promise("maxOutputDerivativeOrder", "run", _output_derivatives),
-    Promise("providesEvaluateDiscreteStates", "initialisation", _evaluate),
-    Promise("providesEvaluateDiscreteStates", "event", _evaluate),
-    Promise("supportsFraction", "initialisation", _fractions),
+    PromisedCall("LogCategories", "new", _categories),
+    PromisedCall("canInterpolateInputs", "run", _input_derivatives),
+    PromisedCall("maxOutputDerivativeOrder", "run", _output_derivatives),
+    PromisedCall("providesEvaluateDiscreteStates", "initialisation", _evaluate),
+    PromisedCall("providesEvaluateDiscreteStates", "event", _evaluate),
+    PromisedCall("supportsFraction", "initialisation", _fractions),
 )
 
 
@@ -143,12 +143,12 @@ def _go(context: Context, driver: Driver, moment: str) -> str:
     return ""
 
 
-def _judge_fraction(context: Context, function: str, arguments: Sequence[Any], found: list[Any]) -> None:
+def _judge_fraction(context: Context, function: str, arguments: Sequence[Any], answer: list[Any]) -> None:
     """An interval as a fraction is that of the description."""
     if function != "GetIntervalFraction":
         return
     job = context.bench.job
-    (counter,), (resolution,), _ = found
+    (counter,), (resolution,), _ = answer
     clock = next(c for c in job.clocks if c.reference == arguments[0][2][0])
     if clock.interval and (not resolution or abs(counter / resolution - clock.interval) > 1e-6 * clock.interval):
         text = f"the interval of `{clock.name}` must be {clock.interval:g}, but is {counter}/{resolution} as a fraction"

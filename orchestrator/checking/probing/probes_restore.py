@@ -27,10 +27,10 @@ def readable(job: ProbeJob, locals_too: bool = True) -> list[ProbedVariable]:
 
 
 def _first_difference(
-    variables: Sequence[ProbedVariable], wanted: Sequence[Any], found: Sequence[Any]
+    variables: Sequence[ProbedVariable], wanted: Sequence[Any], values: Sequence[Any]
 ) -> tuple[ProbedVariable, str] | None:
     labels = [(v, label) for v in variables for label in v.labels]
-    for (v, label), a, b in zip(labels, wanted, found, strict=True):
+    for (v, label), a, b in zip(labels, wanted, values, strict=True):
         close = isinstance(a, float) and isinstance(b, float) and abs(a - b) <= _EQUAL * max(abs(a), abs(b))
         if not same(a, b) and not close:
             return v, f"`{label}` is {shown(b)} instead of {shown(a)}"
@@ -117,9 +117,9 @@ def _fresh_values(context: Context, watch: list[ProbedVariable]) -> Snapshot:
     return kept
 
 
-def _differs(context: Context, rule: str, wanted: str, snapshot: Snapshot, found: Sequence[Any]) -> bool:
+def _differs(context: Context, rule: str, wanted: str, snapshot: Snapshot, values: Sequence[Any]) -> bool:
     """Whether values are others than those of a snapshot; the first that is gets reported."""
-    difference = _first_difference(snapshot[0], snapshot[1], found)
+    difference = _first_difference(snapshot[0], snapshot[1], values)
     if difference is None:
         return False
     v, text = difference
@@ -225,9 +225,9 @@ class _Restoring:
         self.context.report(rule, f"{what} must have its values back before the next step, but {text}", v.name)
         return False
 
-    def _slight(self, found: Sequence[Any]) -> bool:
+    def _slight(self, values: Sequence[Any]) -> bool:
         """Whether all that differs are numbers, and by less than solvers do."""
-        for a, b in zip(self.values, found, strict=True):
+        for a, b in zip(self.values, values, strict=True):
             if same(a, b):
                 continue
             if not (isinstance(a, float) and isinstance(b, float)) or not abs(a - b) <= _SMALL * max(abs(a), abs(b)):

@@ -85,11 +85,11 @@ def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -
 def _follow_tunable(
     context: Context,
     parameters: Mapping[ProbedVariable, Values],
-    found: Mapping[ProbedVariable, Sequence[Any]],
+    now: Mapping[ProbedVariable, Sequence[Any]],
 ) -> None:
     """Tunable calculated parameters follow tunable parameters at once."""
     bench, job = context.bench, context.bench.job
-    followers = list(found)
+    followers = list(now)
     with bench.instance(initialised=False) as other:
         bench.place(other, inputs=False)
         for v, x in parameters.items():
@@ -98,7 +98,7 @@ def _follow_tunable(
         bench.place(other, inputs=True)
         other.exit_initialisation()
         wanted = _by_variable(followers, other.read(followers))
-    _report_stale(context, wanted, found, "when a tunable parameter is set at a communication point")
+    _report_stale(context, wanted, now, "when a tunable parameter is set at a communication point")
 
 
 def _follow_inputs(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
@@ -125,12 +125,12 @@ def _follow_inputs(context: Context, movement: Mapping[ProbedVariable, Values]) 
 def _report_stale(
     context: Context,
     wanted: Mapping[ProbedVariable, Sequence[Any]],
-    found: Mapping[ProbedVariable, Sequence[Any]],
+    now: Mapping[ProbedVariable, Sequence[Any]],
     when: str,
 ) -> None:
     for v, expected in wanted.items():
-        if not _equal(v, found[v], expected, _SAME):
-            values_shown = f"is {_shown(found[v])} instead of {_shown(expected)}"
+        if not _equal(v, now[v], expected, _SAME):
+            values_shown = f"is {_shown(now[v])} instead of {_shown(expected)}"
             context.report("value.stale", f"`{v.name}` must follow {when}, but {values_shown}", v.name)
 
 
@@ -162,14 +162,14 @@ def _calculated(context: Context, movement: Mapping[ProbedVariable, Values]) -> 
 def _judge(
     context: Context,
     wanted: Mapping[ProbedVariable, Sequence[Any]],
-    found: Mapping[ProbedVariable, Sequence[Any]],
+    now: Mapping[ProbedVariable, Sequence[Any]],
     when: str,
 ) -> set[ProbedVariable]:
     """Report what is not there any more. Return the variables."""
-    lost = {v for v, value in wanted.items() if not _equal(v, found[v], value)}
+    lost = {v for v, value in wanted.items() if not _equal(v, now[v], value)}
     for v in wanted:
         if v in lost:
-            text = f"`{v.name}` must keep {_shown(wanted[v])}, set {when}, but is {_shown(found[v])}"
+            text = f"`{v.name}` must keep {_shown(wanted[v])}, set {when}, but is {_shown(now[v])}"
             context.report("value.kept", text, v.name)
     return lost
 
