@@ -190,7 +190,7 @@ class _Watcher:
                 self.add(_rule_of(error), str(error))
                 return
             self.stages[self.probe] = ""
-            self.run_seen = InterfaceRun(job, probes.watched(job), context.quiet)
+            self.run_seen = InterfaceRun(job, job.outputs(), context.quiet)
 
     def add(self, rule: str, message: str, path: str = "", when: str = "") -> None:
         """Take a finding, unless the same was found before; ``when`` is the first time that it was.

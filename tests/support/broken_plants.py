@@ -67,7 +67,7 @@ _TABLE = """
 2 3 | CS | lose_switch       | state.restore
 2 3 | CS | lose_count        | state.restore
 2 3 | CS | lose_integrator   | state.restore
-2 3 | CS | lose_time         | state.restore
+2 3 | CS | lose_time         | state.time
 3   | CS | lose_ticks        | state.restore | clock=decimal
 2 3 | CS | bytes_input       | state.serialise
 2 3 | CS | bytes_text        | state.serialise

@@ -10,8 +10,6 @@ from typing import Any
 
 from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import Driver
-from orchestrator.checking.probing.job import ProbeJob
-from orchestrator.checking.probing.movement import distinct
 from orchestrator.checking.probing.statuses import DISCARD, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.trajectory import Bench, Difference, compare
 from orchestrator.checking.probing.variables import ProbedVariable, finite, shown
@@ -22,7 +20,6 @@ _LEAK_PER_STEP = 8 * 1024
 _LEAK_AT_LEAST = 512 * 1024
 _FEWEST_STEPS = 10
 _SMALL = 1e-3
-_MOST_NARROW = 200
 _BEGINNING = "in initialisation mode"
 _MOST_ITEMS = 10
 
@@ -109,15 +106,13 @@ def load(library: Library, report: Callable[..., None]) -> None:
 def life_cycle(context: Context) -> None:
     """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value."""
     bench, job = context.bench, context.bench.job
-    outputs = watched(job)
+    outputs = job.outputs()
     context.quiet = []
     with bench.instance(initialised=False) as driver:
         driver.enter_initialisation(job.start, job.stop)
         _start_values(context, driver)
-        complaints: set[str] = set()
-        narrow = [v for v in outputs if not v.numeric or v.items]
-        look(context, narrow, driver.read(narrow, _BEGINNING), _BEGINNING, complaints)
         driver.exit_initialisation()
+        complaints: set[str] = set()
         look(context, outputs, driver.read(outputs, "after initialisation"), "after initialisation", complaints)
         budget = Stopwatch(job.budget)
         for n in range(job.steps):
@@ -187,13 +182,6 @@ def _close(a: Any, b: Any) -> bool:
 def _string(context: Context, v: ProbedVariable, value: Any) -> None:
     if v.base in ("String", "Binary") and value is None and not v.clocks:
         context.report("value.string", f"`{v.name}`, of type {v.base}, must not be null, but is", v.name)
-
-
-def watched(job: ProbeJob) -> list[ProbedVariable]:
-    """What a run is judged by: the outputs, and other variables whose values can be none of their type."""
-    outputs = job.outputs()
-    narrow = [v for v in job.variables if not v.clocks and (v.items or v.base in ("Boolean", "String", "Binary"))]
-    return distinct([*outputs, *narrow[:_MOST_NARROW]])
 
 
 def look(context: Context, variables: list[ProbedVariable], values: list[Any], when: str, complaints: set[str]) -> None:

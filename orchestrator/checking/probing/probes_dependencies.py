@@ -116,10 +116,9 @@ class _Measured:
             finally:
                 bench.movement, bench.held = movement, frozenset()
         if silent:
-            text = f"a dependency that is listed must be one, but nothing reacts to {', '.join(silent)}"
-            self.context.report(
-                "dependency.superfluous", f"{text}, at no point and in no run, or calculated parameters alone"
-            )
+            names = ", ".join(silent)
+            text = f"what is listed as a dependency must have an effect, but none was seen of {names}"
+            self.context.report("dependency.superfluous", f"{text}, at three points and in a run")
 
     def listing(self) -> list[ProbedUnknown]:
         """The unknowns that name what they depend on, without those that name everything."""

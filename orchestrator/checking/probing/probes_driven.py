@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.movement import Movement, distinct, moved, settable
-from orchestrator.checking.probing.probes import Context, look, remarks, watched
+from orchestrator.checking.probing.probes import Context, remarks
 from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.trajectory import excitation
 from orchestrator.checking.probing.variables import ProbedVariable
@@ -84,14 +84,9 @@ class _Search:
         values = {v: x for v in variables if (x := moved(v, v.start or ())) is not None}
         switched = tuple(v for v in values if v.causality == "input" and not (v.real and v in bench.job.inputs()))
         bench.movement = Movement(values, switched if bench.excited else ())
-        # Numbers may leave their range, or have no solution, where a model is taken away from its file's values.
-        watch = [v for v in watched(bench.job) if v.items or not v.numeric]
-        complaints: set[str] = set()
         try:
             with bench.instance() as driver:
-                before = driver.read(watch, "after initialisation")
                 trace = bench.run(driver)
-                after = driver.read(watch, "at the end")
         except (StatusError, DiscardedError, TerminatedError):
             return False
         except ChildError as error:
@@ -103,8 +98,6 @@ class _Search:
             bench.library.renew()
             return False
         self.context.trace = trace
-        for values_read, when in ((before, "with other values"), (after, "at the end of a run with other values")):
-            look(self.context, watch, values_read, when, complaints)
         return True
 
 

@@ -161,7 +161,9 @@ class _Restoring:
         self.context, self.driver, self.half = context, driver, half
         self.saved = driver.get_state()
         job = context.bench.job
-        self.watch = readable(job, locals_too=False) + [v for v in (job.time_variable,) if v is not None]
+        self.watch = readable(job, locals_too=False)
+        clock = job.time_variable
+        self.watch += [clock] if clock is not None and job.interface == "CoSimulation" else []
         self.values = driver.read(self.watch, "beside the saved state")
         again = driver.read(self.watch, "beside the saved state")
         if any(not same(a, b) for a, b in zip(self.values, again, strict=True)):
@@ -219,6 +221,11 @@ class _Restoring:
         if difference is None:
             return True
         v, text = difference
+        if v.causality == "independent":
+            self.context.report(
+                "state.time", f"{what} must have its time back before the next step, but {text}", v.name
+            )
+            return True
         if self._slight(found):
             self.context.report("run.inexact", f"{what} must have its values back bit for bit, but {text}", v.name)
             return True

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.checking.probing.movement import Values, distinct, moved
-from orchestrator.checking.probing.probes import Context, SkippedError
-from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.probes import Context, SkippedError, look
+from orchestrator.checking.probing.statuses import StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable, shown
 
 _FEW_STEPS = 2
@@ -13,12 +13,14 @@ _EQUAL = 1e-9
 _SAME = 1e-6  # what two solutions of one algebraic loop may differ by, relative
 _SINGLE = 1e-6
 _MOST = 500
+_MOST_SHOWN = 5
 
 
 def values(context: Context) -> None:
     """Set what can be set to other values than those of the file; read it back, and what depends on it."""
     bench, job = context.bench, context.bench.job
     movement = bench.movement.values
+    _judge_types(context)
     if not movement:
         raise SkippedError("the FMU has nothing that can be set to other values, or takes none")
     if job.interface == "ScheduledExecution":
@@ -31,6 +33,30 @@ def values(context: Context) -> None:
     except StatusError:
         return  # not every FMU takes values at every point; what must be taken has been set before
     _calculated(context, movement)
+
+
+def _judge_types(context: Context) -> None:
+    """Look at the values of types that can be wrong, in initialisation mode and during a driven run."""
+    bench, job = context.bench, context.bench.job
+    narrow = [v for v in distinct(job.variables) if v.items or v.base in ("Boolean", "String", "Binary")]
+    narrow = [v for v in narrow if not v.clocks and v.causality != "structuralParameter"][:_MOST]
+    if not narrow or job.interface == "ScheduledExecution":
+        return
+    complaints: set[str] = set()
+    try:
+        with bench.instance(initialised=False) as driver:
+            driver.driven = True
+            bench.place(driver, inputs=False)
+            driver.enter_initialisation(job.start, job.stop)
+            bench.place(driver, inputs=True)
+            look(context, narrow, driver.read(narrow), "in initialisation mode", complaints)
+            driver.exit_initialisation()
+            for n in range(job.steps):
+                bench.run(driver, n, n + 1)
+                when = f"at t = {job.start + (n + 1) * job.step:g}"
+                look(context, narrow, driver.read(narrow), when, complaints)
+    except (StatusError, TerminatedError):
+        return  # what is no output may be refused here
 
 
 def _kept_before(context: Context, movement: Mapping[ProbedVariable, Values]) -> bool:
@@ -164,13 +190,14 @@ def _judge(
     wanted: Mapping[ProbedVariable, Sequence[Any]],
     now: Mapping[ProbedVariable, Sequence[Any]],
     when: str,
-) -> set[ProbedVariable]:
-    """Report what is not there any more. Return the variables."""
-    lost = {v for v, value in wanted.items() if not _equal(v, now[v], value)}
-    for v in wanted:
-        if v in lost:
-            text = f"`{v.name}` must keep {_shown(wanted[v])}, set {when}, but is {_shown(now[v])}"
-            context.report("value.kept", text, v.name)
+) -> list[ProbedVariable]:
+    """Report what is not there any more, as one finding. Return the variables."""
+    lost = [v for v, value in wanted.items() if not _equal(v, now[v], value)]
+    if lost:
+        shown_values = [f"`{v.name}` is {_shown(now[v])} instead of {_shown(wanted[v])}" for v in lost[:_MOST_SHOWN]]
+        more = f", and {len(lost) - _MOST_SHOWN} more are not what was set" if len(lost) > _MOST_SHOWN else ""
+        text = f"values must stay as they were set {when}, but {'; '.join(shown_values)}{more}"
+        context.report("value.kept", text, lost[0].name)
     return lost
 
 

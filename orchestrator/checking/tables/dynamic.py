@@ -78,6 +78,7 @@ run.reset | E | 2.1.6 | 2.3.1 | a reset returns the instance to its first state 
 state.status | E | 2.1.8 | 2.2.7.4 | the state functions work as the flags promise | implement them, or clear the flag
 state.restore | E | 2.1.8 | 2.2.7.4 | a restored state continues as before | save every variable and clock, hidden ones too, by value
 state.serialise | E | 2.1.8 | 2.2.7.4 | a serialised state continues as before, also in a new instance | serialise every variable, no pointers
+state.time | W | 2.1.8 | 2.2.7.4 | a restored state has its time | save the time too
 state.free | W | 2.1.8 | 2.2.7.4 | freeing a state sets it to null | set the pointer to NULL
 
 [variable steps]
@@ -92,7 +93,7 @@ steps.time | W | 4.2.2 | 4.2.1 | the independent variable is not later than the 
 [dependencies]
 dependency.missing | E | 2.2.8 | 2.4.8 | what reacts to a known at once lists it among its dependencies | add it; hosts order their calls by that list
 dependency.kind | E | 2.2.8 | 2.4.8 | factors are as dependenciesKind says | write dependent, or leave dependenciesKind out
-dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are listed are seen | leave them out where they are none; they cost hosts loops
+dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are listed are seen | see whether the value is used; leave it out of the list where it is none of that unknown's
 
 [states]
 states.order | E | 3.2.1 | 3.2.1 | states stand in the order of ModelStructure, by the attribute derivative | correct the order, or the attribute derivative
