@@ -84,10 +84,10 @@ _TABLE = """
 2 3 | ME | -                 | dependency.missing | Derivative der(v)=u w x v on
 2 3 | ME | -                 | dependency.missing | Derivative der(x)=;Derivative kinds der(x)=
 2 3 | CS | hidden_feed       | dependency.missing
-2 3 | CS | -                 | dependency.missing | Initial y=x
-2 3 | CS | -                 | dependency.missing | Initial c=
-2 3 | CS | -                 | dependency.missing | Initial z=v
-2 3 | CS | -                 | dependency.missing | Initial der(v)=u w x v d i m b j on
+2 3 | CS | -                 | dependency.initial | Initial y=x
+2 3 | CS | -                 | dependency.initial | Initial c=
+2 3 | CS | -                 | dependency.initial | Initial z=v
+2 3 | CS | -                 | dependency.initial | Initial der(v)=u w x v d i m b j on
 2 3 | CS | -                 | dependency.kind    | Output kinds y=dependent constant
 2 3 | ME | -                 | dependency.kind    | Output kinds y=constant fixed
 2 3 | ME | -                 | dependency.kind    | Output kinds z=constant dependent
@@ -132,10 +132,10 @@ _TABLE = """
 2   | CS | interpolation_refused | promise.refused | step flags=canInterpolateInputs="true"
 2   | CS | interpolation_second  | promise.refused | step flags=canInterpolateInputs="true"
 2   | CS | interpolation_ignored | promise.ignored | step flags=canInterpolateInputs="true"
-2 3 | CS | category_refused      | promise.refused
-2 3 | ME | second_category       | promise.refused
-2 3 | CS | logging_refused       | promise.refused
-2 3 | CS | logging_off_refused   | promise.refused
+2 3 | CS | category_refused      | log.refused
+2 3 | ME | second_category       | log.refused
+2 3 | CS | logging_refused       | log.refused
+2 3 | CS | logging_off_refused   | log.refused
 2 3 | CS | second_order_refused  | promise.refused | step flags=maxOutputDerivativeOrder="2"
 2 3 | CS | slopes_refused        | derivative.status | step flags=maxOutputDerivativeOrder="1"
 3   | ME | elements_refused      | promise.refused | elements

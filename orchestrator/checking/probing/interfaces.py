@@ -9,6 +9,7 @@ from orchestrator.checking.probing.variables import ProbedVariable
 
 _TOLERANCE = 0.1  # of the range of a signal: an importer's solver and that of the FMU differ by less
 _FEWEST = 10
+_MOST = 2.0 / 3.0  # of the points: after an event the two may differ for a while
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ def compare_interfaces(a: InterfaceRun, b: InterfaceRun, report: Callable[..., N
             p, q = [row[position] for row, _ in pairs], [row[position] for _, row in pairs]
             size = max(max(p) - min(p), max(q) - min(q), 0.01 * max(map(abs, p)), 1e-6 * (v.nominal or 1.0))
             far = sum(abs(x - y) > _TOLERANCE * size for x, y in zip(p, q, strict=True))
-            if far > len(p) / 2:
+            if far > _MOST * len(p):
                 kinds = f"{a.job.interface} and {b.job.interface}"
                 text = f"is off by more than {_TOLERANCE:.0%} of its range at {far} of {len(p)} points"
                 report("interfaces.differ", f"`{v.name}` must be the same in {kinds}, but {text}", v.name)

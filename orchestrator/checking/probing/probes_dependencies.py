@@ -45,7 +45,7 @@ class _Measured:
 
     def __init__(self, context: Context) -> None:
         self.context = context
-        self.missing: dict[tuple[str, str], str] = {}
+        self.missing: dict[tuple[str, str], tuple[str, str]] = {}
         self.tried: dict[tuple[str, str, str], int] = {}
         self.reacted: set[tuple[str, str, str]] = set()
         self.quotients: dict[tuple[str, str, str], list[tuple[float, float]]] = {}
@@ -70,16 +70,17 @@ class _Measured:
             if any(_reacts(u.variable, a, b) for a, b in zip(before, during, strict=True)):
                 self.reacted.add(name)
                 if not listed:
-                    self.missing.setdefault((u.variable.name, v.name), f"{at} ({_WHERE[u.section]})")
+                    self.missing.setdefault((u.variable.name, v.name), (u.section, f"{at} ({_WHERE[u.section]})"))
             if listed and change and u.variable.real and u.variable.size == 1 and math.isfinite(during[0]):
                 noise = 1e-12 * max(abs(before[0]), abs(during[0])) / abs(change)
                 self.quotients.setdefault(name, []).append(((during[0] - before[0]) / change, noise))
 
     def report(self) -> None:
         """Hold what was seen against the description."""
-        for (unknown, of), where in self.missing.items():
+        for (unknown, of), (section, where) in self.missing.items():
             text = f"`{unknown}` reacts to `{of}` at once, so its dependencies must list it, but do not"
-            self.context.report("dependency.missing", text, unknown, f"in {where}")
+            rule = "dependency.initial" if section == "initial" else "dependency.missing"
+            self.context.report(rule, text, unknown, f"in {where}")
         for u in self.context.bench.job.unknowns:
             name = u.variable.name
             for known, kind in zip(u.knowns or (), u.kinds, strict=False):

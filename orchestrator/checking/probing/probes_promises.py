@@ -107,7 +107,8 @@ def promises(context: Context) -> None:
                 try:
                     found = driver.call(function, *arguments)
                 except StatusError as error:
-                    context.report("promise.refused", f"{error}, for {promise.word} promises it")
+                    rule = "log.refused" if promise.word == "LogCategories" else "promise.refused"
+                    context.report(rule, f"{error}, for {promise.word} promises it")
                     refused.add(promise.word)
                     break
                 _judge_fraction(context, function, arguments, found)

@@ -100,9 +100,7 @@ def _period(rows: Sequence[Sequence[float]], size: float) -> tuple[float, float]
         return None
     at = [n for n, row in enumerate(changed) if any(row)]
     gaps = [b - a for a, b in pairwise(at)]
-    if len(at) < _FEWEST or not gaps or max(gaps) < 2 or max(gaps) - min(gaps) > 1 or min(gaps) < 1:
-        return None
-    if sum(gap == 1 for gap in gaps) > len(gaps) / 2:
+    if len(at) < _FEWEST or not gaps or min(gaps) < 2 or max(gaps) - min(gaps) > 1:
         return None
     return size * (at[-1] - at[0]) / len(gaps), size / len(gaps)
 

@@ -64,7 +64,7 @@ value.set-initial | W | 2.1.7 | 2.3.2 | variables with initial exact accept thei
 
 [values]
 value.kept | E | 2.1.7 | 2.2.7.2 | a value that is set is there | store the value, every element of it, where it is used and read
-value.stale | E | 2.2.7 | 2.3.3 | what is read follows what was set before | compute values when they are read, or when something is set
+value.stale | W | 2.2.7 | 2.3.3 | what is read follows what was set before | compute values when they are read, or when something is set
 value.calculated | W | 2.2.7 | 2.4.7.4 | calculated parameters follow the parameters that they depend on | compute them when initialisation mode is left
 
 [instances]
@@ -92,6 +92,7 @@ steps.time | W | 4.2.2 | 4.2.1 | the independent variable is not later than the 
 
 [dependencies]
 dependency.missing | E | 2.2.8 | 2.4.8 | what reacts to a known at once lists it among its dependencies | add it; hosts order their calls by that list
+dependency.initial | W | 2.2.8 | 2.4.8 | what reacts to a known in initialisation mode lists it in InitialUnknowns | add it; hosts initialise loops by that list
 dependency.kind | E | 2.2.8 | 2.4.8 | factors are as dependenciesKind says | write dependent, or leave dependenciesKind out
 dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are listed are seen | see whether the value is used; leave it out of the list where it is none of that unknown's
 
@@ -99,7 +100,7 @@ dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are listed are se
 states.order | E | 3.2.1 | 3.2.1 | states stand in the order of ModelStructure, by the attribute derivative | correct the order, or the attribute derivative
 states.rates | E | 3.2.2 | 3.2.1 | derivatives of states are those of their variables, in the order of ModelStructure | compute both from one place
 states.nominal-differs | W | 3.2.2 | 3.2.1 | nominal values of states are those of the description | generate both from one source
-states.slope | W | 2.2.7 | 2.4.7.5 | a variable with the attribute derivative is the derivative of that state | correct the variable, or the attribute derivative
+states.slope | I | 2.2.7 | 2.4.7.5 | a variable with the attribute derivative is the derivative of that state | correct the variable, or the attribute derivative
 
 [derivatives]
 derivative.status | E | 2.1.9 | 2.2.11 | derivatives are given as the flags promise | implement the function, or clear the flag
@@ -133,6 +134,7 @@ resources.step-leak | W | * | * | memory does not grow with steps | free what is
 
 [promises]
 promise.refused | E | 2.1.5 | 2.4.2 | what a flag or a list promises can be called | implement the function, or clear the flag
+log.refused | W | 2.1.5 | 2.3.1 | SetDebugLogging takes the categories that are declared | accept them, and return OK
 promise.ignored | W | 4.2.1 | - | derivatives of inputs have an effect with canInterpolateInputs | use them, or clear the flag
 promise.dependencies | W | - | 2.2.9 | per-element dependencies are those of ModelStructure | generate both from one source
 
