@@ -18,10 +18,10 @@ _TABLE = """
 2 3 | CS | drop_truth_input  | value.kept
 2 3 | ME | drop_whole        | value.kept
 2 3 | CS | drop_item         | value.kept
-2 3 | CS | drop_whole_input  | value.kept
+2 3 | CS | drop_whole_input  | value.lags
 2 3 | CS | drop_input        | value.kept
-2 3 | CS | tunable_ignored   | value.kept
-2 3 | CS | input_lags        | value.kept
+2 3 | CS | tunable_ignored   | value.lags
+2 3 | CS | input_lags        | value.lags
 2 3 | CS | rounded           | value.kept
 2 3 | CS | negated           | value.kept
 2 3 | CS | clipped           | value.kept

@@ -66,17 +66,17 @@ def _kept_before(context: Context, movement: Mapping[ProbedVariable, Values]) ->
         Whether it is so.
     """
     bench, job = context.bench, context.bench.job
-    variables = list(movement)
+    # Others that have a start value may be computed anew: it is what they were before.
     states = {v.key for v in job.state_variables or ()}
-    stays = [v for v in variables if v.causality in ("input", "parameter") or v.key in states]
+    stays = [v for v in movement if v.causality in ("input", "parameter") or v.key in states]
     with bench.instance(moved=False) as driver:
         plain = _by_variable(stays, driver.read(stays, "after initialisation"))
     with bench.instance(initialised=False) as driver:
         bench.place(driver, inputs=False)
         driver.enter_initialisation(job.start, job.stop)
         bench.place(driver, inputs=True)
-        found = _by_variable(variables, driver.read(variables, "in initialisation mode"))
-        lost = _judge(context, movement, found, "before initialisation")
+        found = _by_variable(stays, driver.read(stays, "in initialisation mode"))
+        lost = _judge(context, {v: movement[v] for v in stays}, found, "before initialisation")
         driver.exit_initialisation()
         later = _by_variable(stays, driver.read(stays, "after initialisation"))
     # A state that an event at the start changes is no start value any more.
@@ -99,7 +99,7 @@ def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -
         wanted = {v: x for v, value in now.items() if (x := moved(v, value, 1)) is not None}
         driver.set_discrete(wanted, t)
         found = _by_variable(list(wanted), driver.read(list(wanted)))
-        lost = _judge(context, wanted, found, "at a communication point")
+        lost = _judge(context, wanted, found, "at a communication point", "value.lags")
         followers = [v for v in job.variables if v.causality == "calculatedParameter" and v.variability == "tunable"]
         followers = [v for v in followers if not v.clocks][:_MOST]
         later = _by_variable(followers, driver.read(followers, "after a tunable parameter was set"))
@@ -190,6 +190,7 @@ def _judge(
     wanted: Mapping[ProbedVariable, Sequence[Any]],
     now: Mapping[ProbedVariable, Sequence[Any]],
     when: str,
+    rule: str = "value.kept",
 ) -> list[ProbedVariable]:
     """Report what is not there any more, as one finding. Return the variables."""
     lost = [v for v, value in wanted.items() if not _equal(v, now[v], value)]
@@ -197,7 +198,7 @@ def _judge(
         shown_values = [f"`{v.name}` is {_shown(now[v])} instead of {_shown(wanted[v])}" for v in lost[:_MOST_SHOWN]]
         more = f", and {len(lost) - _MOST_SHOWN} more are not what was set" if len(lost) > _MOST_SHOWN else ""
         text = f"values must stay as they were set {when}, but {'; '.join(shown_values)}{more}"
-        context.report("value.kept", text, lost[0].name)
+        context.report(rule, text, lost[0].name)
     return lost
 
 
