@@ -10,6 +10,7 @@ from orchestrator.checking.description import Description, Interface, number
 from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.grammar import attributes_of
 from orchestrator.checking.units import (
+    EXPONENTS,
     Conversion,
     base_conversion,
     dimension_of,
@@ -17,7 +18,6 @@ from orchestrator.checking.units import (
     lacks_angle,
 )
 from orchestrator.checking.xml_reading import xpath
-from orchestrator.master.protocol import EXPONENTS
 
 _DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])T([01]\d|2[0-3]):[0-5]\d:([0-5]\d|60)Z")
 _ANY_DATE = re.compile(r"-?\d{4,}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:\d\d)?")  # the schema has the rest

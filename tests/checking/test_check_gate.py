@@ -1,6 +1,7 @@
 """Formal faults keep no probe from running; what was not executed does not pass."""
 
 import re
+import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -188,3 +189,14 @@ def test_a_wrong_start_of_an_array_is_one_finding(starts: str, wrong: int, tmp_p
     found = [f for f in check_fmu(write_fmu(tmp_path / "a.fmu", files), QUICK).findings if f.rule == "value.start"]
     assert len(found) == min(wrong, 1)
     assert wrong < 2 or "2 more of its 3 elements" in found[0].message
+
+
+def test_the_checker_is_loaded_without_the_packages_that_its_distribution_lacks() -> None:
+    """`fmu-check` installs on lxml and msgspec alone, and on the parts of this package that its setup.py names."""
+    code = (
+        "import sys, orchestrator.commands._fmu_check, orchestrator.checking.check, orchestrator.checking.dynamic\n"
+        "print(*sorted({name.split('.')[0] for name in sys.modules} & {'numpy', 'scipy', 'pint', 'fmpy', 'numba'}))\n"
+        "print(*sorted(n for n in sys.modules if n.startswith(('orchestrator.master', 'orchestrator.fmi'))))\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == []
