@@ -93,7 +93,7 @@ def _master_head(channel: Any, group: int) -> Head:
     unit = channel.unit or getattr(channel.conversion, "unit", "") or ""
     unit = unit if isinstance(unit, str) else ""
     word = MASTERS.get(getattr(channel, "sync_type", 0))
-    known = parse_unit(unit, ("time",))
+    known = None if unit in ("", "s") else parse_unit(unit, ("time",))  # what asks for it loads pint
     if word is None and known is not None and known.kind != "time":
         word = "master"  # version 3 has no word for it
     if word is None:
