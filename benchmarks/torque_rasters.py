@@ -113,9 +113,10 @@ def diagnose_log(log: Log, path: Path) -> Outcome:
 
 def estimate_log(log: Log, path: Path) -> Outcome:
     """Return what ``estimate`` says."""
-    found = oc.estimate(path, nominal_model()).best
+    methods = oc.estimate(path, nominal_model()).estimates
+    found = methods[0]
     low, high = found.interval
-    tau = found.diagnostics["parameters"]["tau"]
+    tau = next(one for one in methods if "parameters" in one.diagnostics).diagnostics["parameters"]["tau"]
     within = abs(tau["value"] - log.tau) <= 1.96 * tau["standard_error"]
     words = f"alpha {found.alpha:.5f}, tau {tau['value']:.5f}; {found.message}"
     return Outcome((), low <= log.alpha <= high, within, words)
