@@ -19,7 +19,7 @@ from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.inference.whitening import band_only
-from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParameter
 from orchestrator.diagnosis.report.estimates import (
     add_test_evidence,
     parameter_estimates,
@@ -170,6 +170,14 @@ class FmuCalibration:
     notes: tuple[str, ...]
 
 
+def _stopping_limit(entry: UncertainParameter, value: float) -> str:
+    """Return which limit of the FMU a fitted parameter stands at, in words, or nothing."""
+    for word, end in (("min", entry.minimum), ("max", entry.maximum)):
+        if value == end:
+            return f"`{entry.name}` is stopped by the FMU's `{word}` {end:.10g}"
+    return ""
+
+
 def calibrate_fmu(
     system: FmuSystem, given: Map, records: Sequence[FmuRecord], settings: DiagnosisSettings, progress: Progress
 ) -> FmuCalibration:
@@ -196,10 +204,12 @@ def calibrate_fmu(
         (names[i], names[j]) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > CONFOUNDED
     )
     notes = [*found.notes]
+    stopped = {entry.name: _stopping_limit(entry, fitted.point.parameters[k]) for k, entry in enumerate(problem.shared)}
+    notes += [f"{text}: a value beyond it may fit better" for text in stopped.values() if text]
     notes += [
         f"the record hardly determines `{name}`: excite what it acts on"
         for name, share in learned.items()
-        if share < LEARNED
+        if share < LEARNED and not stopped[name]
     ]
     notes += [f"the record hardly distinguishes `{a}` and `{b}`: excite other frequencies" for a, b in pairs]
     explained = found.verdict != "unknown" and not found.misses_test_data

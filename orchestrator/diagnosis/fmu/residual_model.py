@@ -256,9 +256,11 @@ def _parameters(problem: FmuProblem, starts: int) -> tuple[UncertainParameter, .
     for k in _order(problem):
         u = problem.map.uncertain[k]
         if u.value == 0.0 or u.name in problem.map.initial:
-            found.append(UncertainParameter(u.name, u.uncertainty, 1.0, u.unit, local=True))
+            low, high = u.minimum - u.value, u.maximum - u.value
+            found.append(UncertainParameter(u.name, u.uncertainty, 1.0, u.unit, True, low, high))
         else:
-            found.append(UncertainParameter(u.name, u.value, u.uncertainty / abs(u.value), u.unit))
+            share = u.uncertainty / abs(u.value)
+            found.append(UncertainParameter(u.name, u.value, share, u.unit, False, u.minimum, u.maximum))
     return (*found, *(UncertainParameter(f"{START} {k + 1}", 1.0, 1.0, local=True) for k in range(starts)))
 
 

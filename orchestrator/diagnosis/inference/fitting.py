@@ -99,8 +99,11 @@ def _take_damped_step(
     problem: FitProblem, point: ModelPoint, coordinates: Sequence[Coordinate], normal: Array, gradient: Array,
     damping: float,
 ) -> tuple[ModelPoint, Array, float]:  # fmt: skip
-    diagonal = np.diag(normal)
-    step = np.asarray(-np.linalg.lstsq(normal + np.diag(damping * diagonal + 1e-12), gradient, rcond=None)[0], float)
+    free = np.flatnonzero(~problem.held(point, coordinates, gradient))
+    inner = normal[np.ix_(free, free)]
+    step = np.zeros(len(coordinates))
+    damped = inner + np.diag(damping * np.diag(inner) + 1e-12)
+    step[free] = -np.linalg.lstsq(damped, gradient[free], rcond=None)[0]
     moved = problem.move_point(point, coordinates, step)
     (residual,) = problem.whiten_residuals([moved])
     prior, _ = problem.prior(moved, coordinates)

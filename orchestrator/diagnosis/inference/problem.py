@@ -165,7 +165,8 @@ class FitProblem:
                 entry = self.parameters[coordinate]
                 moved = parameters[coordinate] + float(step) * entry.nominal
                 least = FARTHEST * entry.nominal
-                parameters[coordinate] = moved if entry.local else max(moved, least) if least > 0 else min(moved, least)
+                moved = moved if entry.local else max(moved, least) if least > 0 else min(moved, least)
+                parameters[coordinate] = entry.limit(moved)
             else:
                 label, place = coordinate
                 effect = self.models[0].effects[label]
@@ -179,12 +180,33 @@ class FitProblem:
         Args:
             residual: (rows,) at the point.
         """
-        steps = [SMALL_SHARE if isinstance(one, int) else 1.0 for one in coordinates]
+        steps = [self._small_step(point, one) if isinstance(one, int) else 1.0 for one in coordinates]
         points = [self.move_point(point, [one], np.array([s])) for one, s in zip(coordinates, steps, strict=True)]
         columns = self.whiten_residuals(points)
         if not columns:  # nothing is uncertain
             return np.zeros((residual.size, 0))
         return np.column_stack([(found - residual) / s for found, s in zip(columns, steps, strict=True)])
+
+    def _small_step(self, point: ModelPoint, number: int) -> float:
+        """Return a small share of a parameter's nominal value, away from a limit that is near."""
+        entry, value = self.parameters[number], point.parameters[number]
+        step = SMALL_SHARE * entry.nominal
+        return -SMALL_SHARE if entry.limit(value + step) != value + step else SMALL_SHARE
+
+    def held(self, point: ModelPoint, coordinates: Sequence[Coordinate], gradient: Array) -> Array:
+        """Return which coordinates (coordinates,) a limit of a parameter keeps from where the cost falls.
+
+        Args:
+            gradient: (coordinates,) of half the cost, by shares of the parameters.
+        """
+        return np.array(
+            [
+                isinstance(one, int)
+                and self.parameters[one].stops(point.parameters[one], -slope * self.parameters[one].nominal)
+                for one, slope in zip(coordinates, gradient.tolist(), strict=True)
+            ],
+            dtype=bool,
+        )
 
     def prior(self, point: ModelPoint, coordinates: Sequence[Coordinate]) -> tuple[Array, Array]:
         """Return the prior's residuals (coordinates,) and their derivatives, each by its own coordinate."""

@@ -23,6 +23,7 @@ class UncertainParameter:
         local: it belongs to one record alone, may have any value, and ``nominal`` is only its scale; the prior is
             normal
             about zero.
+        minimum, maximum: limits of the fitted value, which no fit goes beyond.
     """
 
     name: str
@@ -30,6 +31,16 @@ class UncertainParameter:
     spread: float
     unit: str = ""
     local: bool = False
+    minimum: float = -np.inf
+    maximum: float = np.inf
+
+    def limit(self, value: float) -> float:
+        """Return a value within the limits [unit of the parameter]."""
+        return min(max(value, self.minimum), self.maximum)
+
+    def stops(self, value: float, way: float) -> bool:
+        """Tell whether a limit keeps a value [unit of the parameter] from going on in the direction ``way``."""
+        return (way > 0.0 and value >= self.maximum) or (way < 0.0 and value <= self.minimum)
 
 
 @dataclass(frozen=True, eq=False)

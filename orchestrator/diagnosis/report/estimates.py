@@ -36,7 +36,7 @@ def parameter_estimates(problem: FitProblem, fitted: FittedModel, level: float) 
     for n, entry in enumerate(problem.shared):
         value = fitted.point.parameters[n]
         error = abs(entry.nominal) * float(np.sqrt(covariance[n, n]))
-        interval = (value - width * error, value + width * error)
+        interval = (entry.limit(value - width * error), entry.limit(value + width * error))
         result[entry.name] = ParameterEstimate(value, error, interval, entry.unit, entry.nominal)
     return result
 
