@@ -22,6 +22,7 @@ from orchestrator.diagnosis.report.summary import play_of
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation import cramer_rao
+from orchestrator.estimation.effort import Stop, StoppedError, never
 from orchestrator.estimation.methods import maximum_likelihood, two_encoders
 from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
 from orchestrator.estimation.repeats import in_words, repeats_of
@@ -241,6 +242,7 @@ def estimate(
     diagnose: bool = True,
     settings: EstimationSettings | Path | str | None = None,
     progress: Callable[[str, str, float], None] = lambda work, stage, share: None,
+    stop: Callable[[], str] = never,
 ) -> EstimateResult:
     """Estimate the half-gap of a machine from a measured record.
 
@@ -255,6 +257,8 @@ def estimate(
             and give the half-gap of the corrected model, one for all records. This takes some ten seconds more.
         settings: thresholds, or the path of a TOML file with those that differ from the default.
         progress: called with the piece of work (a method, or "diagnosis"), its stage, and the share that is behind.
+        stop: asked again and again: a text ends ``maximum_likelihood`` with what it has, and a diagnosis without
+            anything; the result says the text. An empty text lets them go on.
 
     Returns:
         The half-gap with standard error and interval, and what each method says.
@@ -287,7 +291,7 @@ def estimate(
         try:
             with numeric_errors(f"{measured.source}: `{name}` finds no solution for this record"):
                 progress(name, name.replace("_", " "), 0.0)
-                fitted = _estimate_by(name, measured, more, model, time_limit, chosen, partial(progress, name))
+                fitted = _estimate_by(name, measured, more, model, time_limit, chosen, partial(progress, name), stop)
                 bound = _error_bound(measured, model, [*(m.estimate for m in found if m.estimate is not None), fitted])
         except NotApplicableError as error:
             found.append(MethodResult(name, None, math.inf, time.perf_counter() - begun, str(error)))
@@ -299,7 +303,7 @@ def estimate(
     missing, why = None, ""
     if diagnose and _is_unexplained(judged):
         progress(DIAGNOSIS, "diagnosing", 0.0)
-        missing, why = _try_diagnosis([measured, *more], model, partial(progress, DIAGNOSIS))
+        missing, why = _try_diagnosis([measured, *more], model, partial(progress, DIAGNOSIS), stop)
     first = () if missing is None else _of_diagnosis(missing)
     repeats = repeats_of([measured, *more])
     return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen, why)
@@ -325,17 +329,27 @@ def _is_unexplained(methods: Sequence[MethodResult]) -> bool:
 
 
 def _try_diagnosis(
-    records: Sequence[Record], model: Model, report: Callable[[str, float], None]
+    records: Sequence[Record], model: Model, report: Callable[[str, float], None], stop: Stop
 ) -> tuple[DiagnosisResult | None, str]:
     """Return what the model misses; or None, and why these records cannot be diagnosed."""
 
     def progress(done: int, most: int, what: str) -> None:
-        report(f"fitted {what}", done / max(most, 1))
+        report(f"fitted {what}", done / most if most else 0.0)
+        ask()
+
+    def ask() -> None:
+        if why := stop():
+            raise StoppedError(f"it was ended before it was done ({why})")
 
     try:
+        ask()
         return find_missing(records, model, progress=progress), ""
     except (InputError, ConvergenceError) as error:
         return None, str(error)
+    except KeyboardInterrupt:
+        if not stop():
+            raise
+        return None, stop()
 
 
 def _of_diagnosis(diagnosis: DiagnosisResult) -> tuple[MethodResult, ...]:
@@ -355,13 +369,14 @@ def _estimate_by(
     time_limit: float,
     settings: EstimationSettings,
     report: Callable[[str, float], None],
+    stop: Stop,
 ) -> Estimate:
     """Return the estimate of one method; all but the likelihood take one whole record."""
     if name != WITHOUT_TORQUE and not all(one.has_torque for one in (record, *more)):
         raise NotApplicableError("needs the torque `u`, which the record does not have")
     if name == DEFAULT_METHOD:
         return maximum_likelihood.estimate(
-            record, model, more=more, time_limit=time_limit, report=report, settings=settings
+            record, model, more=more, time_limit=time_limit, report=report, settings=settings, stop=stop
         )
     if more:
         raise NotApplicableError("takes one record; several are fitted together by maximum_likelihood")

@@ -11,11 +11,11 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 BAR, LEFT = 20, "about {}:{:02d} left"
-DIAGNOSIS_START, DIAGNOSIS_PER_ROW, DIAGNOSED_ROWS = 5.0, 0.01, 9000  # s, s for each row, of so many at most
+DIAGNOSIS_START, DIAGNOSIS_PER_ROW, DIAGNOSED_ROWS = 15.0, 0.002, 9000  # s, s for each row, of so many at most
 
 
 def diagnosis_seconds(rows: int) -> float:
-    """Return about how long a diagnosis takes, before its first fit tells."""
+    """Return about how much processor time [s] a diagnosis takes, before its first fit tells."""
     return DIAGNOSIS_START + DIAGNOSIS_PER_ROW * min(rows, DIAGNOSED_ROWS)
 
 
@@ -28,7 +28,7 @@ class Stages:
 
     def __init__(self, stream: IO[str] | None = None) -> None:
         chosen = stream or sys.stderr
-        self._stage, self._expected, self._begun = "", 0.0, time.monotonic()
+        self._stage, self._expected, self._begun, self._done = "", 0.0, time.monotonic(), 0.0
         live = Live(get_renderable=self._line, console=Console(file=chosen), transient=True, refresh_per_second=4)
         self._live = live if chosen.isatty() else None
 
@@ -45,7 +45,7 @@ class Stages:
 
     def begin(self, stage: str, seconds: float) -> None:
         """Start a piece of work that is expected to take so many seconds."""
-        self._stage, self._expected, self._begun = stage, seconds, time.monotonic()
+        self._stage, self._expected, self._begun, self._done = stage, seconds, time.monotonic(), 0.0
 
     def at(self, stage: str, share: float) -> None:
         """Say what is done now, and which share (0 to 1) of the piece of work is behind."""
@@ -59,11 +59,12 @@ class Stages:
 
     def _line(self) -> RenderableType:
         left = self.time_left()
-        done = 1.0 - left / self._expected if self._expected > 0.0 else 0.0
+        # What is done stays done, also where the rest turns out to be longer.
+        self._done = max(self._done, 1.0 - left / self._expected if self._expected > 0.0 else 0.0)
         minutes, seconds = divmod(round(left), 60)
         line = Table.grid(padding=(0, 1), expand=True)
         line.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
         line.add_column(width=BAR)
         line.add_column(no_wrap=True, width=len(LEFT.format(99, 0)))
-        line.add_row(self._stage, ProgressBar(1.0, done, width=BAR), LEFT.format(minutes, seconds))
+        line.add_row(self._stage, ProgressBar(1.0, self._done, width=BAR), LEFT.format(minutes, seconds))
         return line

@@ -26,11 +26,12 @@ from orchestrator.api.estimate import (
 )
 from orchestrator.api.records import read_model
 from orchestrator.api.shown import Block
+from orchestrator.commands._budget import Budget
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.errors import ScenarioError
-from orchestrator.estimation.cost import estimate_seconds
+from orchestrator.estimation.cost import fit_seconds
 from orchestrator.estimation.protocol import METHODS
 from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.records.model_file import Model
@@ -63,8 +64,9 @@ DESIGN_OPTIONS = (
 )
 
 
-ANNOUNCED_FROM = 20.0  # s
 SECONDS_OF_OTHERS = 3.0  # that a method without a fit takes
+INTERRUPTED = 130  # exit code after Ctrl-C
+CHEAP = 20.0  # s, from which on a word is said of a lower rate
 LOW_RATE = 200.0  # Hz, which shows the shafts that the methods are made for
 
 
@@ -120,10 +122,11 @@ def run(args: argparse.Namespace) -> int:
         results = EstimateFound()
         blocks: list[Block] = []
         found: EstimateResult | None = None
+        interrupted = False
         if records:
-            _announce(records, model, args)
+            budget, told = Budget(), _tell_cost(records, model, args, settings)
             blocks += what_was_read(records)
-            with _show_stages(records, model) as progress:
+            with budget.catching(), _show_stages(records, told, budget) as progress:
                 found = estimate(
                     records,
                     model,
@@ -133,12 +136,14 @@ def run(args: argparse.Namespace) -> int:
                     diagnose=not args.no_diagnose,
                     settings=settings,
                     progress=progress,
+                    stop=budget.why,
                 )
+            interrupted = budget.interrupted
             blocks += found.blocks()
             found.write_files(folder)
             found.write_diagnosis(folder, args.out)
             results = found.results(args.out)
-        if args.design:
+        if args.design and not interrupted:
             size = args.size if args.size is not None else _design_size(found)
             with _progress() as advance:
                 plan = design(
@@ -157,19 +162,24 @@ def run(args: argparse.Namespace) -> int:
         write_result(folder, "estimate", given, None, results)
         write_report(folder, "estimate")
     print_blocks([*blocks, f"Written to {args.out}"])
-    return 0
+    return INTERRUPTED if interrupted else 0
 
 
-def _announce(records: list[Record], model: Model, args: argparse.Namespace) -> None:
-    """Say what a long fit will cost before it starts."""
-    if (args.method or default_method(records)) not in (DEFAULT_METHOD, "all") or not records[0].has_torque:
-        return
+def _tell_cost(records: list[Record], model: Model, args: argparse.Namespace, settings: EstimationSettings) -> float:
+    """Say what a fit will cost before it starts, and return its processor time [s]; 0.0 where nothing is fitted."""
+    fitted = (args.method or default_method(records)) in (DEFAULT_METHOD, "all")
+    if not fitted or not all(record.has_torque for record in records):
+        return 0.0
     rows = sum(record.size for record in records)
-    seconds = estimate_seconds(records, model)
-    if seconds > ANNOUNCED_FROM:
-        rate = 1.0 / records[0].step
-        cheaper = "" if rate <= LOW_RATE else f"; with --rate {LOW_RATE:g} {seconds * LOW_RATE / rate:.0f} s"
-        sys.stderr.write(f"The fit of {rows} rows will take about {seconds:.0f} s{cheaper}\n")
+    seconds = fit_seconds(records, model, settings)
+    rate = 1.0 / records[0].step
+    said = f"The fit of {rows} rows will take about {seconds:.0f} s of processor time"
+    if rate > LOW_RATE and seconds > CHEAP:
+        said += f" (with --rate {LOW_RATE:g} {seconds * LOW_RATE / rate:.0f} s)"
+    if not args.no_diagnose:
+        said += f"; a diagnosis, where the model does not explain the record, {diagnosis_seconds(rows):.0f} s more"
+    sys.stderr.write(said + "\n")
+    return seconds
 
 
 def _plain(value: Any) -> Any:
@@ -206,18 +216,21 @@ def _design_size(estimate: EstimateResult | None) -> float:
 
 
 @contextmanager
-def _show_stages(records: list[Record], model: Model) -> Iterator[Callable[[str, str, float], None]]:
-    """Show stages with the time left on a terminal; yield what is to be called at each."""
+def _show_stages(records: list[Record], told: float, budget: Budget) -> Iterator[Callable[[str, str, float], None]]:
+    """Show stages with the time left on a terminal, each in its budget; yield what is to be called at each."""
     rows = sum(record.size for record in records)
     with Stages() as stages:
-        fitted = sys.stderr.isatty() and records[0].has_torque
-        stages.begin("preparing", estimate_seconds(records, model) if fitted else 0.0)
+        stages.begin("preparing", told)
+        budget.begin(told or math.inf)
         known = [DEFAULT_METHOD]
 
         def show(work: str, stage: str, share: float) -> None:
             if work not in known:
                 known.append(work)
-                stages.begin(stage, diagnosis_seconds(rows) if work == DIAGNOSIS else SECONDS_OF_OTHERS)
+                diagnosed = work == DIAGNOSIS
+                expected = diagnosis_seconds(rows) if diagnosed else SECONDS_OF_OTHERS
+                stages.begin(stage, expected)
+                budget.begin(expected if diagnosed else math.inf, at_once=diagnosed)
             stages.at(stage, share)
 
         yield show

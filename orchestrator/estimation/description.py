@@ -1,6 +1,7 @@
 """What a maximum of the likelihood says: interval, whether a gap is seen, whether the model explains the record."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from orchestrator.estimation.cramer_rao import error_bound_of_fit
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.likelihood import GapFit, Likelihood
 from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
-from orchestrator.estimation.profile import profile
+from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import GapVerdictSettings
 from orchestrator.estimation.torque_reading import torque_words
@@ -18,26 +19,52 @@ from orchestrator.shared.inference.normal import NORMAL_95
 
 def describe(fit: GapFit) -> Estimate:
     """Return the estimate of a fit: interval, visibility, and what else the fit says."""
+    settings = fit.likelihood.settings.verdict
+    alpha, error, column = _gap_of(fit)
+    curve = profile(fit)
+    wider = max(_misfit_variance(fit), _block_variance(fit, column, settings.blocks))
+    low, high = curve.interval(alpha, NORMAL_95**2 * wider)
+    # A profile point that is not quite the maximum makes the interval too short, never too long.
+    half = NORMAL_95 * math.sqrt(wider) * error
+    return _describe(fit, curve, wider, (min(low, max(alpha - half, 0.0)), max(high, alpha + half)))
+
+
+def describe_unfinished(fit: GapFit, why: str) -> Estimate:
+    """Return the estimate of a fit that was ended before it was done, its interval by the curvature alone."""
+    alpha, error, _ = _gap_of(fit)
+    wider = fit.likelihood.settings.verdict.misfit_widening**2
+    half = NORMAL_95 * math.sqrt(wider) * error
+    places = np.maximum(alpha + 1.5 * half * np.linspace(-1.0, 1.0, 9), 0.0)
+    curve = Profile(places, ((places - alpha) / error) ** 2)
+    found = _describe(fit, curve, wider, (max(alpha - half, 0.0), alpha + half))
+    said = f"the fit was ended before it was done ({why}), and this is the best that it had reached"
+    diagnostics = dict(found.diagnostics) | {"converged": False, "stopped": said}
+    return replace(found, message="; ".join(text for text in (said, found.message) if text), diagnostics=diagnostics)
+
+
+def _gap_of(fit: GapFit) -> tuple[float, float, int]:
+    """Return half-gap and standard error [rad] of a fit, and the gap's place among the free unknowns."""
+    place = fit.likelihood.problem.index("alpha")
+    column = list(fit.free).index(place)
+    return float(fit.point.theta[place]), math.sqrt(fit.covariance[column, column]), column
+
+
+def _misfit_variance(fit: GapFit) -> float:
+    """Return by what torque noise multiplies the variance: the model is not exact, and what it lacks is not white."""
+    problem = fit.likelihood.problem
+    noise = zip(fit.likelihood.noise(fit.point.theta).torque, problem.torque_units, strict=True)
+    inexact = any(w > 10.0 * LEAST_TORQUE_NOISE * unit for w, unit in noise)
+    return fit.likelihood.settings.verdict.misfit_widening**2 if inexact else 1.0
+
+
+def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, float]) -> Estimate:
+    """Return the estimate of a fit with this interval [rad], whose variance is ``wider`` times that of white errors."""
     likelihood = fit.likelihood
     problem, settings = likelihood.problem, likelihood.settings.verdict
-    place = problem.index("alpha")
-    column = list(fit.free).index(place)
-    alpha = float(fit.point.theta[place])
-    error = math.sqrt(fit.covariance[column, column])
-    curve = profile(fit)
-    # Torque noise above the least means that the model is not exact; what it lacks is not white, as the likelihood
-    # takes it to be, so the interval is widened.
-    torque_noise = likelihood.noise(fit.point.theta).torque
-    inexact = any(
-        w > 10.0 * LEAST_TORQUE_NOISE * unit for w, unit in zip(torque_noise, problem.torque_units, strict=True)
-    )
-    wider = max(settings.misfit_widening**2 if inexact else 1.0, _block_variance(fit, column, settings.blocks))
-    limit = NORMAL_95**2 * wider
-    low, high = curve.interval(alpha, limit)
-    # A profile point that is not quite the maximum makes the interval too short, never too long.
-    half = math.sqrt(limit) * error
+    alpha, error, _ = _gap_of(fit)
     error *= math.sqrt(wider)
-    low, high = min(low, max(alpha - half, 0.0)), max(high, alpha + half)
+    limit = NORMAL_95**2 * wider
+    low, high = interval
     kept = likelihood.run(fit.point.theta, keep=True)
     flanks = kept.contacts[kept.contacts != 0]
     traversals = int(np.count_nonzero(np.diff(flanks))) if alpha > 0.0 else 0

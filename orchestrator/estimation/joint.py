@@ -3,12 +3,12 @@
 Each record has an initial state of its own, and an angle between its encoders' zeros, which may have been set anew.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.innovations import Array, Innovations
 from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.problem import OFFSET, SAMPLED, STATE_NAMES, GapProblem
@@ -48,11 +48,11 @@ class JointLikelihood(Likelihood):
         problems: Sequence[GapProblem],
         threads: int = 1,
         settings: EstimationSettings = DEFAULT_SETTINGS,
-        deadline: float = math.inf,
+        effort: Effort | None = None,
     ) -> None:
-        super().__init__(_joint_problem(problems), threads, settings, deadline)
+        super().__init__(_joint_problem(problems), threads, settings, effort)
         names = self.problem.names
-        self._parts = [Likelihood(problem, deadline=deadline) for problem in problems]
+        self._parts = [Likelihood(problem) for problem in problems]
         self._own = [
             np.array(
                 [names.index(f"{u.name}@{number}" if number > 1 and u.name in OWN else u.name) for u in p.unknowns]
@@ -62,6 +62,7 @@ class JointLikelihood(Likelihood):
 
     def run(self, theta: Array, keep: bool = False) -> Innovations:
         """Return the innovations of all records at ``theta``."""
+        self.effort.check()
         runs = []
         for part, places in zip(self._parts, self._own, strict=True):
             runs.append(part.with_options(soft=self.soft).run(theta[places], keep))

@@ -8,19 +8,19 @@ In all functions: ``theta``: (unknowns,); ``free``: (k,) indices of the free unk
 """
 
 import math
-import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels, affine_model, innovations
 from orchestrator.estimation.problem import IMPULSE, OFFSET, SAMPLED, SCALE, STATE_NAMES, GapProblem
-from orchestrator.estimation.protocol import TimeLimitError
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.shared.inference.inverse import pseudo_inverse
 from pyfmu_sources.drivetrain_parameters import NAMES, DrivetrainParameters
@@ -51,7 +51,6 @@ class GapFit:
     Attributes:
         free: (k,) indices of the unknowns that were fitted.
         information: (k, k) Fisher information of the free unknowns, prior included.
-        covariance: (k, k) its inverse.
         converged: whether the last step changed the objective by less than the tolerance.
         likelihood: the likelihood with what the fit has learnt of it, for the next fit.
     """
@@ -59,10 +58,14 @@ class GapFit:
     point: Point
     free: NDArray[np.int64]
     information: Array
-    covariance: Array
     iterations: int
     converged: bool
     likelihood: "Likelihood" = field(repr=False)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Return the inverse (k, k) of the information."""
+        return inverse(self.information)
 
 
 class Likelihood:
@@ -78,7 +81,7 @@ class Likelihood:
         problem: GapProblem,
         threads: int = 1,
         settings: EstimationSettings = DEFAULT_SETTINGS,
-        deadline: float = math.inf,
+        effort: Effort | None = None,
     ) -> None:
         self.problem = problem
         self.settings = settings
@@ -95,15 +98,20 @@ class Likelihood:
         self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
         self._scale = names.index(SCALE) if SCALE in names else None
         self._sampled = names.index(SAMPLED) if SAMPLED in names else None
-        self.deadline = deadline  # of time.monotonic()
+        self.effort = effort or Effort()
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._mean = problem.start
         self._weight = np.array([u.deviation**-2 if math.isfinite(u.deviation) else 0.0 for u in problem.unknowns])
 
     def with_options(
-        self, *, soft: bool | None = None, information: Array | None = None, problem: GapProblem | None = None
+        self,
+        *,
+        soft: bool | None = None,
+        information: Array | None = None,
+        problem: GapProblem | None = None,
+        effort: Effort | None = None,
     ) -> Self:
-        """Return the likelihood with other flanks, information or bounds of the unknowns.
+        """Return the likelihood with other flanks, information, bounds of the unknowns, or leave to go on.
 
         Args:
             information: (unknowns, unknowns) of the unknowns (default: the last one).
@@ -112,6 +120,7 @@ class Likelihood:
         other.soft = self.soft if soft is None else soft
         other.information = self.information if information is None else information
         other.problem = self.problem if problem is None else problem
+        other.effort = self.effort if effort is None else effort
         return other
 
     @property
@@ -139,10 +148,7 @@ class Likelihood:
 
     def run(self, theta: Array, keep: bool = False) -> Innovations:
         """Return the innovations at ``theta``."""
-        if time.monotonic() > self.deadline:
-            raise TimeLimitError(
-                "`time_limit` must be longer for this record, or its `rate` lower", "time_limit", "rate"
-            )
+        self.effort.check()
         record = self.problem.record
         u = record.u
         if self._sampled is not None and record.u_sampled is not None:
@@ -264,6 +270,7 @@ def maximise(
         held = ((value <= lower) & (gradient > 0.0)) | ((value >= upper) & (gradient < 0.0))
         before = point.objective
         point, damping = _step(likelihood, point, places, gradient, information, held, (lower, upper), damping)
+        likelihood.effort.keep(GapFit(point, places, information, done, False, likelihood))
         if before - point.objective < tolerance:
             # The first differences may have been taken too coarsely: look again with better ones.
             if before == point.objective and done == 1:
@@ -271,7 +278,7 @@ def maximise(
                 continue
             converged = True
             break
-    return GapFit(point, places, information, inverse(information), done, converged, likelihood)
+    return GapFit(point, places, information, done, converged, likelihood)
 
 
 def _step(

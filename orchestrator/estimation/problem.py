@@ -116,9 +116,10 @@ def make_problem(record: Record, model: Model) -> GapProblem:
         spread = 0.02 if known else NOISE_SPREAD
         least = max(math.log(level) - 6.0, math.log(max(rounding_noise(record, model, column), 1e-12)))
         noises.append(Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, least, math.log(level) + 6.0))
-    least = scale_noise((LEAST_TORQUE_NOISE,) * 2 if both else LEAST_WHERE_INEXACT, units)
-    most = scale_noise((LARGEST_TORQUE_NOISE,) * 2, units)
-    for side, low, high in zip(("motor", "load"), least, most, strict=True):
+    exact = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE)
+    lows = scale_noise(exact if both else LEAST_WHERE_INEXACT, units)
+    highs = scale_noise((LARGEST_TORQUE_NOISE, LARGEST_TORQUE_NOISE), units)
+    for side, low, high in zip(("motor", "load"), lows, highs, strict=True):
         noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(high)))
     if not both:
         levels.append(levels[0])

@@ -38,7 +38,9 @@ def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Re
     lacking = fit.diagnostics.get("lacking")
     if lacking:
         yield Reason(Level.AMBER, str(lacking))
-    if not fit.diagnostics.get("converged", True):
+    if "stopped" in fit.diagnostics:
+        yield Reason(Level.AMBER, str(fit.diagnostics["stopped"]))
+    elif not fit.diagnostics.get("converged", True):
         yield Reason(Level.AMBER, "the fit stopped before it converged")
     if not math.isfinite(fit.interval[1]):
         yield Reason(Level.AMBER, "the record cannot show a gap of any size")

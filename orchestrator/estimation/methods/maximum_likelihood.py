@@ -11,11 +11,13 @@ a sharp flank, so there the first fits blur it.
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from orchestrator.errors import ConvergenceError
-from orchestrator.estimation.description import describe
+from orchestrator.estimation.description import describe, describe_unfinished
+from orchestrator.estimation.effort import Effort, Stop, StoppedError, never
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
@@ -59,36 +61,56 @@ def estimate(
     time_limit: float = math.inf,
     report: Report = _quiet,
     settings: EstimationSettings = DEFAULT_SETTINGS,
+    stop: Stop = never,
 ) -> Estimate:
     """Return the maximum-likelihood half-gap with its profile-likelihood interval.
 
     Args:
         time_limit: [s], after which the fit is given up.
+        stop: returns why the fit is to end with what it has; it is asked before each run of the filter.
     """
     records = (record, *more)
-    deadline = time.monotonic() + time_limit
-    likelihood = _likelihood(records, model, threads, deadline, settings)
-    fit = None
+    effort = Effort(time.monotonic() + time_limit, stop)
+    likelihood = _likelihood(records, model, threads, effort, settings)
+    try:
+        found = describe(_fit(records, model, threads, likelihood, report))
+    except StoppedError as error:
+        if effort.best is None:
+            raise ConvergenceError(
+                f"{record.source}: the fit must reach a first size, but was ended: {error}"
+            ) from None
+        found = describe_unfinished(_on_all_rows(effort.best, likelihood), str(error))
+    return by_record(found, records) if more else found
+
+
+def _fit(records: Sequence[Record], model: Model, threads: int, likelihood: Likelihood, report: Report) -> GapFit:
+    """Return the fit of all unknowns to all rows."""
+    settings, fit = likelihood.settings, None
     if sum(one.size for one in records) > settings.fit.long_record:
         # What a long record says first of all, its beginning says too, in a fraction of the time.
         shorts = [one.part(0, min(one.size, settings.fit.short_record // len(records))) for one in records]
         report("fitting the beginning", 0.0)
-        fit = _refine(likelihood, _likelihood(shorts, model, threads, deadline, settings), report)
+        fit = _refine(likelihood, _likelihood(shorts, model, threads, likelihood.effort, settings), report)
     if fit is None:
         fit = fit_record(likelihood, report)
     fit = settle_torque(fit)
     report("finding the interval", BEFORE_INTERVAL)
-    found = describe(fit)
-    return by_record(found, records) if more else found
+    return fit
+
+
+def _on_all_rows(fit: GapFit, likelihood: Likelihood) -> GapFit:
+    """Return a fit, perhaps of the beginning, as one of all rows; nothing ends what is still to be run."""
+    whole = likelihood.with_options(soft=fit.likelihood.soft, effort=Effort())
+    return replace(fit, likelihood=whole, point=whole.at(fit.point.theta))
 
 
 def _likelihood(
-    records: Sequence[Record], model: Model, threads: int, deadline: float, settings: EstimationSettings
+    records: Sequence[Record], model: Model, threads: int, effort: Effort, settings: EstimationSettings
 ) -> Likelihood:
     first, *more = (make_problem(one, model) for one in records)
     if more:
-        return JointLikelihood([first, *more], threads, settings, deadline)
-    return Likelihood(first, threads, settings, deadline)
+        return JointLikelihood([first, *more], threads, settings, effort)
+    return Likelihood(first, threads, settings, effort)
 
 
 def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit | None:

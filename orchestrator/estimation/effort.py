@@ -1,0 +1,64 @@
+"""What a fit is asked before every run of the filter: whether to go on; and the best that it has reached by then."""
+
+import math
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from orchestrator.errors import ConvergenceError
+from orchestrator.estimation.protocol import TimeLimitError
+
+if TYPE_CHECKING:
+    from orchestrator.estimation.likelihood import GapFit
+
+Stop = Callable[[], str]
+"""Returns why work is to end with what it has; nothing while it may go on."""
+
+
+class StoppedError(ConvergenceError):
+    """Work was asked to end before it was done; the text says why."""
+
+
+def never() -> str:
+    """Return no reason to end."""
+    return ""
+
+
+class Effort:
+    """The leave to go on, and the best fit so far.
+
+    Args:
+        deadline: of ``time.monotonic()``, at which a fit is given up.
+        stop: asked before each run.
+    """
+
+    def __init__(self, deadline: float = math.inf, stop: Stop = never) -> None:
+        """Begin with nothing found."""
+        self._deadline, self._stop = deadline, stop
+        self.best: GapFit | None = None
+
+    def check(self) -> None:
+        """Return where the fit may go on.
+
+        Raises:
+            TimeLimitError: the deadline is past.
+            StoppedError: it was asked to end with what it has.
+        """
+        if time.monotonic() > self._deadline:
+            raise TimeLimitError(
+                "`time_limit` must be longer for this record, or its `rate` lower", "time_limit", "rate"
+            )
+        why = self._stop()
+        if why:
+            raise StoppedError(why)
+
+    def keep(self, fit: "GapFit") -> None:
+        """Keep a fit with the gap free, if it is of more rows than the best so far, or better."""
+        if fit.likelihood.problem.index("alpha") not in fit.free:
+            return
+        if self.best is None or _merit(fit) > _merit(self.best):
+            self.best = fit
+
+
+def _merit(fit: "GapFit") -> tuple[int, float]:
+    return fit.likelihood.problem.outputs.shape[0], -fit.point.objective
