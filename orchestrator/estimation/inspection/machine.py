@@ -1,5 +1,6 @@
 """A rough machine from a record alone: gear ratio, inertia, friction, lag of the drive, frequency of the shaft."""
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -95,9 +96,14 @@ def as_model(rough: RoughMachine, base: Model) -> Model:
 
 
 def _balance(record: Record) -> tuple[float, float, float, float]:
-    """Return lag [s], inertia [kg.m2] and viscous friction at the motor, and the share of the impulse they explain."""
-    tried = ((tau, *momentum_balance(*smooth(record, tau)[:3])) for tau in LAGS)
-    tau, inertia, friction, share = max(tried, key=lambda fit: fit[3])
+    """Return lag [s], inertia [kg.m2] and viscous friction at the motor, and the share of the impulse they explain.
+
+    The lag is the shortest one that the next longer one does not better: behind seconds of lag any torque looks like
+    one that a friction without inertia takes.
+    """
+    tried = [(tau, *momentum_balance(*smooth(record, tau)[:3])) for tau in LAGS]
+    best = next((now for now, longer in itertools.pairwise(tried) if longer[3] <= now[3]), tried[-1])
+    tau, inertia, friction, share = best
     return tau, abs(inertia) or 1.0, abs(friction), share
 
 
