@@ -109,5 +109,6 @@ def write_drive_log(path: Path, drive: Drive) -> None:
     unit = 10.0 ** np.floor(np.log10(np.abs(current).max()) - 3.0)  # four digits, as drives log
     for n in range(current.size):
         angles = (np.rad2deg(columns[name][n]) for name in ("theta_m", "theta_l"))
-        lines.append(f"{1e3 * n / drive.rate:g};{round(current[n] / unit) * unit:.6g};" + ";".join(f"{a:.6f}" for a in angles))
+        cells = [f"{1e3 * n / drive.rate:g}", f"{round(current[n] / unit) * unit:.6g}", *(f"{a:.6f}" for a in angles)]
+        lines.append(";".join(cells))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
