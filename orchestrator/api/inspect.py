@@ -19,14 +19,14 @@ from orchestrator.estimation.inspection.channels import (
     excitation_of,
     reversals_of,
 )
-from orchestrator.estimation.inspection.machine import as_model, is_of, rough_machine, visible_effects
+from orchestrator.estimation.inspection.machine import RoughMachine, as_model, is_of, rough_machine, visible_effects
 from orchestrator.estimation.inspection.starter import OF_DEFAULT, assume_columns, starter
 from orchestrator.estimation.inspection.sufficiency import SEEN, Sufficiency, sufficiency
 from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.estimation.methods import two_encoders
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.estimation.zeros import set_zeros
-from orchestrator.records.model_file import Model, read_model
+from orchestrator.records.model_file import DEFAULT, Model, read_model
 from orchestrator.records.record import Record
 from orchestrator.shared.results.estimate import ExcitationFound, RecordFound
 from orchestrator.shared.results.inspect import (
@@ -41,6 +41,8 @@ from orchestrator.shared.results.inspect import (
 
 STARTER = "model.toml"
 OF_GIVEN = "of the model that was given"
+OF_FMU = "ASSUMED: what the FMU has when nothing is said; put in the machine's"
+ROUGHLY = "inertias, stiffness, friction and lag roughly, from the record; see the model file"
 SHOWN_EXPERIMENTS = 3
 
 
@@ -237,16 +239,27 @@ def inspect(
 
 def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Model, Mapping[str, str], tuple[str, ...]]:
     """Return the machine that the judgement is for, where each of its values is from, and what was assumed."""
-    if given:
-        said_of = {name: OF_GIVEN if name in base.stated else OF_DEFAULT for name in base.plant.linear}
-        return base, said_of, ()
+    said_of = {name: OF_GIVEN if name in base.stated else OF_DEFAULT for name in base.plant.linear}
+    if base.fmu != DEFAULT or all(name in base.stated for name in said_of):
+        return base, said_of | dict.fromkeys(set(said_of) - set(base.stated), OF_FMU), ()
     rough = rough_machine(record)
+    if given and any(name in base.stated for name in said_of):
+        return (
+            _completed(base, rough),
+            {**rough.origin, **{n: OF_GIVEN for n in base.stated if n in said_of}},
+            (ROUGHLY,),
+        )
     if not record.has_torque:
         return as_model(rough, base), rough.origin, ()
     if sure and is_of(record, base):
         return base, dict.fromkeys(base.plant.linear, OF_DEFAULT), ("the default model's values, each known to 5 %",)
-    said = "inertias, stiffness, friction and lag roughly, from the record; see the model file"
-    return as_model(rough, base), rough.origin, (said,)
+    return as_model(rough, base), rough.origin, (ROUGHLY,)
+
+
+def _completed(base: Model, rough: RoughMachine) -> Model:
+    """Return a model with rough values for what its file does not state."""
+    whole = as_model(rough, base)
+    return replace(whole, parameters={**whole.parameters, **{name: base.parameters[name] for name in base.stated}})
 
 
 def _of_two_angles(record: Record, model: Model) -> Estimate | None:

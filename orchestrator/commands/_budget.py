@@ -20,23 +20,23 @@ class Budget:
 
     def __init__(self) -> None:
         """Begin with nothing to end."""
-        self._told, self._begun, self._stopped = math.inf, working_seconds(), 0.0
+        self._expected, self._begun, self._stopped = math.inf, working_seconds(), 0.0
         self.interrupted, self.at_once = False, False
 
-    def begin(self, told: float, at_once: bool = False) -> None:
+    def begin(self, expected: float, at_once: bool = False) -> None:
         """Start a piece of work that was told to take so much processor time [s].
 
         Args:
             at_once: Ctrl-C does not wait for the work to ask.
         """
-        self._told, self._begun, self.at_once = told, working_seconds(), at_once
+        self._expected, self._begun, self.at_once = expected, working_seconds(), at_once
 
     def why(self) -> str:
         """Return why the work is to end; nothing while it may go on."""
         if self.interrupted:
             return "interrupted"
         used = working_seconds() - self._begun
-        return f"{used:.0f} s of processor time, twice what was expected" if used > PATIENCE * self._told else ""
+        return f"{used:.0f} s of processor time, twice what was expected" if used > PATIENCE * self._expected else ""
 
     @contextmanager
     def catching(self) -> Iterator[None]:

@@ -124,9 +124,9 @@ def run(args: argparse.Namespace) -> int:
         found: EstimateResult | None = None
         interrupted = False
         if records:
-            budget, told = Budget(), _tell_cost(records, model, args, settings)
+            budget, seconds = Budget(), _tell_cost(records, model, args, settings)
             blocks += what_was_read(records)
-            with budget.catching(), _show_stages(records, told, budget) as progress:
+            with budget.catching(), _show_stages(records, seconds, budget) as progress:
                 found = estimate(
                     records,
                     model,
@@ -216,12 +216,12 @@ def _design_size(estimate: EstimateResult | None) -> float:
 
 
 @contextmanager
-def _show_stages(records: list[Record], told: float, budget: Budget) -> Iterator[Callable[[str, str, float], None]]:
+def _show_stages(records: list[Record], seconds: float, budget: Budget) -> Iterator[Callable[[str, str, float], None]]:
     """Show stages with the time left on a terminal, each in its budget; yield what is to be called at each."""
     rows = sum(record.size for record in records)
     with Stages() as stages:
-        stages.begin("preparing", told)
-        budget.begin(told or math.inf)
+        stages.begin("preparing", seconds)
+        budget.begin(seconds or math.inf)
         known = [DEFAULT_METHOD]
 
         def show(work: str, stage: str, share: float) -> None:

@@ -8,7 +8,10 @@ from orchestrator.api.inspect import STARTER, inspect
 from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of
+from orchestrator.commands._stages import Stages
 from orchestrator.shared.output import stage_output
+
+USUAL = 10.0  # s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Look at the record, print what it holds, write JSON, picture, report and a model file to start from."""
     model = None if args.model is None else read_model(args.model)
-    found = inspect(args.record, model, **reading_of(args))
+    with Stages() as stages:
+        stages.begin("looking at the record", USUAL)
+        found = inspect(args.record, model, **reading_of(args))
     given = {"record": str(args.record), "model": args.model and str(args.model)}
     with stage_output(args.out) as folder:
         found.write(

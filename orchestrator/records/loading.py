@@ -29,6 +29,8 @@ from orchestrator.records.topics import has_topics, split_topics
 from orchestrator.records.units import parse_unit
 from orchestrator.shared.numbers import exact_text
 
+MOST_NAMED = 12  # columns in a note
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -127,7 +129,7 @@ def load(
 
     at = {name: choice.place for name, choice in chosen.items()} | extra
     table, raster, more = bring_to_motor(table, at, source, path, reading.resample, own_time)
-    notes += [", ".join(units), *more]
+    notes += [", ".join(units), *_unused(source, places), *more]
     drive = columns.get("u", Column())
     unit = None
     if "u" in chosen:
@@ -141,6 +143,16 @@ def load(
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
     table, more = make_uniform(table, reading.resample)
     return Loaded(table, labels, (*notes, *more), raster)
+
+
+def _unused(source: RecordSource, places: Sequence[int]) -> list[str]:
+    """Return a note that names the columns that are not used, or none."""
+    rest = [(n, head) for n, head in enumerate(source.heads) if n not in places and head.name != "time"]
+    names = [f"`{head.full or head.name or f'#{n + 1}'}`" for n, head in rest]
+    if not names:
+        return []
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return [f"not used: {', '.join(names[:MOST_NAMED])}{more}"]
 
 
 def _in_part(

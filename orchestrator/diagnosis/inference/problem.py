@@ -193,7 +193,7 @@ class FitProblem:
         step = SMALL_SHARE * entry.nominal
         return -SMALL_SHARE if entry.limit(value + step) != value + step else SMALL_SHARE
 
-    def held(self, point: ModelPoint, coordinates: Sequence[Coordinate], gradient: Array) -> Array:
+    def held(self, point: ModelPoint, coordinates: Sequence[Coordinate], gradient: Array) -> NDArray[np.bool_]:
         """Return which coordinates (coordinates,) a limit of a parameter keeps from where the cost falls.
 
         Args:

@@ -35,11 +35,26 @@ class UncertainParameter:
     maximum: float = np.inf
 
     def limit(self, value: float) -> float:
-        """Return a value within the limits [unit of the parameter]."""
+        """Return a value within the limits.
+
+        Args:
+            value: in the unit of the parameter.
+
+        Returns:
+            The value, or the limit that it went beyond.
+        """
         return min(max(value, self.minimum), self.maximum)
 
     def stops(self, value: float, way: float) -> bool:
-        """Tell whether a limit keeps a value [unit of the parameter] from going on in the direction ``way``."""
+        """Tell whether a limit keeps a value from going on.
+
+        Args:
+            value: in the unit of the parameter.
+            way: its sign is the direction.
+
+        Returns:
+            Whether the value stands at the limit that lies that way.
+        """
         return (way > 0.0 and value >= self.maximum) or (way < 0.0 and value <= self.minimum)
 
 

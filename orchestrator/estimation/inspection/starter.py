@@ -98,7 +98,8 @@ def starter(
 
 
 def _column_lines(column: Column, assumed: Sequence[str], name: str) -> list[str]:
-    mark = "   # ASSUMED: put in the drive's" if any(name in text or name == "time" for text in assumed) else ""
+    unit = "samples per second" if name == "time" else f" of {name}"
+    mark = "   # ASSUMED: put in the drive's" if any(unit in text for text in assumed) else ""
     return [f"{key} = {text}{mark if key in MACHINE_KEYS else ''}" for key, text in entry_texts(column).items()]
 
 
