@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestrator.estimation.likelihood import Likelihood
-from orchestrator.estimation.methods.maximum_likelihood import GRID
 from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.model_file import Model
@@ -17,7 +16,7 @@ RUNS = 3000.0
 RUNS_OF_LONG = 0.5  # share of them over the whole of a record whose beginning was fitted first
 BESIDES = 5.0  # s, for a start, figures and files
 PROBED_ROWS = 1000
-PROBED_SIZES = GRID[1::6]  # half-gaps [rad]: contacts are what a run takes its time for
+PROBED_SIZES = (3e-4, 1.3e-3, 6e-3, 0.025, 0.11)  # half-gaps [rad]: contacts are what a run takes its time for
 
 
 def fit_seconds(records: Sequence[Record], model: Model, settings: EstimationSettings = DEFAULT_SETTINGS) -> float:
