@@ -3,13 +3,10 @@
 import math
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Any
 
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.protocol import TimeLimitError
-
-if TYPE_CHECKING:
-    from orchestrator.estimation.likelihood import GapFit
 
 Stop = Callable[[], str]
 """Returns why work is to end with what it has; nothing while it may go on."""
@@ -35,7 +32,8 @@ class Effort:
     def __init__(self, deadline: float = math.inf, stop: Stop = never) -> None:
         """Begin with nothing found."""
         self._deadline, self._stop = deadline, stop
-        self.best: GapFit | None = None
+        self.best: Any = None
+        self._merit = (0, -math.inf)
 
     def check(self) -> None:
         """Return where the fit may go on.
@@ -52,13 +50,7 @@ class Effort:
         if why:
             raise StoppedError(why)
 
-    def keep(self, fit: "GapFit") -> None:
-        """Keep a fit with the gap free, if it is of more rows than the best so far, or better."""
-        if fit.likelihood.problem.index("alpha") not in fit.free:
-            return
-        if self.best is None or _merit(fit) > _merit(self.best):
-            self.best = fit
-
-
-def _merit(fit: "GapFit") -> tuple[int, float]:
-    return fit.likelihood.problem.outputs.shape[0], -fit.point.objective
+    def keep(self, fit: Any, rows: int, objective: float) -> None:
+        """Keep a fit as the best so far, if it is of more rows than that, or its objective lower."""
+        if self.best is None or (rows, -objective) > self._merit:
+            self.best, self._merit = fit, (rows, -objective)

@@ -270,7 +270,9 @@ def maximise(
         held = ((value <= lower) & (gradient > 0.0)) | ((value >= upper) & (gradient < 0.0))
         before = point.objective
         point, damping = _step(likelihood, point, places, gradient, information, held, (lower, upper), damping)
-        likelihood.effort.keep(GapFit(point, places, information, done, False, likelihood))
+        if likelihood.problem.index("alpha") in places:
+            fit = GapFit(point, places, information, done, False, likelihood)
+            likelihood.effort.keep(fit, likelihood.problem.outputs.shape[0], point.objective)
         if before - point.objective < tolerance:
             # The first differences may have been taken too coarsely: look again with better ones.
             if before == point.objective and done == 1:
