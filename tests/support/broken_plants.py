@@ -198,8 +198,6 @@ _TABLE = """
 2 3 | CS | own_fine          | steps.internal | step=0.01
 2 3 | CS | own_sampled       | steps.internal | step=0.02
 2 3 | CS | own_slow          | steps.internal | step=0.02
-2 3 | CS | own_drift         | steps.internal | step=0.015
-2 3 | CS | own_round         | steps.internal | step=0.024
 2 3 | CS | own_behind        | steps.internal | step=0.015
 2 3 | CS | time_runs         | steps.time
 """  # noqa: E501

@@ -11,7 +11,7 @@ from orchestrator.checking.probing.variables import ProbedVariable
 
 _FINE = 16
 """Parts of a communication step in which the outputs are looked at, so that an inner step of a third of it is seen."""
-_LENGTH = 4  # communication steps
+_LENGTH = 6  # communication steps
 _FEWEST = 3  # steps inside that must be seen
 _MULTIPLE = 0.02  # of an inner step: nearer to a multiple is one
 _STEP_TOLERANCE = 0.1
