@@ -72,7 +72,7 @@ def record_from_columns(
         )
     for name, values in arrays.items():
         check_finite(values, label[name], source)
-    grid = grid_of(arrays["time"], label["time"], source, trust_rows)
+    grid = grid_of(arrays["time"], label["time"], source, trust_rows, arrays["theta_m"])
     for name in ("u", "theta_m"):
         if name in arrays and np.isnan(arrays[name]).all():
             raise RecordError(f"{source}: column `{label[name]}` must hold numbers, but is empty")
@@ -82,7 +82,7 @@ def record_from_columns(
             check_moving(
                 {key: interpolate_missing(values) for key, values in arrays.items()}, name, label[name], source
             )
-    record = _on_grid(arrays, grid, source, trust_rows)
+    record = _on_grid(arrays, grid, source)
     return replace(record, notes=(*notes, *record.notes))
 
 
@@ -101,11 +101,11 @@ def _stamp(arrays: dict[str, Array], label: str, source: str) -> tuple[dict[str,
     return kept, [f"{lost} {'row' if lost == 1 else 'rows'} without a time left out"]
 
 
-def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: bool) -> Record:
+def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str) -> Record:
     """Return the record on its uniform grid; rows that the file lacks are missing samples."""
     timing, notes = grid.timing, []
     table: dict[str, Array] = {}
-    if timing.missing == 0 and not trust_rows:
+    if timing.missing == 0 and not grid.trusted:
         table.update(arrays)
     else:
         for name, values in arrays.items():
@@ -123,7 +123,9 @@ def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: b
     if record.n_missing:
         share = 100.0 * record.n_missing / record.size
         notes.append(f"{record.n_missing} rows ({share:.2g} %) have missing samples; estimates leave them out")
-    if timing.jitter > 1e-3 * timing.step or timing.missing:
+    if grid.note:
+        notes.append(grid.note)
+    elif timing.jitter > 1e-3 * timing.step or timing.missing:
         notes.append(timing.describe())
     return replace(record, notes=tuple(notes))
 

@@ -4,12 +4,13 @@ In all functions: ``time``: (n,) stamps [s]; ``values``: (n,); NaN: missing.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
+from orchestrator.records.jitter import describe_jitter, fit_clock
 from orchestrator.shared.numbers import exact_text
 
 Array = NDArray[np.float64]
@@ -59,30 +60,49 @@ class Timing:
 
 @dataclass(frozen=True)
 class Grid:
-    """A uniform grid for rows: ``place`` (n,) is where each row of the file belongs on its ``size`` rows."""
+    """A uniform grid for rows: ``place`` (n,) is where each row of the file belongs on its ``size`` rows.
+
+    Attributes:
+        trusted: whether the rows are uniform, and not their stamps.
+        note: words for what was found, where nobody said that they are.
+    """
 
     start: float
     timing: Timing
     place: NDArray[np.int64]
     size: int
+    trusted: bool = False
+    note: str = ""
 
 
-def grid_of(time: Array, label: str, source: str, trust_rows: bool = False) -> Grid:
-    """Return the uniform grid of time stamps (n,) [s]."""
+def grid_of(time: Array, label: str, source: str, trust_rows: bool = False, angle: Array | None = None) -> Grid:
+    """Return the uniform grid of time stamps (n,) [s].
+
+    Args:
+        trust_rows: whether the rows are uniform whatever their stamps say.
+        angle: (n,) what moved; with it, stamps that jitter about a uniform clock are found and their rows trusted.
+    """
     where = f"{source}: column `{label}`"
     _check_increasing(time, label, source)
-    step = float(np.median(np.diff(time)))
+    start, place = float(time[0]), np.arange(time.size)
     if trust_rows:
-        step = float((time[-1] - time[0]) / (time.size - 1))
-        place = np.arange(time.size)
+        start, step, _ = fit_clock(time)
     else:
-        step, place = _places(time, step)
+        step, place = _places(time, float(np.median(np.diff(time))))
     _check_step(step, where)
-    off = time - (time[0] + step * place)
+    off = time - (start + step * place)
     off = off - 0.5 * (off.max() + off.min())
     largest, rounded = float(np.abs(off).max()), _rounding(time)
-    if not trust_rows:
-        _check_grid(off, np.diff(place), step, rounded, time, label, source)
+    row = None if trust_rows else _row_off_grid(off, np.diff(place), step, rounded, time)
+    if row is not None:
+        note = "" if angle is None else describe_jitter(time, angle)
+        if note:
+            return replace(grid_of(time, label, source, True), note=note)
+        raise RecordError(
+            f"{source}: row {row + 1}, column `{label}` must be uniform with a step of {step:.6g} s, but is off by "
+            f"{1e3 * abs(off[row]):.3g} ms, jitter {1e3 * float(np.std(off)):.3g} ms: say how to resample: `resample` "
+            "uniform (only the stamps jitter), linear or cubic (the samples do)"
+        )
     jumps = np.flatnonzero(np.diff(place) > 1)
     gaps = tuple((int(place[n]) + 1, int(place[n + 1] - place[n]) - 1) for n in jumps)
     size = int(place[-1]) + 1
@@ -96,9 +116,8 @@ def grid_of(time: Array, label: str, source: str, trust_rows: bool = False) -> G
             f"{exact_text(round((longest[0] - 1) * step, 6))} s after the first row on): keep a part without it by "
             "`part` START:END"
         )
-    return Grid(
-        float(time[0]), Timing(step, float(np.sqrt(np.mean(off**2))), largest, missing, gaps, rounded), place, size
-    )
+    timing = Timing(step, float(np.sqrt(np.mean(off**2))), largest, missing, gaps, rounded)
+    return Grid(start, timing, place, size, trust_rows)
 
 
 def _check_increasing(time: Array, label: str, source: str) -> None:
@@ -198,20 +217,13 @@ def _are_multiples(away: Array, unit: float) -> bool:
     return bool(np.all(np.abs(off, out=off) < 1e-3))
 
 
-def _check_grid(
-    off: Array, steps: NDArray[np.int64], step: float, rounded: float, time: Array, label: str, source: str
-) -> None:
-    """Refuse stamps that are too far from the grid."""
+def _row_off_grid(off: Array, steps: NDArray[np.int64], step: float, rounded: float, time: Array) -> int | None:
+    """Return the first row whose stamp is too far from the grid, or None."""
     allowed = LARGEST_JITTER * step + 1e-9 * float(np.abs(time).max()) + 0.5 * rounded * (rounded < 1.01 * step)
-    bad = np.flatnonzero(np.abs(off) > allowed)
-    if not bad.size and np.all(steps > 0):
-        return
-    row = int(bad[0]) if bad.size else int(np.flatnonzero(steps <= 0)[0])
-    raise RecordError(
-        f"{source}: row {row + 1}, column `{label}` must be uniform with a step of {step:.6g} s, but is off by "
-        f"{1e3 * abs(off[row]):.3g} ms, jitter {1e3 * float(np.std(off)):.3g} ms: say how to resample: `resample` "
-        "uniform (only the stamps jitter), linear or cubic (the samples do)"
-    )
+    for bad in (np.flatnonzero(np.abs(off) > allowed), np.flatnonzero(steps <= 0)):
+        if bad.size:
+            return int(bad[0])
+    return None
 
 
 def resample_grid(time: Array) -> tuple[Array, float]:

@@ -79,8 +79,9 @@ def _held(rows: slice) -> Callable[[Table], Table]:
 
 
 def _jitter(table: Table) -> Table:
+    """Return stamps that may be nearer to another row's time: below half a step they would be taken as jitter."""
     rng = np.random.default_rng(0)
-    return table | {"time": np.sort(table["time"] + 0.002 * rng.uniform(-1.0, 1.0, table["time"].size))}
+    return table | {"time": np.sort(table["time"] + 0.004 * rng.uniform(-1.0, 1.0, table["time"].size))}
 
 
 def _scaled(**factors: float) -> Callable[[Table], Table]:

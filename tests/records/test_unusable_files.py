@@ -96,8 +96,9 @@ def _mat_lengths(path: Path, table: Table) -> None:
 
 
 def _jitter(t: Table) -> Table:
+    """Return stamps that may be nearer to another row's time: below half a step they would be taken as jitter."""
     rng = np.random.default_rng(0)
-    return t | {"time": np.sort(t["time"] + 0.002 * rng.uniform(-1.0, 1.0, t["time"].size))}
+    return t | {"time": np.sort(t["time"] + 0.004 * rng.uniform(-1.0, 1.0, t["time"].size))}
 
 
 def _hold(t: Table, name: str, rows: slice) -> Table:

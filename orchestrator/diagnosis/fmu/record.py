@@ -14,6 +14,7 @@ from orchestrator.errors import RecordError
 from orchestrator.master.protocol import Unit
 from orchestrator.master.units import contradiction, conversion, resolve
 from orchestrator.records.arrays import interpolate_missing, runs_of
+from orchestrator.records.jitter import describe_jitter, fit_clock
 from orchestrator.records.tables import NamedColumns, Wanted, read_columns, read_unit
 from orchestrator.records.timing import has_unpadded_fractions, interpolate
 from orchestrator.shared.inference.band import content_band
@@ -104,8 +105,9 @@ def read_fmu_record(path: Path, given: Map, uneven: float = DEFAULT.uneven) -> F
     time = Wanted(options.time, "$.options.time", cure)
     read = read_columns(path, time, wanted, options.time_factor, options.header)
     good = np.isfinite(read.time)
-    even, place = _even(read.time[good], path, uneven)
-    filled, notes = [], list(read.notes)
+    motion = read.values[len(given.inputs)][good]
+    even, place, jitter = _even(read.time[good], motion, path, uneven)
+    filled, notes = [], [*read.notes, *jitter]
     for number, (_, name, entry) in enumerate(columns):
         spread = np.full(even.size, np.nan)
         spread[place] = _convert(read, number, wanted[number], entry.factor, given.units.get(name), name, path)[good]
@@ -153,8 +155,12 @@ def _convert(
     return ratio[0] * values + ratio[1]
 
 
-def _even(time: Array, path: Path, uneven: float) -> tuple[Array, NDArray[np.int64]]:
-    """Return uniform times [s], and the row of each row of the file on them."""
+def _even(time: Array, motion: Array, path: Path, uneven: float) -> tuple[Array, NDArray[np.int64], list[str]]:
+    """Return uniform times [s], the row of each row of the file on them, and a note where the stamps jitter.
+
+    Args:
+        motion: (n,) an output.
+    """
     if len(time) < LEAST_ROWS:
         raise RecordError(f"{path}: must have at least {LEAST_ROWS} rows, but has {len(time)}")
     grown = np.diff(time)
@@ -167,8 +173,12 @@ def _even(time: Array, path: Path, uneven: float) -> tuple[Array, NDArray[np.int
     step = (time[-1] - time[0]) / float(place[-1])
     off = np.abs(time - time[0] - step * place)
     if not step > 0.0 or float(off.max()) > uneven * step * np.sqrt(len(time)):
-        raise RecordError(f"{path}: {_unevenness(time)}")
-    return time[0] + step * np.arange(place[-1] + 1), place
+        note = describe_jitter(time, motion)
+        if not note:
+            raise RecordError(f"{path}: {_unevenness(time)}")
+        start, step, _ = fit_clock(time)
+        return start + step * np.arange(time.size), np.arange(time.size), [note]
+    return time[0] + step * np.arange(place[-1] + 1), place, []
 
 
 def _fill(values: Array, time: Array, entry: ColumnEntry, path: Path) -> tuple[Array, list[str]]:
