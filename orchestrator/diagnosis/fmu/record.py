@@ -177,7 +177,8 @@ def _even(time: Array, motion: Array, path: Path, uneven: float) -> tuple[Array,
         if not note:
             raise RecordError(f"{path}: {_unevenness(time)}")
         start, step, _ = fit_clock(time)
-        return start + step * np.arange(time.size), np.arange(time.size), [note]
+        place = np.arange(time.size, dtype=np.int64)
+        return np.asarray(start + step * place, dtype=np.float64), place, [note]
     return time[0] + step * np.arange(place[-1] + 1), place, []
 
 
