@@ -36,6 +36,7 @@ def check_parameters(system: System, cases: DesignCases, ignored: frozenset[str]
     if set(cases.names) <= ignored:
         return
     structural = _structural(system)
+    fed = {c.target for c in system.connections} | {s.target for s in system.sources}
     for index in range(min(len(cases), CHECKED_CASES)):
         for name, value in cases[index].parameters.items():
             if name not in ignored and name not in problems and value is not None:
@@ -44,6 +45,8 @@ def check_parameters(system: System, cases: DesignCases, ignored: frozenset[str]
                     _, text = coerce_value(variable, value)
                 else:
                     _, text = system.start_value(name, value)
+                if text is None and name in fed:
+                    text = "must name an input that nothing feeds, but a source or connection sets it: vary a parameter"
                 if text is not None:
                     problems[name] = Problem(name, text)
     raise_problems(list(problems.values()), "`vary`", "vary")

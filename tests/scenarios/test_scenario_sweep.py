@@ -56,6 +56,7 @@ def test_a_grid_over_any_parameter(scenario, tmp_path, capsys):
         (["--vary", "plant.nothing=1"], "plant.nothing"),
         (["--vary", "engine.k=1"], "engine"),
         (["--vary", "plant.k"], "NAME=SPECIFICATION"),
+        (["--vary", "plant.u=1,2"], "plant.u: must name an input that nothing feeds"),
     ],
 )
 def test_bad_input(scenario, tmp_path, capsys, words, complaint):
