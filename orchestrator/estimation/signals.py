@@ -42,7 +42,8 @@ def shaft_signals(record: Record, model: Model) -> ShaftSignals:
         raise NotApplicableError("this method needs the load's angle `theta_l`")
     p = {name: entry.value for name, entry in model.parameters.items()}
     h = record.step
-    width = max(5, 2 * round(0.5 * WINDOW / h) + 1)
+    rows = record.theta_l.size
+    width = max(5, min(2 * round(0.5 * WINDOW / h) + 1, rows - 1 + rows % 2))
     twist = record.theta_m / p["i"] - record.theta_l
     rate = savgol_filter(twist, width, 2, deriv=1, delta=h)
     speed = savgol_filter(record.theta_l, width, 3, deriv=1, delta=h)

@@ -46,3 +46,12 @@ def test_one_encoder_loses_whole_turns(record: Record) -> None:
     near = set_zeros(far, default_model())
     assert np.abs(near.theta_m).max() < 200.0
     assert (np.round((near.theta_m - far.theta_m) / (2.0 * np.pi), 6) % 1.0 == 0.0).all()
+
+
+@pytest.mark.parametrize("rows", [200, 201])
+def test_a_record_shorter_than_its_filter_is_no_crash(rows: int, record: Record) -> None:
+    """Stamps in the wrong unit make seconds into milliseconds."""
+    names = ("time", "u", "theta_m", "theta_l")
+    short = {name: np.asarray(getattr(record, name))[:rows] for name in names}
+    fast = record_from_columns(short | {"time": 1e-6 * np.arange(rows)}, "fast")
+    assert set_zeros(fast, default_model()).theta_m.size == rows
