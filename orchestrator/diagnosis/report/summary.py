@@ -111,9 +111,11 @@ def list_effects(labels: Sequence[str]) -> str:
 def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
     """Return the verdict in one sentence."""
     if diagnosis.verdict in ("none", "parameters") and diagnosis.misses_test_data:
+        found = "No effect of the library is missing, yet" if diagnosis.searched else "No effect was looked for, and"
+        outside = " outside the library" if diagnosis.searched else ""
         return (
-            f"Verdict: {diagnosis.verdict}. No effect of the library is missing, yet the {compared} misses the test "
-            f"data by {diagnosis.largest_miss:.3g} times the noise: a disturbance, or an effect outside the library."
+            f"Verdict: {diagnosis.verdict}. {found} the {compared} misses the test data by "
+            f"{diagnosis.largest_miss:.3g} times the noise: a disturbance, or an effect{outside}."
         )
     if diagnosis.verdict == "none":
         return f"Verdict: none. Nothing is missing: the {compared} explains the record."
