@@ -20,7 +20,7 @@ from orchestrator.shared.results.any_fmu import FmuCalibrationFound, LearnedPara
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
-MISSING = "something that is no parameter is missing: the values are biased"
+MISSING = "no values of these parameters within their limits explain the record: the estimates are biased"
 
 
 @dataclass(frozen=True, repr=False)

@@ -92,7 +92,8 @@ def starter(
         share = entry.uncertainty / abs(entry.value) if entry.value else 0.0
         meaning = MEANING.get(name) or model.plant.table[list(model.parameters).index(name)].description
         lines += [f"[parameters.{name}]", f"value = {entry.value:.6g}   # {entry.unit or '1'}: {meaning}; {said}"]
-        lines += [f"relative_uncertainty = {share:.3g}   # off by at most this share; the fit finds the value", ""]
+        says = "off by at most this share; the fit finds the value" if share else "exact: the fit holds the value"
+        lines += [f"relative_uncertainty = {share:.3g}   # {says}", ""]
     lines += _further(model, origin)
     return "\n".join(lines).rstrip() + "\n"
 

@@ -66,6 +66,14 @@ def test_a_limit_that_stops_the_fit_is_named(free, tmp_path: Path, name: str, sh
     assert not any(f"hardly determines `{name}`" in note for note in found.notes)
 
 
+def test_a_limit_far_from_the_value_is_not_told_as_something_that_is_no_parameter(free, tmp_path: Path) -> None:
+    wanted = free.calibration.diagnosis.parameters["m"]
+    word = "max" if wanted.value > wanted.nominal else "min"
+    found = _calibrated(tmp_path, {"m": f'{word}="{wanted.nominal!r}"'})
+    assert not found.calibration.explained
+    assert "within their limits" in found.trust.reasons[0]
+
+
 def test_limits_that_stop_nothing_change_no_value_and_end_the_interval(free, tmp_path: Path) -> None:
     wanted = free.calibration.diagnosis.parameters["k"]
     place, word = (1, "max") if wanted.value > wanted.nominal else (0, "min")  # away from the nominal value

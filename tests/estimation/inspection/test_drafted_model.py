@@ -59,3 +59,6 @@ def test_what_a_model_file_leaves_open_is_of_the_record(
     assert model.columns["u"].torque_constant == drive.torque_constant
     line = next(text for text in found.starter.splitlines() if text.startswith("torque_constant"))
     assert "ASSUMED" not in line
+    shares = [text for text in found.starter.splitlines() if text.startswith("relative_uncertainty")]
+    assert all(("holds the value" in text) == text.startswith("relative_uncertainty = 0 ") for text in shares)
+    assert {"holds the value" in text for text in shares} == {True, False}
