@@ -19,6 +19,7 @@ def set_zeros(record: Record, model: Model) -> Record:
 
     The load's angle, and one that is alone, loses whole turns, so that what follows a turn stays where it is. The
     motor's zero goes to the middle of the play, where it lies outside: an offset as large is no property of sensors.
+    The twist of a torque that the motor holds throughout, such as a weight's, is no offset.
     """
     if model.fmu != "Drivetrain":
         return record
@@ -31,8 +32,10 @@ def set_zeros(record: Record, model: Model) -> Record:
     unwound = shaft.twist - shaft.torque / model.parameters["k"].value
     low, high = np.quantile(unwound, (TAIL, 1.0 - TAIL))
     centre = 0.5 * float(low + high)
-    lies_within = abs(centre) <= max(FAR_TWIST, 0.5 * float(high - low))
-    return _shift(record, 0.0 if lies_within else centre * model.parameters["i"].value, load)
+    ratio = model.parameters["i"].value
+    held = abs(float(np.mean(filled.u))) * ratio / model.parameters["k"].value if record.has_torque else 0.0
+    lies_within = abs(centre) <= max(FAR_TWIST, 0.5 * float(high - low)) + held
+    return _shift(record, 0.0 if lies_within else centre * ratio, load)
 
 
 def _far_turns(angle: np.ndarray) -> int:
