@@ -20,7 +20,7 @@ from orchestrator.master.iterated import Iterated, backward_slots, initialise
 from orchestrator.master.layout import Layout, lay_out
 from orchestrator.master.own_steps import own_step_remarks
 from orchestrator.master.problems import Problem, raise_problems
-from orchestrator.master.protocol import RunEndedError, Slave, StepDiscardedError, Value
+from orchestrator.master.protocol import AT_EVENT, RunEndedError, Slave, StepDiscardedError, Value
 from orchestrator.master.result import MACHINE_CODE, PYTHON, EventStatistics, Recording, RunRemark, Statistics
 from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, Quantity, System, split
@@ -143,7 +143,7 @@ class Session:
                 if not allow_early_end:
                     raise SlaveError(f"{error}: it wants the run to end, but the whole run is needed") from None
                 steps = math.floor((error.time - self.start) / self.algorithm.step + 1e-6)
-                if steps == 0:
+                if steps == 0 and error.how != AT_EVENT:
                     raise SlaveError(f"{error}: it asks for the end of the run before a step is done") from None
                 text = f"ended the run at t = {error.time:g} s of {self.stop:g} s ({error.how})"
                 calls = dict.fromkeys((block.name for block in self.layout.blocks), steps)

@@ -11,6 +11,7 @@ from orchestrator.shared.isolation.limits import Limits
 from tests.support.broken_ball3 import behavioural
 from tests.support.broken_ball3_xml import static
 from tests.support.broken_fmus import QUICK, Broken, corpus, good
+from tests.support.broken_plants import broken_plants
 from tests.support.c_fmu import REFERENCE, build_c_fmu, fmu_files, have_compiler, write_fmu
 from tests.support.outlined_findings import outline_of, outlines
 
@@ -112,7 +113,7 @@ def test_an_fmu_that_writes_to_our_pipe_forges_no_finding(tmp_path: Path) -> Non
 
 
 def test_the_corpus_is_large_and_covers_the_rules() -> None:
-    covered = {b.rule for b in CORPUS} | {m.rule for m in (*behavioural(), *static())}
+    covered = {b.rule for b in CORPUS} | {m.rule for m in (*behavioural(), *static(), *broken_plants())}
     assert len(CORPUS) >= 40
     assert f"{len(CORPUS)} FMUs, each broken by one mutation" in DOCS.read_text(encoding="utf-8")
     assert [b.name for b in CORPUS] == list(OUTLINES)
@@ -125,6 +126,7 @@ NOT_IN_THE_CORPUS = {
     "model.vendor-annotation",
     "run.not-executed",
     "run.failed",
+    "run.moved-crash",  # shown by FMUs of others alone
     "variable.alias-start",
     "variable.name-flat",
 }

@@ -232,12 +232,18 @@ class _Restoring:
         self.context.report(rule, f"{what} must have its values back before the next step, but {text}", v.name)
         return False
 
+    def _allowed(self) -> float:
+        """Return the relative difference that a solver may make: its tolerance, multiplied by the run."""
+        errs = _AMPLIFIED * (self.context.bench.job.tolerance or 0.0)
+        return min(max(errs, _SMALL), _MOST_INEXACT)
+
     def _slight(self, values: Sequence[Any]) -> bool:
         """Whether all that differs are numbers, and by less than solvers do."""
+        allowed = self._allowed()
         for a, b in zip(self.values, values, strict=True):
             if same(a, b):
                 continue
-            if not (isinstance(a, float) and isinstance(b, float)) or not abs(a - b) <= _SMALL * max(abs(a), abs(b)):
+            if not (isinstance(a, float) and isinstance(b, float)) or not abs(a - b) <= allowed * max(abs(a), abs(b)):
                 return False
         return True
 
@@ -256,7 +262,5 @@ class _Restoring:
         context = self.context
         difference = context.compare((context.trace or [])[self.half :], context.bench.run(driver, self.half))
         if difference is not None:
-            # A solver that starts anew errs by its tolerance, and the rest of the run multiplies that.
-            errs = _AMPLIFIED * (context.bench.job.tolerance or 0.0)
-            context.report_difference(rule, wanted, difference, min(max(errs, _SMALL), _MOST_INEXACT))
+            context.report_difference(rule, wanted, difference, self._allowed())
         return difference is None
