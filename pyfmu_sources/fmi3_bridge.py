@@ -23,12 +23,19 @@ _KINDS = (
     (IndexError, INDEX_ERROR),
 )
 
+try:  # at once: the library of the FMU keeps this module for later instances, when its package may be out of reach
+    _MODEL: Any = import_module(".entry", __package__).Model
+except ModuleNotFoundError as error:  # outside an FMU
+    if error.name != f"{__package__}.entry":
+        raise
+    _MODEL = None
+
 
 class Bridge:
     """One slave and the memory that it shares: values, states, results, event, fault, message (python_slave.h)."""
 
     def __init__(self, memory: memoryview, variables: int, states: int, results: int, model: Any = None) -> None:
-        model = import_module(".entry", __package__).Model if model is None else model
+        model = _MODEL if model is None else model
         self.slave = model()
         self.text = b""
         places = []
