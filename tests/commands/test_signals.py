@@ -23,6 +23,14 @@ SPINNING = 0.5  # s of processor time since it was started, and no answer: the F
 ENDINGS = {"SIGINT": "interrupted", "SIGTERM": "ended by SIGTERM", "SIGHUP": "ended by SIGHUP"}
 
 
+@pytest.fixture(autouse=True)
+def _ctrl_c_is_heard():
+    """Programs that start here hear Ctrl-C, also where the tests themselves run in the background of a shell."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def wait_for_step(pid: int, process: "subprocess.Popen[str]") -> None:
     """Wait until a child of the process spins in the FMU's step: it takes processor time, and nothing else happens."""
     end, before, since = time.monotonic() + HANGS, {}, {}
