@@ -34,7 +34,7 @@ def multiply(left, right, out):  # type: ignore[no-untyped-def]
 
 @njit_on_disk(nogil=True)
 def advance_by(phi, gain_u, gain_1, u, x, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` (5,) with where a transition leads from ``x``."""
+    """Fill ``out`` (5,) with where a transition leads from ``x``; of a rate, with the time derivative there."""
     for r in range(5):
         acc = gain_u[r] * u + gain_1[r]
         for c in range(5):
@@ -103,16 +103,6 @@ def transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped-
             gain_1[r] = moved_1[r]
             for c in range(5):
                 phi[r, c] = other[r, c]
-
-
-@njit_on_disk(nogil=True)
-def _derivative(a, b_u, b_1, x, u, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` with the time derivative of ``x`` in one mode."""
-    for r in range(5):
-        total = b_u[r] * u + b_1[r]
-        for c in range(5):
-            total += a[r, c] * x[c]
-        out[r] = total
 
 
 @njit_on_disk(nogil=True)
@@ -239,12 +229,12 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
         after = (2 if side > 0.0 else 0) if flank == 1 else 1
         speed0 = np.empty(5)
         speed1 = np.empty(5)
-        _derivative(mats[flank], b_u, b_1[flank], y, u, speed0)
+        advance_by(mats[flank], b_u, b_1[flank], u, y, speed0)
         rate = normal[0] * y[1] + normal[2] * y[3]
         way = side if flank == 1 else -side
         for r in range(5):
             y[r] += way * jump[r]
-        _derivative(mats[after], b_u, b_1[after], y, u, speed1)
+        advance_by(mats[after], b_u, b_1[after], u, y, speed1)
         if abs(rate) > 1e-6:
             for c in range(5):
                 along = (normal[0] * total[0, c] + normal[2] * total[2, c]) / rate
