@@ -192,6 +192,17 @@ def _equal_rows(a: Sequence[Any], b: Sequence[Any]) -> bool:
     return all(x == y or (x != x and y != y) for x, y in zip(a, b, strict=True))  # noqa: PLR0124 (NaN)
 
 
+def _rows_beside(
+    driver: Driver, v: ProbedVariable, base: Sequence[Any], other: Sequence[Any], variables: Sequence[ProbedVariable]
+) -> list[Any] | None:
+    """Values with ``v`` at ``base`` and at ``other``; None where they are not back once ``v`` is."""
+    before = driver.read(variables)
+    driver.set([v], other)
+    during = driver.read(variables)
+    driver.set([v], base)
+    return [before, during] if _equal_rows(before, driver.read(variables)) else None
+
+
 def _switch(
     measured: _Measured, point: RestPoint, unknowns: Sequence[ProbedUnknown], inputs: Sequence[ProbedVariable]
 ) -> None:
@@ -206,12 +217,8 @@ def _switch(
         other = moved(v, base, 0)
         if other is None:
             continue
-        before = driver.read(variables)
-        driver.set([v], other)
-        during = driver.read(variables)
-        driver.set([v], base)
-        if _equal_rows(before, driver.read(variables)):
-            measured.look(unknowns, v, [before, during], None, f"t = {point.time:g}")
+        if (rows := _rows_beside(driver, v, base, other, variables)) is not None:
+            measured.look(unknowns, v, rows, None, f"t = {point.time:g}")
     if leave:
         driver.settle(point.time, "at a point of a run")  # type: ignore[attr-defined]
         driver.call(leave)
@@ -260,12 +267,8 @@ def _initial(
         other = moved(v, base, which)
         if other is None:
             continue
-        before = driver.read(variables)
-        driver.set([v], other)
-        during = driver.read(variables)
-        driver.set([v], base)
-        if _equal_rows(before, driver.read(variables)):
+        if (rows := _rows_beside(driver, v, base, other, variables)) is not None:
             change = other[0] - base[0] if v.real and v.size == 1 else None
-            measured.look(unknowns, v, [before, during], change, "initialisation mode")
+            measured.look(unknowns, v, rows, change, "initialisation mode")
         if budget.over:
             return
