@@ -1,4 +1,4 @@
-"""What result files say for pages that simulate: the model, and from where on it runs beside the record."""
+"""What result files say for runs beside the record: the model, and from where on it runs."""
 
 from orchestrator.diagnosis.report.corrected import BeforeAfter, start_values
 from orchestrator.diagnosis.result import Diagnosis

@@ -26,8 +26,6 @@ FLAGS = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall",
 ZIG_FLAGS = ("-O2", "-fno-sanitize=undefined", "-fno-slp-vectorize")
 # On Windows half a library is the compiler's own C library: what is translated is kept small there, and copied less.
 ZIG_WINDOWS_FLAGS = ("-Os", "-mllvm", "-inline-threshold=0", *ZIG_FLAGS[1:])
-# A module without a main function, for a browser.
-WEB_FLAGS = ("-std=gnu99", *ZIG_FLAGS, "-target", "wasm32-wasi", "-mexec-model=reactor", "-s")
 
 
 @dataclass(frozen=True)
@@ -135,18 +133,6 @@ def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder
         command.append("-lm")
     _run(compiler, command, folder, f"{name}.c for {target.folder}")
     return (folder / library).read_bytes()
-
-
-def compile_web_module(compiler: Compiler, sources: Mapping[str, bytes]) -> bytes:
-    """Return a WebAssembly module."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for file, content in sources.items():
-            (folder / file).write_bytes(content)
-        parts = [file for file in sources if file.endswith("_part.c")]
-        command = [*compiler.command, *FLAGS, *WEB_FLAGS, "-o", "live.wasm", "live.c", *parts]
-        _run(compiler, command, folder, "live.c for a page")
-        return (folder / "live.wasm").read_bytes()
 
 
 def _run(compiler: Compiler, command: Sequence[str], folder: Path, what: str) -> None:

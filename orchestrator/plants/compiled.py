@@ -31,7 +31,7 @@ INLINED = ("rates", "elastic_torque", "motor_torque", "load_torque")
 FORMULAS = ("axis_equations", "effects", "equations")
 """Modules of the plants' own equations, which every stage of every step runs."""
 
-LISTING = ("attachment", "backlash_estimator", "dead_time", "linear_mode", "riccati")
+LISTING = ("attachment", "backlash_estimator", "dead_time", "linear_mode")
 """Modules whose functions make lists: references to those are counted, there and in modules that call them."""
 
 _PACKAGE = pyfmu_sources.__name__

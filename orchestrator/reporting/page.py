@@ -1,24 +1,22 @@
 """A report as one HTML page that needs nothing but a browser."""
 
 import base64
+import json
 import mimetypes
-from collections.abc import Set
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import jinja2
 from markupsafe import Markup
 
-from orchestrator.reporting.live_data import in_script, live_data
 from orchestrator.reporting.model import (
     POINT_LIMIT,
     Bars,
     Cell,
     Facts,
     Findings,
-    Live,
-    LivePlot,
     Numbers,
     Picture,
     Plot,
@@ -31,10 +29,8 @@ from orchestrator.reporting.model import (
 from orchestrator.reporting.numbers import in_words, thin_series
 
 EMBED_LIMIT = 1_000_000
-LIVE_LIMIT = 1_500_000
-"""Bytes of a page that simulates: files that would make it larger are linked beside it."""
 LONG_TEXT = 40
-SCRIPTS = ("scale.js", "svg.js", "plot.js", "live.js", "page.js")
+SCRIPTS = ("scale.js", "svg.js", "plot.js", "page.js")
 _KINDS = {
     Text: "text",
     Facts: "facts",
@@ -43,43 +39,21 @@ _KINDS = {
     Findings: "findings",
     Bars: "bars",
     Picture: "picture",
-    Live: "live",
 }
 
 
 def render(report: Report) -> str:
     """Return the page. It depends on the report and the files named in ``downloads`` only, never on the date."""
-    live = any(isinstance(section, Live) for section in report.sections)
-    inside: Set[Path] = {path for path in report.downloads if path.stat().st_size <= EMBED_LIMIT}
-    if live:
-        inside = _that_fit(inside, LIVE_LIMIT - len(_page(report, live, set()).encode()))
-    return _page(report, live, inside)
-
-
-def _page(report: Report, live: bool, inside: Set[Path]) -> str:
-    """Return the page with some of its files inside it."""
     return (
         _environment()
         .get_template("page.html")
         .render(
             report=report,
-            live=live,
-            downloads=[_download(path, path in inside) for path in report.downloads],
+            downloads=[_download(path) for path in report.downloads],
             style=Markup(_asset("page.css")),
             script=Markup("\n".join(_asset(name) for name in SCRIPTS)),
         )
     )
-
-
-def _that_fit(files: Set[Path], room: int) -> Set[Path]:
-    """Return the smallest files that together fit into ``room`` bytes of text."""
-    chosen: set[Path] = set()
-    for path in sorted(files, key=lambda path: (path.stat().st_size, path.name)):
-        room -= len(_embed(path))
-        if room < 0:
-            break
-        chosen.add(path)
-    return chosen
 
 
 @cache
@@ -94,8 +68,6 @@ def _environment() -> jinja2.Environment:
     environment.filters |= {
         "words": in_words,
         "plot_data": _plot_data,
-        "live_data": live_data,
-        "live_plot": _live_plot,
         "sort_key": _sort_key,
         "cell_class": _cell_class,
         "embedded": _embed,
@@ -142,12 +114,6 @@ def _plot_data(plot: Plot) -> Markup:
     return in_script(data)
 
 
-def _live_plot(plot: LivePlot) -> Markup:
-    """Return a live section's plot without its curves, which the page computes."""
-    series = tuple(Series(curve.name, (), ()) for curve in plot.curves)
-    return _plot_data(Plot(plot.title, "time [s]", plot.y_label, series))
-
-
 def _series_data(series: Series) -> dict[str, object]:
     data: dict[str, object] = {"name": series.name, "kind": series.kind}
     data |= {"x": _round(series.x), "y": _round(series.y)}
@@ -163,12 +129,18 @@ def _round(values: Numbers) -> list[float | None]:
     return [None if value is None else float(f"{value:.10g}") for value in values]
 
 
-def _download(path: Path, inside: bool) -> dict[str, str]:
+def _download(path: Path) -> dict[str, str]:
     length = path.stat().st_size
     size = f"{length / 1000:.1f} kB" if length < 1_000_000 else f"{length / 1e6:.1f} MB"
-    if not inside:
+    if length > EMBED_LIMIT:
         return {"name": path.name, "size": f"{size}, beside this page", "href": path.name}
     return {"name": path.name, "size": size, "href": _embed(path)}
+
+
+def in_script(data: Any) -> Markup:
+    """Write data as JSON. Return text that is safe inside a script element."""
+    text = json.dumps(data, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
+    return Markup(text.replace("<", "\\u003c").replace("&", "\\u0026"))
 
 
 def _embed(path: Path) -> str:

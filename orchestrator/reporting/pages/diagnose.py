@@ -20,7 +20,6 @@ from orchestrator.reporting.model import (
 )
 from orchestrator.reporting.pages import any_fmu
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.pages.live import plant_section
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument, words
 from orchestrator.reporting.trust import trust_badge, trust_section
@@ -75,7 +74,6 @@ def build(source: ResultDocument) -> Report:
     sections += [*_residual_sections(results.remaining), *_law_sections(source, results.learned_law)]
     metric = any(signal.unit == "m" for test in results.test for signal in test.misfit.values())
     sections += record_plots(source, "diagnose.csv", live.rows if live else (), metric)
-    sections += plant_section(source, "diagnose.csv", live, metric=metric)
     sections += [_parameter_table(results.parameters), *_candidate_table(results.candidates), *_analysis(results)]
     sections += sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"})
     return Report(

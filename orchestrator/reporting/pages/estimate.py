@@ -18,7 +18,6 @@ from orchestrator.reporting.model import (
     Text,
 )
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.pages.live import plant_section
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument, numbers, words
 from orchestrator.reporting.trust import trust_badge, trust_section
@@ -30,7 +29,6 @@ Methods = Mapping[str, MethodFound]
 CURVE_POINTS = 121
 FLANK_POINTS = 2000
 CHI_SQUARE_95 = 3.841458820694124  # of one degree of freedom
-OFFERED = ("effects.coulomb_friction.motor.torque", "effects.coulomb_friction.load.torque")  # live, beside the gap
 UNEXPLAINED = "The model does not explain what was measured"
 ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
 
@@ -51,7 +49,6 @@ def build(source: ResultDocument) -> Report:
         *record_plots(source, "estimate.csv"),
         *_errors(source),
     ]
-    sections += plant_section(source, "estimate.csv", results.live, OFFERED)
     parameters = (results.diagnostics or {}).get("parameters")
     if parameters:
         sections.append(_parameters(parameters))

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from orchestrator.reporting.model import Cell, Facts, Plot, Report, Section, Series, Span
 from orchestrator.reporting.pages import generic
-from orchestrator.reporting.pages import live as live_pages
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.record import out_of_contact
 from orchestrator.reporting.source import ResultDocument, numbers
@@ -85,8 +84,7 @@ def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[l
     if {"theta_l_hat", "twin_theta_l_hat"} <= set(table):
         plots.insert(1, _difference(time, table, spans))
     experiment = sections_of("Experiment", results.experiment)
-    live = live_pages.pair_section(source, results)
-    return [Facts("Overview", tuple(facts)), *plots, *live, *experiment], summary
+    return [Facts("Overview", tuple(facts)), *plots, *experiment], summary
 
 
 def _difference(time: list[float | None], table: Columns, spans: tuple[Span, ...]) -> Plot:

@@ -84,5 +84,4 @@ function remember(mode) {
 themeButton(document.getElementById("theme"));
 document.querySelectorAll("table.sortable").forEach(sortable);
 document.querySelectorAll("table.sortable").forEach(fitted);
-document.querySelectorAll("figure.plot:not(.simulated)").forEach((figure) => new Plot(figure));
-document.querySelectorAll(".live").forEach((host) => new Live(host));
+document.querySelectorAll("figure.plot").forEach((figure) => new Plot(figure));

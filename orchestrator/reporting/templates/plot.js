@@ -75,14 +75,6 @@ class Plot {
     this.draw();
   }
 
-  // Show other numbers, with everything in view unless the reader has zoomed.
-  show(series) {
-    series.forEach((found, n) => Object.assign(this.data.series[n], found));
-    this.cursor = null;
-    if (this.range === this.home) this.reset();
-    else this.draw();
-  }
-
   zoom(factor) {
     const point = this.cursor && this.pointAt(this.cursor);
     const middle = (scale) => scale.value((scale.from + scale.to) / 2);

@@ -63,7 +63,7 @@ class PairFound(ResultData, frozen=True, kw_only=True):
 
 
 class LiveFound(msgspec.Struct, frozen=True):
-    """What a page needs to simulate a plant beside its record.
+    """What it takes to simulate a plant beside its record.
 
     ``values`` are those of ``fmu`` that differ from its defaults. From each row of the record in ``rows`` on it starts
     anew, from the ``starts`` of the same place. ``step`` in seconds.
