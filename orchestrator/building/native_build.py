@@ -22,10 +22,11 @@ from orchestrator.building.fmi3_files import build_description, terminals_and_ic
 from orchestrator.building.native_description import native_description
 from orchestrator.building.native_sources import RUNTIME, c_sources, indicator_count, slave_class
 from orchestrator.building.reference_files import reference_files
-from orchestrator.building.sources import DATA_FILES, Recipe, catalogue, closure, digest, recipe_of
+from orchestrator.building.sources import DATA_FILES, Recipe, catalogue, digest, recipe_of
 from orchestrator.building.stamping import content_guid, final_text, stamp
 from orchestrator.errors import FmuError
 from orchestrator.fmi.ours import record
+from orchestrator.shared.equation_files import closure
 
 PLACEHOLDER = "{00000000-0000-0000-0000-000000000000}"
 NO_COMPILER = "native FMUs need a C compiler: install one (cc), or `pip install 'backlash-cosim[native]'` for zig"

@@ -12,10 +12,11 @@ from typing import Any, get_type_hints
 
 from orchestrator.building.arrays import arrays
 from orchestrator.building.fmi3_description import INDICATOR, is_sampled
-from orchestrator.building.sources import Recipe, closure
+from orchestrator.building.sources import Recipe
 from orchestrator.building.starts import default_starts
 from orchestrator.building.translation.slave import has_states, translate_slave
 from orchestrator.errors import FmuError
+from orchestrator.shared.equation_files import members
 from pyfmu_sources.fmu_variables import FmuVariable
 
 RUNTIME = Path(__file__).parent / "native_fmu"
@@ -103,7 +104,7 @@ def _indicators(cls: Any) -> Iterator[FmuVariable]:
 def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, bytes]:
     """Return the members of ``sources/`` for a version of FMI, 2 or 3: file name to content."""
     translated = translate_slave(cls, _runtime_names(), fmi)
-    files = ", ".join(path.name for path in closure(recipe.module) if path.stem not in _PYTHON_ONLY)
+    files = ", ".join(name for name in sorted(members(recipe.module)) if Path(name).stem not in _PYTHON_ONLY)
     text = _FILE.format(
         name=recipe.name,
         title=cls.title,
@@ -158,7 +159,7 @@ def indicator_count(source: bytes) -> int:
     return int(found[1]) if found else 0
 
 
-_PYTHON_ONLY = ("slave_base", "sampled_slave", "fmu_variables", "hidden_state", "model_xml")
+_PYTHON_ONLY = ("slave_base", "sampled_slave", "fmu_variables", "hidden_state", "model_xml", "__init__")
 
 
 @cache

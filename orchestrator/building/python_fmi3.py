@@ -20,13 +20,15 @@ from orchestrator.building.launcher import NATIVE, Toolchain, compile_host, find
 from orchestrator.building.native_description import native_description
 from orchestrator.building.native_sources import OF_FMI3, RUNTIME, count_tables, indicator_total, slave_class
 from orchestrator.building.reference_files import reference_files
-from orchestrator.building.sources import DATA_FILES, Recipe, catalogue, closure, digest, fingerprint, recipe_of
+from orchestrator.building.sources import DATA_FILES, Recipe, catalogue, digest, fingerprint, recipe_of
 from orchestrator.building.stamping import content_guid, final_text, stamp
 from orchestrator.building.starts import default_starts
 from orchestrator.building.translation.slave import has_states, variable_table
 from orchestrator.building.worker import ENTRY, pythonfmu_license, runtime_files
 from orchestrator.errors import FmuError
 from orchestrator.fmi.ours import record
+from orchestrator.shared.equation_files import closure
+from orchestrator.shared.equation_files import members as source_members
 
 PLATFORM = "x86_64-linux"
 BRIDGE = "fmi3_bridge"
@@ -105,8 +107,7 @@ def _members(recipe: Recipe, toolchain: Toolchain, current: str) -> dict[str, by
 def _modules(recipe: Recipe) -> tuple[str, dict[str, bytes]]:
     """Return the package of all modules and its members; its name carries a hash of its content."""
     starts = default_starts(recipe.plain) | dict(recipe.starts)
-    paths = {*closure(recipe.module), *closure(BRIDGE)}
-    sources = {path.name: path.read_bytes() for path in sorted(paths)}
+    sources = source_members(recipe.module) | source_members(BRIDGE)
     sources |= {f"pythonfmu/{name}": data for name, data in runtime_files().items()}
     content = [part for name in sorted(sources) for part in (name.encode(), sources[name])]
     identity = digest([json.dumps([recipe.name, sorted(starts.items())]).encode(), *content])

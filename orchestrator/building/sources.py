@@ -12,11 +12,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import pyfmu_sources
 from orchestrator.errors import FmuError
+from orchestrator.shared.equation_files import SOURCES, closure
 from orchestrator.shared.version import __version__
 
-SOURCES = Path(pyfmu_sources.__file__).parent
 HERE = Path(__file__).parent
 SUFFIX = "_slave"
 LAW_SUFFIX, LAW_CLASS = "_law", "WithLaw"  # of the adapter of a plant with a learned law: module and class
@@ -76,29 +75,6 @@ def takes_law(recipe: Recipe) -> bool:
 
 def _law_module(recipe: Recipe) -> str:
     return recipe.module.removesuffix(SUFFIX) + LAW_SUFFIX
-
-
-@cache
-def closure(module: str) -> tuple[Path, ...]:
-    """Return the files of ``pyfmu_sources`` that ``module`` imports, directly or not, and its own, sorted."""
-    found: dict[str, Path] = {}
-    waiting = [module]
-    while waiting:
-        name = waiting.pop()
-        path = SOURCES / f"{name}.py"
-        if name in found or not path.exists():
-            continue
-        found[name] = path
-        waiting += _import_names(path)
-    return tuple(found[name] for name in sorted(found))
-
-
-def _import_names(path: Path) -> list[str]:
-    names: list[str] = []
-    for node in ast.walk(ast.parse(path.read_bytes())):
-        if isinstance(node, ast.ImportFrom) and node.level == 1:
-            names += [node.module.split(".")[0]] if node.module else [alias.name for alias in node.names]
-    return names
 
 
 def digest(parts: Iterable[bytes]) -> str:

@@ -12,10 +12,11 @@ from xml.etree import ElementTree
 
 from orchestrator.building.archive import read_archive, write_archive
 from orchestrator.building.launcher import compile_launcher, find_toolchain
-from orchestrator.building.sources import Recipe, closure, digest
+from orchestrator.building.sources import Recipe, digest
 from orchestrator.building.stamping import content_guid, final_text, stamp
 from orchestrator.building.starts import default_starts
 from orchestrator.errors import OrchestratorError
+from orchestrator.shared.equation_files import members as source_members
 
 RUNTIME = ("_version", "default_experiment", "enums", "fmi2slave", "logmsg", "variables")
 LINUX = "binaries/linux64"
@@ -45,7 +46,7 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
     """Build ``recipe`` into ``target``."""
     starts = default_starts(recipe.plain) | dict(recipe.starts)
     runtime = runtime_files()
-    sources = {path.name: path.read_bytes() for path in closure(recipe.module)}
+    sources = source_members(recipe.module)
     content = [part for name in sorted(sources) for part in (name.encode(), sources[name])]
     options = json.dumps([recipe.name, sorted(starts.items()), recipe.law]).encode()
     identity = digest([options, *runtime.values(), *content])
@@ -77,6 +78,7 @@ def _build_by_pythonfmu(
 
     (folder / package).mkdir()
     for file, content in sources.items():
+        (folder / package / file).parent.mkdir(exist_ok=True)
         (folder / package / file).write_bytes(content)
     script = folder / f"{name}_{package}.py"
     script.write_text(loaded, encoding="utf-8")

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.building.fastest import NATIVE, ensure_fastest
-from orchestrator.building.sources import closure, recipe_of
+from orchestrator.building.sources import recipe_of
 from orchestrator.errors import CalibrationError
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
@@ -30,6 +30,7 @@ from orchestrator.paired.native_loop import NativeLoop
 from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.cores import usable_cores
+from orchestrator.shared.equation_files import closure
 from orchestrator.shared.output import write_whole
 from orchestrator.shared.version import __version__
 

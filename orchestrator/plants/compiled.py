@@ -10,7 +10,6 @@ code beside them, and a changed source can never meet machine code made from an 
 import hashlib
 import importlib.util
 import inspect
-import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -19,9 +18,9 @@ from typing import Any
 
 import numba
 
-import pyfmu_sources
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.cores import cache_once
+from orchestrator.shared.equation_files import PACKAGE, closure, module_name
 from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 from orchestrator.shared.output import write_whole
 
@@ -34,17 +33,12 @@ FORMULAS = ("axis_equations", "effects", "equations")
 LISTING = ("attachment", "backlash_estimator", "dead_time", "linear_mode")
 """Modules whose functions make lists: references to those are counted, there and in modules that call them."""
 
-_PACKAGE = pyfmu_sources.__name__
-_SOURCES = Path(pyfmu_sources.__file__).parent
-
 
 @cache_once
 def compile_module(name: str) -> ModuleType:
     """Return a copy of ``pyfmu_sources.NAME`` whose functions are compiled by numba (at their first call)."""
     full_name = f"_compiled_{name}"
-    original = f"{_PACKAGE}.{name}"
-    if not (_SOURCES / f"{name}.py").exists():
-        raise ModuleNotFoundError(original)
+    original = f"{PACKAGE}.{name}"
     path = _copy_source(name)
     spec = importlib.util.spec_from_file_location(original, path)
     assert spec is not None
@@ -57,11 +51,11 @@ def compile_module(name: str) -> ModuleType:
     for attribute, value in list(vars(copy).items()):
         if not inspect.isfunction(value):
             continue
-        home = value.__module__.rpartition(".")[2]
+        home = value.__module__.removeprefix(f"{PACKAGE}.")
         if home == name:
             value.__module__ = full_name
             setattr(copy, attribute, njit_on_disk(forceinline=attribute in INLINED, **options)(value))
-        elif value.__module__.startswith(_PACKAGE + "."):
+        elif value.__module__.startswith(PACKAGE + "."):
             setattr(copy, attribute, getattr(compile_module(home), attribute))
     return copy
 
@@ -69,20 +63,20 @@ def compile_module(name: str) -> ModuleType:
 def _options(name: str) -> dict[str, Any]:
     """Return the further options with which numba compiles a module's functions."""
     formulas = ALGEBRA if name in FORMULAS else {}
-    return formulas if _closure(name) & set(LISTING) else {**formulas, **UNCOUNTED}
+    return formulas if set(_modules(name)) & set(LISTING) else {**formulas, **UNCOUNTED}
 
 
 @cache
 def _copy_source(name: str) -> Path:
     """Return the copy of a source in a folder named by a hash of it and of all that it imports."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for module in sorted(_closure(name)):
+    for module, path in _modules(name).items():
         digest.update(repr(_options(module)).encode())
-        digest.update((_SOURCES / f"{module}.py").read_bytes())
+        digest.update(path.read_bytes())
     folder = cache_directory("numba") / digest.hexdigest()[:20]
     folder.mkdir(exist_ok=True)
     target = folder / f"{name}.py"
-    source = (_SOURCES / f"{name}.py").read_bytes()
+    source = _modules(name)[name].read_bytes()
     try:
         intact = target.read_bytes() == source
     except OSError:
@@ -92,12 +86,6 @@ def _copy_source(name: str) -> Path:
     return target
 
 
-def _closure(name: str) -> set[str]:
-    found: set[str] = set()
-    waiting = {name}
-    while waiting:
-        module = waiting.pop()
-        found.add(module)
-        text = (_SOURCES / f"{module}.py").read_text(encoding="utf-8")
-        waiting |= set(re.findall(r"^from \.(\w+) import", text, re.MULTILINE)) - found
-    return found
+def _modules(name: str) -> dict[str, Path]:
+    """Return the file of a module and of each that it imports, by name, in order."""
+    return {module_name(path): path for path in closure(name)}

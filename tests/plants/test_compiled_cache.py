@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.plants import compiled as module
+from orchestrator.shared.equation_files import SOURCES, module_name
 from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
 
@@ -20,7 +21,7 @@ def test_a_damaged_source_is_not_imported(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_references_are_counted_where_a_module_makes_lists_or_calls_one_that_does() -> None:
-    listing = {path.stem for path in module._SOURCES.glob("*.py") if "list[" in path.read_text(encoding="utf-8")}
+    listing = {module_name(path) for path in SOURCES.rglob("*.py") if "list[" in path.read_text(encoding="utf-8")}
     adapters = {name for name in listing if name.endswith(("_slave", "_base", "_state"))}
     assert set(module.LISTING) == listing - adapters
     assert module._options("equations") == {**ALGEBRA, **UNCOUNTED}

@@ -70,12 +70,12 @@ class Program:
     def _global_name(self, name: str, module: str) -> str:
         taken = {function.c for function in self._functions.values()} | set(self._constants) | self._taken
         plain = f"{name.lstrip('_')}{'_pair' if self.paired else ''}"
-        return plain if plain not in taken else f"{module}_{plain}"
+        return plain if plain not in taken else _name_in(module, plain)
 
     def constant(self, source: ModuleSource, name: str, value: float | int) -> str:
         """Return the name of a constant, which is defined once."""
         plain = name.lstrip("_")
-        for candidate in (plain, f"{source.name}_{plain}"):
+        for candidate in (plain, _name_in(source.name, plain)):
             known = self._constants.get(candidate)
             if known is None and candidate not in self._taken:
                 self._constants[candidate] = value
@@ -165,7 +165,7 @@ class Program:
             if function.module != module:
                 module = function.module
                 first = docstring(self._sources[module].tree).split("\n\n")[0]
-                title = f"{module}.py: {first}"
+                title = f"{module.replace('.', '/')}.py: {first}"
                 parts.append(f"/* {'-' * 110} */\n{comment_of(title)}".rstrip())
             parts.append(function.text)
         return "\n\n".join(parts)
@@ -173,6 +173,11 @@ class Program:
     def _in_order(self) -> list[Function]:
         modules = list(dict.fromkeys(function.module for function in self._functions.values()))
         return sorted(self._functions.values(), key=lambda f: (modules.index(f.module), f.line))
+
+
+def _name_in(module: str, name: str) -> str:
+    """Return a name in C with that of its module, ``laws.friction``, in front."""
+    return f"{module.replace('.', '_')}_{name}"
 
 
 def _by_value(item: tuple[str, float | int]) -> tuple[str, float | int]:

@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 from orchestrator.building.translation.kinds import Kind, KindError, is_type, kind_of
 from orchestrator.errors import FmuError
+from orchestrator.shared.equation_files import PACKAGE, module_name, read_imports
 
 # Their classes are the runtime's business.
 NOT_TRANSLATED = ("slave_base", "sampled_slave")
@@ -70,12 +71,9 @@ class ModuleSource:
             self.refuse(place, f"{error}")
 
     def imports(self) -> Iterator[str]:
-        """Yield the full names of the modules beside this one that it imports from, base classes of slaves apart."""
-        package = self.module.__name__.rpartition(".")[0]
-        for node in self.tree.body:
-            if isinstance(node, ast.ImportFrom) and node.level == 1:
-                names = [node.module] if node.module else [alias.name for alias in node.names]
-                yield from (f"{package}.{name}" for name in names if name not in NOT_TRANSLATED)
+        """Yield the full names of the modules that it imports from, base classes of slaves apart."""
+        names = (module_name(path) for path in read_imports(Path(self.module.__file__ or "")))
+        yield from (f"{PACKAGE}.{name}" for name in names if name not in NOT_TRANSLATED)
 
     def aliases(self) -> Iterator[tuple[str, Kind]]:
         """Yield names of tuples and lists that this module gives, in order."""
@@ -103,7 +101,7 @@ def read_source(name: str) -> ModuleSource:
         raise FmuError(f"the source {name} cannot be read: {error}") from None
     functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
     remarks, whole = _remarks(content)
-    return ModuleSource(name.rpartition(".")[2], _relative_path(path), tree, module, functions, remarks, whole)
+    return ModuleSource(name.removeprefix(f"{PACKAGE}."), _relative_path(path), tree, module, functions, remarks, whole)
 
 
 def _remarks(content: bytes) -> tuple[dict[int, str], frozenset[int]]:

@@ -1,6 +1,5 @@
 """The corrected system as SSP 1.0: the original FMU untouched, effect FMUs wired around it, and their values."""
 
-import hashlib
 import subprocess
 import sys
 import tempfile
@@ -11,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-import pyfmu_sources
 from orchestrator.building.archive import write_archive
+from orchestrator.building.sources import digest
 from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
 from orchestrator.diagnosis.fmu.coupled_fmus import split_name
 from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem
@@ -32,6 +31,7 @@ from orchestrator.scenarios.ssp.common import (
     tag,
 )
 from orchestrator.scenarios.ssp.read import open_ssp
+from orchestrator.shared.equation_files import members
 from orchestrator.shared.results.any_fmu import DeliveredFound, PartFound
 from pyfmu_sources.attachment import SERIES
 
@@ -76,7 +76,7 @@ def write_corrected(path: Path, problem: FmuProblem, model: FmuModel) -> Deliver
     if parts:
         with tempfile.TemporaryDirectory() as folder:
             built = _build_effect_fmu(Path(folder)).read_bytes()
-        attachment = f"AttachedEffect_{hashlib.sha256(built).hexdigest()[:8]}.fmu"
+        attachment = f"AttachedEffect_{digest([built])[:8]}.fmu"
         members[f"resources/{attachment}"] = built
     starts: dict[str, dict[str, Value]] = {name: {} for name in system.members}
     for full, value in problem.starts(model).items():
@@ -127,17 +127,18 @@ def effect_parts(problem: FmuProblem, model: FmuModel) -> tuple[Part, ...]:
 
 
 def _build_effect_fmu(folder: Path) -> Path:
-    """Return the effect FMU, built in ``folder`` from the laws' own source, its modules named by their content."""
-    sources = Path(pyfmu_sources.__file__).parent
-    laws, slave = ((sources / f"{name}.py").read_text(encoding="utf-8") for name in ("port_laws", "attachment"))
-    digest = hashlib.sha256((laws + slave).encode()).hexdigest()[:16]
-    (folder / f"port_laws_{digest}.py").write_text(laws, encoding="utf-8")
-    script = folder / f"attachment_{digest}.py"
-    script.write_text(slave.replace("from .port_laws import", f"from port_laws_{digest} import"), encoding="utf-8")
+    """Return the effect FMU, built in ``folder`` from the laws' own source, its package named by their content."""
+    sources = members("attachment")
+    package = folder / f"effect_{digest(part for name in sources for part in (name.encode(), sources[name]))[:16]}"
+    for name, content in sources.items():
+        (package / name).parent.mkdir(parents=True, exist_ok=True)
+        (package / name).write_bytes(content)
+    script = folder / f"attachment_{package.name}.py"
+    script.write_text(f"from {package.name}.attachment import AttachedEffect\n", encoding="utf-8")
     target = folder / "built"
     target.mkdir()
     run = subprocess.run(
-        [sys.executable, "-c", BUILD, str(script), str(target), str(folder / f"port_laws_{digest}.py")],
+        [sys.executable, "-c", BUILD, str(script), str(target), str(package)],
         capture_output=True, text=True, check=False, cwd=folder,
     )  # fmt: skip
     built = sorted(target.glob("*.fmu"))
