@@ -5,9 +5,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 Cell = float | int | str | bool | None
-Numbers = Sequence[float | None]
+Numbers = Sequence[float | None] | NDArray[np.float64]
 Badge = Literal["good", "warn", "bad", "neutral"]
+Kind = Literal["line", "steps", "points", "bars"]
 Severity = Literal["error", "warning", "info"]
 
 ROW_LIMIT = 500
@@ -56,7 +60,7 @@ class ReportTable:
 
 @dataclass(frozen=True)
 class Series:
-    """One curve or cloud of a plot; ``None`` leaves a gap.
+    """One curve or cloud of a plot; ``None`` or NaN leaves a gap.
 
     Attributes:
         name: as in the legend.
@@ -68,7 +72,7 @@ class Series:
     name: str
     x: Numbers
     y: Numbers
-    kind: Literal["line", "steps", "points", "bars"] = "line"
+    kind: Kind = "line"
     low: Numbers | None = None
     high: Numbers | None = None
     labels: Sequence[str] | None = None
@@ -164,6 +168,7 @@ class Report:
         badge: the answer's colour and its word, such as ("good", "3 of 3 FMUs comply").
         sections: in the order of the page.
         origin: what was run and with what (command, version, seed, arguments).
+        angle_unit: in which angles are shown first: rad, deg, arcmin or turns.
         downloads: files to hand on with the page; small ones are embedded, others linked beside it.
     """
 
@@ -173,3 +178,4 @@ class Report:
     badge: tuple[Badge, str] | None = None
     origin: tuple[tuple[str, Cell], ...] = ()
     downloads: tuple[Path, ...] = field(default=())
+    angle_unit: str = "rad"

@@ -1,9 +1,8 @@
-"""Numbers as readers want to see them, and fewer of them where a plot needs no more."""
+"""Numbers as readers want to see them."""
 
 import math
-from collections.abc import Sequence
 
-from orchestrator.reporting.model import Cell, Series
+from orchestrator.reporting.model import Cell
 
 MISSING = "–"
 
@@ -30,36 +29,3 @@ def _float(value: float, digits: int) -> str:
         return text.rstrip("0").rstrip(".") if "." in text else text
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(exponent)}"
-
-
-def thin_series(series: Series, limit: int) -> Series:
-    """Return a series of at most about ``limit`` points that looks the same.
-
-    A curve keeps the smallest and the largest y of each of ``limit / 2`` runs of points, a cloud every n-th point.
-    """
-    count = len(series.x)
-    if count <= limit:
-        return series
-    keep = _extremes(series.y, limit // 2) if series.kind in {"line", "steps"} else range(0, count, -(-count // limit))
-    chosen = list(keep)
-    return Series(
-        series.name,
-        [series.x[i] for i in chosen],
-        [series.y[i] for i in chosen],
-        series.kind,
-        None if series.low is None else [series.low[i] for i in chosen],
-        None if series.high is None else [series.high[i] for i in chosen],
-        None if series.labels is None else [series.labels[i] for i in chosen],
-    )
-
-
-def _extremes(y: Sequence[float | None], runs: int) -> list[int]:
-    kept = {0, len(y) - 1}
-    for run in range(runs):
-        indices = range(run * len(y) // runs, (run + 1) * len(y) // runs)
-        finite = [(value, i) for i in indices if (value := y[i]) is not None]
-        if finite:
-            kept |= {min(finite)[1], max(finite)[1]}
-        elif indices:
-            kept.add(indices[0])  # a gap stays a gap
-    return sorted(kept)

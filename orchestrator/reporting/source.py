@@ -8,10 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from orchestrator.errors import ScenarioError
 from orchestrator.reporting.model import Cell, ReportTable, TableColumn
 from orchestrator.shared.results import as_plain
 
+Array = NDArray[np.float64]
 DATA_SUFFIXES = (".csv", ".json", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")
 
 UNITS = {  # of arguments
@@ -71,6 +75,21 @@ class ResultDocument:
         rows = self.rows(name)
         header = next(rows, [])
         return by_column(header, rows)
+
+    def signals(self, name: str) -> dict[str, Array]:
+        """Return a CSV file of numbers by column, NaN where one is missing; empty when there is no such file."""
+        path = self.directory / name
+        if not path.is_file():
+            return {}
+        with path.open(encoding="utf-8", newline="") as stream:
+            header = next(csv.reader(stream), [])
+            try:
+                table = np.loadtxt(stream, delimiter=",", ndmin=2, dtype=float)
+            except ValueError:  # empty cells and words, or no table at all: slowly, and with a message
+                return {n: np.array(numbers(values), dtype=float) for n, values in self.columns(name).items()}
+        if not table.size:
+            table = np.empty((0, len(header)))
+        return dict(zip(header, table.T, strict=True))
 
     def origin(self, *made: tuple[str, Cell]) -> tuple[tuple[str, Cell], ...]:
         """Return what was run and with what."""

@@ -3,9 +3,10 @@
 import base64
 import json
 
+import numpy as np
 import pytest
 
-from orchestrator.reporting import render
+from orchestrator.reporting import Facts, Plot, Report, ReportTable, Series, TableColumn, render
 from tests.support import browser as browsers
 from tests.support.report import example
 
@@ -208,3 +209,149 @@ def test_it_prints_in_light_on_white_without_buttons(opened):
         assert base64.b64decode(pdf).startswith(b"%PDF")
     finally:
         opened.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
+ROWS = 300_000
+PEAK = 123_457
+
+
+@pytest.fixture(scope="module")
+def long_page(tmp_path_factory):
+    """Two long curves over one time, the first with one row far above all others, a gap, and angles in a table."""
+    time = 1e-3 * np.arange(ROWS)
+    y = np.sin(time)
+    y[PEAK] = 5.0
+    y[200_000:220_000] = np.nan
+    plots = (
+        Plot("First", "time [s]", "angle [rad]", (Series("a", time, y), Series("b", time, 0.5 * y, "steps"))),
+        Plot("Second", "time [s]", "torque [N.m]", (Series("c", time + 1e-5 * np.sin(time), np.cos(time)),)),
+        Plot("Apart", "alpha [rad]", "error [%]", (Series("d", [0.1, 0.2], [1.0, 2.0], "points"),)),
+    )
+    table = ReportTable(
+        "Sizes", (TableColumn("half-gap", "rad"), TableColumn("as text")), ((0.02, "0.02 rad (0.01 to 0.03)"),)
+    )
+    facts = Facts("Facts", (("gap [rad]", 0.02), ("stiffness", "3300 N.m/rad")))
+    path = tmp_path_factory.mktemp("long") / "report.html"
+    summary = "The half-gap is 0.02 rad, with 95 % confidence between 0.01 and 0.03 rad."
+    path.write_text(render(Report("Long", summary, (facts, table, *plots), angle_unit="deg")))
+    return path
+
+
+@pytest.fixture
+def long_opened(driver, long_page):
+    driver.get_log("browser")
+    browsers.set_screen(driver, 1280, 900, "light")
+    browsers.open_page(driver, long_page.as_uri())
+    yield driver
+    assert driver.get_log("browser") == []
+
+
+def test_a_long_curve_is_drawn_from_few_points_and_loses_no_peak_and_no_gap(long_opened):
+    drawn = """
+    const plot = Plot.all[0], path = plot.svg.querySelector("path.curve").getAttribute("d");
+    const top = plot.y.pixel(5), pens = path.split("M").length - 1;
+    const numbers = path.match(/[-\\d.]+/g).map(Number);
+    return [path.length, pens, Math.min(...numbers.map((v) => Math.abs(v - top)))];
+    """
+    length, pens, off = long_opened.execute_script(drawn)
+    assert length < 60_000
+    assert pens == 2  # before and behind the gap
+    assert off <= 0.1
+    held = "return Plot.all[0].svg.querySelectorAll('path.curve')[1].getAttribute('d').length"
+    assert long_opened.execute_script(held) < 60_000
+
+
+def test_zoomed_far_in_every_row_is_drawn_where_it_is(long_opened):
+    script = f"""
+    const plot = Plot.all[0];
+    plot.go([{PEAK - 2}e-3, {PEAK + 2}e-3]);
+    const at = plot.svg.querySelector("path.curve").getAttribute("d").match(/[-\\d.]+/g).map(Number);
+    const places = at.filter((_, n) => n % 2 === 0);
+    return [places.length, Math.abs(at[2 * 3 + 1] - plot.y.pixel(5))];
+    """
+    rows, off = long_opened.execute_script(script)
+    assert rows == 6  # five in view and one beside, to which the line goes on
+    assert off < 0.1
+
+
+def test_plots_over_time_move_together_and_others_stay(long_opened):
+    from selenium.webdriver.common.keys import Keys
+
+    keys(long_opened, "#section-3 svg", "+", "+", Keys.SHIFT + Keys.ARROW_RIGHT)
+    ranges = "return Plot.all.map((plot) => plot.range.x)"
+    first, second, apart = long_opened.execute_script(ranges)
+    assert first == second
+    assert first[1] - first[0] == pytest.approx(0.27 * ROWS * 1e-3, rel=0.01)
+    assert apart == pytest.approx([0.096, 0.204])
+    keys(long_opened, "#section-4 svg", "0")
+    first, second, _ = long_opened.execute_script(ranges)
+    assert first[1] == pytest.approx(second[1], rel=1e-4)
+    assert first[1] > 300.0
+
+
+def test_the_cursor_of_one_plot_shows_the_values_of_the_linked_one(long_opened):
+    from selenium.webdriver.common.keys import Keys
+
+    browsers.set_screen(long_opened, 1280, 2500, "light")  # both plots in view
+    seen = "const d = arguments[0], w = () => Plot.all.every((p) => p.onScreen) ? d() : setTimeout(w, 10); w();"
+    long_opened.execute_async_script(seen)
+    keys(long_opened, "#section-3 svg", Keys.ARROW_RIGHT, Keys.PAGE_DOWN)
+    said = long_opened.execute_script("return document.querySelector('#section-3 [aria-live]').textContent")
+    assert said.startswith("time [s]: 15,")
+    tips = "return Plot.all.map((plot) => plot.tip.hidden ? '' : plot.tip.innerText)"
+    first, second, apart = long_opened.execute_script(tips)
+    assert "a:" in first
+    assert "b:" in first
+    assert second.startswith("time [s]: 15\nc:")
+    assert apart == ""
+
+
+def shown_texts(driver):
+    script = """
+    const text = (selector) => document.querySelector(selector).textContent;
+    return [text(".summary"), text("dd"), text("dt"), text("th"), text("td"), text("td:nth-child(2)"),
+      Plot.all[0].svg.textContent.includes("angle [deg]"), text("dd:last-of-type"),
+      document.querySelector("td").dataset.label, text("div:nth-child(2) > dd")];
+    """
+    return driver.execute_script(script)
+
+
+def test_angles_are_shown_in_the_log_s_unit_until_another_is_chosen(long_opened):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.support.ui import Select
+
+    summary, fact, name, head, cell, words, axis, _, tag, stiffness = shown_texts(long_opened)
+    assert summary == "The half-gap is 1.1 deg, with 95 % confidence between 0.57 and 1.7 deg."
+    assert (fact, name, cell, words) == ("1.14592", "gap [deg]", "1.146", "1.1 deg (0.57 to 1.7)")
+    assert (head.strip(), tag, axis, stiffness) == ("half-gap [deg]", "half-gap [deg]", True, "3300 N.m/rad")
+    ticks_in_degrees = ticks(long_opened, "#section-3")
+    Select(long_opened.find_element(By.ID, "units")).select_by_value("rad")
+    summary, fact, name, head, cell, words, axis, *_ = shown_texts(long_opened)
+    assert summary == "The half-gap is 0.02 rad, with 95 % confidence between 0.01 and 0.03 rad."
+    assert (fact, name, cell, words, axis) == ("0.02", "gap [rad]", "0.02", "0.02 rad (0.01 to 0.03)", False)
+    assert ticks(long_opened, "#section-3") != ticks_in_degrees
+
+
+def test_a_page_without_angles_has_no_switch(driver, tmp_path):
+    page = tmp_path / "report.html"
+    page.write_text(render(Report("None", "2 N.m.", (Plot("p", "x [s]", "y [N.m]", (Series("a", [0, 1], [0, 1]),)),))))
+    browsers.open_page(driver, page.as_uri())
+    assert not driver.execute_script("return document.getElementById('units').checkVisibility()")
+
+
+def test_a_plot_can_be_made_from_data_of_another_program(long_opened):
+    """As the workbench does: plain lists, typed arrays, and new series later."""
+    script = """
+    const figure = document.createElement("figure");
+    figure.className = "plot";
+    document.querySelector("main").append(figure);
+    const series = [{name: "a", x: [0, 1, 2], y: [1, null, 3]}];
+    const data = {title: "Own", xLabel: "time [s]", yLabel: "u [N.m]", series};
+    const plot = new Plot(figure, data), before = figure.querySelector("path.curve").getAttribute("d");
+    plot.show([{name: "b", x: new Float64Array([0, 5]), y: Float32Array.of(7, 9)}]);
+    return [before.split("M").length - 1, figure.querySelector(".legend").textContent, plot.range.x, plot.range.y];
+    """
+    pens, legend, x, y = long_opened.execute_script(script)
+    assert (pens, legend) == (2, "b")
+    assert x == pytest.approx([-0.2, 5.2])
+    assert y == pytest.approx([6.92, 9.08])

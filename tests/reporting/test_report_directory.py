@@ -105,7 +105,7 @@ def test_the_page_of_a_pair_shades_the_time_out_of_contact(tmp_path):
     position, difference = sections(report, Plot)
     assert [(s.start, s.end) for s in position.spans] == [(1.0, 3.0), (4.0, 4.0)]
     assert [s.name for s in position.series] == ["with backlash", "without", "reference"]
-    assert difference.series[0].y == [0.0, 0.5, 1.5, 2.5, 2.5]
+    assert list(difference.series[0].y) == [0.0, 0.5, 1.5, 2.5, 2.5]
 
 
 @pytest.mark.parametrize("command", ["simulate", "ssp"])

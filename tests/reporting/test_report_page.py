@@ -1,14 +1,25 @@
 """Pages as text: complete, safe, reproducible."""
 
+import base64
 import json
 import math
 import re
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
 from orchestrator.reporting import Facts, Findings, Plot, Remark, Report, ReportTable, Series, TableColumn, Text, render
-from orchestrator.reporting.numbers import in_words, thin_series
+from orchestrator.reporting.numbers import in_words
+from orchestrator.reporting.plots import (
+    CURVE_LIMIT,
+    PAGE_LIMIT,
+    pack,
+    pack_times,
+    plot_data,
+    rows_of_a_curve,
+    thin_series,
+)
 from tests.support.report import example
 
 
@@ -124,17 +135,65 @@ def test_numbers_in_words(value, digits, text):
 
 def test_a_thinned_curve_keeps_its_peaks_its_gaps_and_its_ends():
     count = 100_000
-    y = [math.sin(i / 3000.0) for i in range(count)]
-    y[54_321] = 9.0
-    y[54_400] = -9.0
-    y[70_000:80_000] = [None] * 10_000
-    thin = thin_series(Series("a", list(range(count)), y, labels=[str(i) for i in range(count)]), 1000)
+    y = np.sin(np.arange(count) / 3000.0)
+    y[54_321], y[54_400], y[70_000:80_000] = 9.0, -9.0, np.nan
+    thin = thin_series(Series("a", np.arange(count), y, labels=[str(i) for i in range(count)]), 1000)
     assert len(thin.x) <= 1002
-    assert (max(v for v in thin.y if v is not None), min(v for v in thin.y if v is not None)) == (9.0, -9.0)
-    assert None in thin.y
+    assert (np.nanmax(thin.y), np.nanmin(thin.y)) == (9.0, -9.0)
+    assert np.isnan(thin.y).any()
     assert (thin.x[0], thin.x[-1]) == (0, count - 1)
-    assert all(thin.labels[i] == str(x) for i, x in enumerate(thin.x))
+    assert all(thin.labels[i] == str(int(x)) for i, x in enumerate(thin.x))
     few = Series("c", [0, 1, 2, 3], [1.0, 2.0, 2.0, 1.0])
     assert thin_series(few, 4) is few
     cloud = thin_series(Series("b", list(range(count)), y, "points"), 1000)
-    assert 900 <= len(cloud.x) <= 1000
+    assert 3500 <= len(cloud.x) <= 4000
+
+
+def unpack(column):
+    """What the page's program makes of a column."""
+    if isinstance(column, list):
+        return np.array(column, dtype=float)
+    if "step" in column:
+        return column["start"] + column["step"] * np.arange(column["count"])
+    kind = "f4" if "f4" in column else "f8"
+    return np.frombuffer(base64.b64decode(column[kind]), f"<{kind}").astype(float) + column.get("offset", 0.0)
+
+
+@pytest.mark.parametrize("far", [0.0, 1e6, -3e9])
+def test_packed_columns_keep_seven_digits_of_their_range(far):
+    y = far + np.sin(np.arange(1000) / 30.0)
+    y[17] = np.nan
+    read = unpack(json.loads(json.dumps(pack(y))))
+    assert np.isnan(read[17])
+    assert np.nanmax(np.abs(read - y)) < 1e-7 + 2e-16 * abs(far)
+
+
+def test_small_numbers_beside_large_ones_keep_their_digits():
+    y = np.geomspace(1e-12, 1e6, 1000)
+    np.testing.assert_allclose(unpack(pack(y)), y, rtol=1e-7)
+
+
+def test_uniform_times_are_three_numbers_and_others_are_exact():
+    uniform = 5.0 + 1e-3 * np.arange(10_000)
+    assert pack_times(uniform) == {"start": 5.0, "step": pytest.approx(1e-3, rel=1e-12), "count": 10_000}
+    np.testing.assert_allclose(unpack(pack_times(uniform)), uniform, atol=1e-9)
+    jittered = uniform + 1e-5 * np.sin(np.arange(10_000))
+    np.testing.assert_array_equal(unpack(pack_times(jittered)), jittered)
+
+
+def test_curves_of_one_time_tell_it_once_and_only_plots_over_time_are_linked():
+    x = np.arange(100.0) ** 2
+    curves = (Series("a", x, x), Series("b", x, -x), Series("c", x + 1.0, x))
+    data = plot_data(Plot("p", "time [s]", "y [rad]", curves))
+    assert [set(s["x"]) for s in data["series"]] == [{"f8"}, {"of"}, {"f8"}]
+    assert data["series"][1]["x"] == {"of": 0}
+    assert (data["link"], plot_data(Plot("q", "alpha [rad]", "y", curves))["link"]) == ("time", "")
+
+
+def test_a_page_shares_its_room_between_long_curves():
+    def plots(*counts):
+        return [Plot("p", "x", "y", tuple(Series("a", range(n), range(n)) for n in counts))]
+
+    assert rows_of_a_curve(plots(1000, 1_000_000)) == CURVE_LIMIT
+    limit = rows_of_a_curve(plots(*[2_000_000] * 10, 1000))
+    assert limit == (PAGE_LIMIT - 1000) // 10

@@ -5,6 +5,8 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 MOST_VALUES = 12  # of a row of numbers that is shown as it is
 LONG = 60  # characters or values: on a line by itself
 
@@ -135,6 +137,8 @@ def outline(part: Any, depth: int = 0) -> list[str]:
     pad, short, lines = "  " * depth, [], []
     for entry in fields(part):
         content = getattr(part, entry.name)
+        if isinstance(content, np.ndarray):
+            content = [None if np.isnan(value) else value for value in content.tolist()]
         if entry.default == content and type(entry.default) is type(content):
             continue
         items = [content] if is_dataclass(content) else content

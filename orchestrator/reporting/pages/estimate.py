@@ -180,27 +180,27 @@ def _profile(source: ResultDocument, limit: float) -> list[Section]:
 
 
 def _online(source: ResultDocument) -> list[Section]:
-    table = source.columns("online.csv")
+    table = source.signals("online.csv")
     if not {"time", "alpha", "low", "high"} <= set(table):
         return []
-    time = numbers(table["time"])
+    time = table["time"]
     names = {"alpha": "estimate", "low": "lower end (95 %)", "high": "upper end (95 %)"}
-    curves = tuple(Series(label, time, numbers(table[name])) for name, label in names.items())
+    curves = tuple(Series(label, time, table[name]) for name, label in names.items())
     return [Plot("Online estimate", "time [s]", "half-gap [rad]", curves, log_y=True)]
 
 
 def _flanks(source: ResultDocument) -> list[Section]:
     """Return the load's distance from mid-gap, as two encoders without a torque show it."""
-    table = source.columns("flanks.csv")
+    table = source.signals("flanks.csv")
     if not {"time", "twist", "flank"} <= set(table):
         return []
-    rows = list(zip(*(numbers(table[name]) for name in ("time", "twist", "flank")), strict=True))
-    rows = rows[:: max(1, len(rows) // FLANK_POINTS)]
+    every = slice(None, None, max(1, table["time"].size // FLANK_POINTS))
+    time, twist, flank = (table[name][every] for name in ("time", "twist", "flank"))
     sides = ((-1.0, "lower flank"), (0.0, "between"), (1.0, "upper flank"))
     series = tuple(
-        Series(label, [r[0] for r in rows if r[2] == side], [r[1] for r in rows if r[2] == side], "points")
+        Series(label, time[flank == side], twist[flank == side], "points")
         for side, label in sides
-        if any(r[2] == side for r in rows)
+        if np.any(flank == side)
     )
     note = (
         "The motor's angle over the ratio, less the load's, at the same moment: plus or minus the half-gap at a flank."
@@ -209,12 +209,11 @@ def _flanks(source: ResultDocument) -> list[Section]:
 
 
 def _errors(source: ResultDocument) -> list[Section]:
-    table = source.columns("estimate.csv")
+    table = source.signals("estimate.csv")
     found = [name for name in ERRORS if name in table]
     if not found:
         return []
-    time = numbers(table["time"])
-    curves = tuple(Series(ERRORS[name], time, numbers(table[name])) for name in found)
+    curves = tuple(Series(ERRORS[name], table["time"], table[name]) for name in found)
     note = "Measured minus predicted one sample ahead: noise when the model is right."
     return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)]
 
@@ -238,10 +237,10 @@ def _design(source: ResultDocument, candidates: Sequence[ExcitationFound]) -> li
     )
     rows = tuple((c.name, c.bound, c.peak_torque, c.peak_motor_speed) for c in candidates)
     note = "Best first: the smallest standard error of the half-gap that any estimator can have."
-    table = source.columns("design.csv")
+    table = source.signals("design.csv")
     made: list[Section] = [ReportTable("Proposed excitations", columns, rows, note)]
     if {"time", "u"} <= set(table):
-        torque = Series("requested torque", numbers(table["time"]), numbers(table["u"]), "steps")
+        torque = Series("requested torque", table["time"], table["u"], "steps")
         made.append(Plot("The best excitation", "time [s]", "u [N.m]", (torque,)))
     return made
 

@@ -2,8 +2,11 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from orchestrator.reporting.model import Cell, Plot, Section, Series, Span
-from orchestrator.reporting.source import ResultDocument, numbers
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.reporting.model import Kind, Plot, Section, Series, Span
+from orchestrator.reporting.source import ResultDocument
 
 SIGNALS = {
     "theta_m": ("Motor angle", "rad"),
@@ -17,9 +20,10 @@ SIGNALS = {
 # The same of an axis that moves in metres.
 METRIC = {"rad": "m", "rad/s": "m/s", "N.m": "N", "angle": "position", "torque": "force", "Twist": "Stretch"}
 GIVEN = {"u": "requested"}  # what is not measured
+HELD = frozenset({"u"})  # from sample to sample
 MOST_SPANS = 1000
-Table = Mapping[str, list[Cell]]
-Numbers = Sequence[float | None]
+Array = NDArray[np.float64]
+Table = Mapping[str, Array]
 
 
 def metric_words(text: str, metric: bool) -> str:
@@ -35,25 +39,27 @@ def record_plots(
     For each signal with simulated columns a plot of simulated minus measured comes first. Empty where there is no
     such file, or no column ``time``. ``metric``: the axis moves in metres.
     """
-    table = source.columns(name)
-    return list(_plots(table, restarts, metric)) if "time" in table else []
+    table = source.signals(name)
+    return list(signal_plots(table, restarts, metric)) if "time" in table else []
 
 
-def _plots(table: Table, restarts: Sequence[int], metric: bool) -> Iterator[Plot]:
-    time = numbers(table["time"])
-    moments = tuple(Span(t, t, "free run starts anew") for t in (time[row] for row in restarts) if t is not None)
-    spans = out_of_contact(time, numbers(table["contact"])) if "contact" in table else ()
+def signal_plots(table: Table, restarts: Sequence[int] = (), metric: bool = False) -> Iterator[Plot]:
+    """Yield the plots of a table; see ``record_plots``."""
+    time = table["time"]
+    moments = tuple(Span(float(t), float(t), "free run starts anew") for t in time[list(restarts)] if np.isfinite(t))
+    spans = out_of_contact(time, table["contact"]) if "contact" in table else ()
     note = "Shaded: the teeth are not in contact." if spans else ""
     for signal, shown in SIGNALS.items():
         title, unit = (metric_words(text, metric) for text in shown)
-        simulated = {_words(c, signal): numbers(v) for c, v in table.items() if c.startswith(f"{signal}_")}
-        measured = numbers(table[signal]) if signal in table else None
+        simulated = {_words(c, signal): v for c, v in table.items() if c.startswith(f"{signal}_")}
+        measured = table.get(signal)
         found = ({GIVEN.get(signal, "measured"): measured} if measured is not None else {}) | simulated
         if measured is not None and simulated:
-            gaps = tuple(Series(name, time, _difference(values, measured)) for name, values in simulated.items())
+            gaps = tuple(Series(name, time, values - measured) for name, values in simulated.items())
             yield Plot(f"{title}: simulated minus measured", "time [s]", f"difference [{unit}]", gaps, moments)
         if found:
-            curves = tuple(Series(name, time, values) for name, values in found.items())
+            kind: Kind = "steps" if signal in HELD else "line"
+            curves = tuple(Series(name, time, values, kind) for name, values in found.items())
             yield Plot(
                 title, "time [s]", f"{signal} [{unit}]", curves, (*spans, *(moments if simulated else ())), note=note
             )
@@ -63,29 +69,21 @@ def _words(column: str, signal: str) -> str:
     return column.removeprefix(f"{signal}_").replace("_", " ")
 
 
-def _difference(values: Numbers, measured: Numbers) -> list[float | None]:
-    return [None if a is None or b is None else a - b for a, b in zip(values, measured, strict=True)]
-
-
-def out_of_contact(time: Sequence[float | None], contact: Sequence[float | None]) -> tuple[Span, ...]:
+def out_of_contact(time: Array, contact: Array) -> tuple[Span, ...]:
     """Return the spans of time in which ``contact`` is zero: the teeth do not touch. At most ``MOST_SPANS``.
 
     Args:
-        time: (n,) [s]; None: unknown.
+        time: (n,) [s]; NaN: unknown.
         contact: (n,) flank of each sample, 0 inside the gap.
 
     Returns:
         Begin and end of each span [s].
     """
-    spans, start = [], None
-    for t, c in zip(time, contact, strict=True):
-        if t is None:
-            continue
-        if c == 0.0 and start is None:
-            start = t
-        elif c != 0.0 and start is not None:
-            spans.append(Span(start, t, "not in contact"))
-            start = None
-    if start is not None and time[-1] is not None:
-        spans.append(Span(start, time[-1], "not in contact"))
+    known = np.isfinite(time)
+    time, free = time[known], contact[known] == 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(np.int8)))
+    spans = [
+        Span(float(time[first]), float(time[min(last, time.size - 1)]), "not in contact")
+        for first, last in zip(edges[::2], edges[1::2], strict=True)
+    ]
     return tuple(spans[:MOST_SPANS])

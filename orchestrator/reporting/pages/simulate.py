@@ -3,20 +3,22 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from orchestrator.reporting.model import Cell, Facts, Plot, Report, Section, Series, Span
 from orchestrator.reporting.pages import generic
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.record import out_of_contact
-from orchestrator.reporting.source import ResultDocument, numbers
+from orchestrator.reporting.source import Array, ResultDocument
 from orchestrator.shared.results import PairFound, SignalsFound, as_plain, read
 
 SIGNALS_PER_PLOT = 6
-Columns = Mapping[str, list[Cell]]
+Columns = Mapping[str, Array]
 
 
 def build(source: ResultDocument) -> Report:
     """Return the page."""
-    table = source.columns(f"{source.command}.csv")
+    table = source.signals(f"{source.command}.csv")
     results = source.results
     file = Path(str((source.document.get("arguments") or {}).get("file") or results.get("file") or "")).name
     if not table:
@@ -34,7 +36,7 @@ def build(source: ResultDocument) -> Report:
 def _what_ran(file: str, results: SignalsFound, table: Columns) -> str:
     """Return which components of a file ran, for how long and in which steps."""
     components = dict.fromkeys(s.signal.split(".")[0] for s in results.signals if "." in s.signal)
-    end = max((t for t in numbers(table["time"]) if t is not None), default=0.0)
+    end = float(np.nanmax(table["time"], initial=0.0))
     step = f" of {end / results.steps:.6g} s" if results.steps else ""
     named = f", with signals of {', '.join(components)}" if components else ""
     return f"The system in {file} was run from 0 to {end:g} s in steps{step}{named}."
@@ -64,8 +66,8 @@ def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[l
         facts += [(f"estimate: {name} [rad]", getattr(estimate, name)) for name in ("alpha", "lower", "upper")]
     else:
         summary = f"Two loops, one with a half-gap of {alpha:g} rad. No estimate: {results.no_estimate}."
-    time = numbers(table["time"])
-    spans = out_of_contact(time, numbers(table["contact"])) if "contact" in table else ()
+    time = table["time"]
+    spans = out_of_contact(time, table["contact"]) if "contact" in table else ()
     gap = "Shaded: the teeth of the loop with backlash are not in contact."
     plots: list[Section] = []
     for title, label, names in (
@@ -78,7 +80,7 @@ def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[l
         ("Requested torque", "torque [N.m]", {"u": "with backlash", "twin_u": "without"}),
         ("Shaft torque", "torque [N.m]", {"T_shaft": "with backlash", "twin_T_shaft": "without"}),
     ):
-        series = tuple(Series(words, time, numbers(table[name])) for name, words in names.items() if name in table)
+        series = tuple(Series(words, time, table[name]) for name, words in names.items() if name in table)
         if series:
             plots.append(Plot(title, "time [s]", label, series, spans, note=gap if spans else ""))
     if {"theta_l_hat", "twin_theta_l_hat"} <= set(table):
@@ -87,16 +89,15 @@ def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[l
     return [Facts("Overview", tuple(facts)), *plots, *experiment], summary
 
 
-def _difference(time: list[float | None], table: Columns, spans: tuple[Span, ...]) -> Plot:
-    pairs = zip(numbers(table["theta_l_hat"]), numbers(table["twin_theta_l_hat"]), strict=True)
-    difference = [None if a is None or b is None else a - b for a, b in pairs]
+def _difference(time: Array, table: Columns, spans: tuple[Span, ...]) -> Plot:
+    difference = table["theta_l_hat"] - table["twin_theta_l_hat"]
     series = Series("estimated load angles, with minus without", time, difference)
     note = "S is the sum of the absolute values of this curve."
     return Plot("Difference of the loops", "time [s]", "difference [rad]", (series,), spans, note=note)
 
 
 def _scenario(results: SignalsFound, table: Columns) -> tuple[list[Section], str]:
-    time = numbers(table["time"])
+    time = table["time"]
     by_unit: dict[str, list[str]] = {}
     for signal in results.signals:
         if signal.signal in table:
@@ -105,7 +106,7 @@ def _scenario(results: SignalsFound, table: Columns) -> tuple[list[Section], str
     for unit, names in by_unit.items():
         for start in range(0, len(names), SIGNALS_PER_PLOT):
             part = names[start : start + SIGNALS_PER_PLOT]
-            series = tuple(Series(name, time, numbers(table[name])) for name in part)
+            series = tuple(Series(name, time, table[name]) for name in part)
             which = f", part {start // SIGNALS_PER_PLOT + 1}" if len(names) > SIGNALS_PER_PLOT else ""
             title = f"Signals in {unit}{which}" if unit != "1" else f"Signals without unit{which}"
             plots.append(Plot(title, "time [s]", f"value [{unit}]", series))

@@ -85,3 +85,4 @@ themeButton(document.getElementById("theme"));
 document.querySelectorAll("table.sortable").forEach(sortable);
 document.querySelectorAll("table.sortable").forEach(fitted);
 document.querySelectorAll("figure.plot").forEach((figure) => new Plot(figure));
+unitSwitch(document.getElementById("units"));

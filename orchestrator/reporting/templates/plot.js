@@ -1,44 +1,79 @@
 // Width of a digit of a tick, in pixels.
 const DIGIT = 7;
 
-// A plot in its figure: drawn as SVG, with a cursor that reads values, and zoom by mouse, buttons and keys.
+// A plot in its figure: drawn as SVG, with a cursor that reads values, and moved by mouse, buttons and keys.
+// Its data, see "Data of a plot" in docs/reports.md, are given, or stand as JSON in the figure.
 class Plot {
+  static all = [];
   static count = 0;
 
-  constructor(figure) {
+  constructor(figure, data = JSON.parse(figure.querySelector("script").textContent)) {
     this.figure = figure;
-    this.data = JSON.parse(figure.querySelector("script").textContent);
+    this.data = { spans: [], categories: [], ...data };
+    this.read(this.data.series);
     this.id = `plot-${Plot.count++}`;
     this.hidden = new Set();
     this.cursor = null;
+    this.onScreen = true;
     this.build();
-    this.reset();
+    this.reset(false);
+    Plot.all.push(this);
     new ResizeObserver(() => this.draw()).observe(this.svg);
+    new IntersectionObserver((entries) => this.entered(entries.at(-1).isIntersecting)).observe(this.figure);
+    Units.listeners.push(() => this.draw());
+  }
+
+  // Columns of the series as numbers.
+  read(series) {
+    const earlier = [];
+    this.data.series = series.map((given) => {
+      const x = decodeColumn(given.x, earlier);
+      earlier.push(x);
+      const curve = ["line", "steps"].includes(given.kind ?? "line");
+      return { ...given, x, y: decodeColumn(given.y), low: decodeColumn(given.low), high: decodeColumn(given.high), ascending: curve && isAscending(x) };
+    });
+  }
+
+  // Show other series, with everything in view unless the reader has zoomed.
+  show(series) {
+    this.read(series);
+    this.cursor = null;
+    this.hidden.clear();
+    this.legend.replaceWith(this.makeLegend());
+    if (this.range === this.home) this.reset(false);
+    else this.draw();
   }
 
   build() {
-    const tools = element("div", { class: "tools" });
-    const legend = element("div", { class: "legend" });
-    this.data.series.forEach((series, n) => legend.append(this.legendButton(series, n)));
-    for (const [name, span] of new Map(this.data.spans.map((span) => [span.name, span]))) {
-      legend.append(element("span", {}, swatch(span.start === span.end ? "var(--soft)" : "var(--span)"), name));
-    }
-    if (this.data.diagonal) legend.append(element("span", {}, swatch("var(--soft)"), "equal"));
-    tools.append(legend, element("div", { class: "buttons" },
+    this.makeLegend();
+    const buttons = element("div", { class: "buttons" },
       this.button("+", "Zoom in", () => this.zoom(0.5)),
       this.button("−", "Zoom out", () => this.zoom(2)),
-      this.button("Reset", "Show everything", () => this.reset())));
+      this.button("◀", "Move left", () => this.move(-0.25)),
+      this.button("▶", "Move right", () => this.move(0.25)),
+      this.button("Reset", "Show everything", () => this.reset()));
     this.svg = shape("svg", { tabindex: 0, role: "img", "aria-label": this.description() });
     this.tip = element("div", { class: "tip", hidden: "" });
     this.spoken = element("div", { class: "quiet", "aria-live": "polite" });
-    this.figure.append(tools, this.svg, this.tip, this.spoken);
+    this.figure.append(element("div", { class: "tools" }, this.legend, buttons), this.svg, this.tip, this.spoken);
     this.listen();
+  }
+
+  makeLegend() {
+    this.legend = element("div", { class: "legend" });
+    this.data.series.forEach((series, n) => this.legend.append(this.legendButton(series, n)));
+    for (const [name, span] of new Map(this.data.spans.map((span) => [span.name, span]))) {
+      this.legend.append(element("span", {}, swatch(span.start === span.end ? "var(--soft)" : "var(--span)"), name));
+    }
+    if (this.data.diagonal) this.legend.append(element("span", {}, swatch("var(--soft)"), "equal"));
+    return this.legend;
   }
 
   description() {
     const names = this.data.series.map((series) => series.name).join(", ");
     return `${this.data.title}: ${this.data.yLabel} against ${this.data.xLabel}; ${names}. ` +
-      "Left and right arrows read the points, up and down choose the series, plus and minus zoom, zero resets.";
+      "Left and right arrows read the points, page up and down go further, up and down choose the series, " +
+      "shift and left or right move the view, plus and minus zoom, zero resets.";
   }
 
   button(text, label, action) {
@@ -62,41 +97,84 @@ class Plot {
     return this.data.series.map((series, n) => ({ series, n })).filter(({ n }) => !this.hidden.has(n));
   }
 
-  reset() {
+  isAngular() {
+    return [this.data.xLabel, this.data.yLabel].some((label) => ANGULAR.test(Units.ofLabel(label)));
+  }
+
+  // Plots that move with this one along x.
+  linked() {
+    return this.data.link ? Plot.all.filter((plot) => plot !== this && plot.data.link === this.data.link) : [];
+  }
+
+  // Where the view goes -------------------------------------------------------------------------------------------
+
+  reset(withOthers = true) {
     const { series, spans, diagonal, logX, logY, categories } = this.data;
     const flat = series.some((s) => s.kind === "bars") ? [[0]] : [];
     const edges = spans.map((span) => [span.start, span.end]);
     const names = categories.length ? [[-0.5, categories.length - 0.5]] : [];
-    let x = extent([...series.map((s) => s.x), ...edges, ...names], logX);
+    let x = extent([...series.map((s) => (s.ascending && !logX ? [s.x[0], s.x.at(-1)] : s.x)), ...edges, ...names], logX);
     let y = extent([...series.flatMap((s) => [s.y, s.low ?? [], s.high ?? []]), ...flat], logY);
     if (diagonal) x = y = [Math.min(x[0], y[0]), Math.max(x[1], y[1])];
     this.range = { x, y };
     this.home = this.range;
     this.draw();
+    if (withOthers) this.linked().forEach((plot) => plot.follow(plot.home.x));
   }
 
-  zoom(factor) {
-    const point = this.cursor && this.pointAt(this.cursor);
+  // Show a range; the linked plots follow along x.
+  go(x, y = this.range.y, now = true) {
+    this.range = { x, y };
+    if (now) this.draw();
+    else this.drawSoon();
+    this.linked().forEach((plot) => plot.follow(x));
+  }
+
+  follow(x) {
+    this.range = x === this.home.x ? this.home : { x, y: this.range.y };
+    this.drawSoon();
+  }
+
+  zoom(factor, centre = this.cursor && this.pointAt(this.cursor)) {
     const middle = (scale) => scale.value((scale.from + scale.to) / 2);
-    this.range = {
-      x: this.x.zoomed(factor, point ? point.x : middle(this.x)),
-      y: this.y.zoomed(factor, point ? point.y : middle(this.y)),
-    };
-    this.draw();
+    const x = this.x.zoomed(factor, centre ? centre.x : middle(this.x));
+    // What is linked along time is zoomed along time; its height stays.
+    this.go(x, this.data.link ? this.range.y : this.y.zoomed(factor, centre ? centre.y : middle(this.y)));
+  }
+
+  move(part) {
+    this.go(this.x.moved(part));
+  }
+
+  // Drawing -------------------------------------------------------------------------------------------------------
+
+  entered(onScreen) {
+    this.onScreen = onScreen;
+    if (onScreen && this.stale) this.draw();
+  }
+
+  // Draw with the next picture, or once the plot comes into view.
+  drawSoon() {
+    if (this.stale) return;
+    this.stale = true;
+    if (this.onScreen) requestAnimationFrame(() => this.stale && this.draw());
   }
 
   draw() {
+    this.stale = false;
     const width = this.svg.clientWidth || 640;
     const height = Math.round(Math.min(420, Math.max(260, width * 0.5)));
+    const [ux, uy] = [this.data.xLabel, this.data.yLabel].map((label) => Units.shown(Units.ofLabel(label)).factor);
     this.slanted = this.data.categories.some((name) => name.length * 7.5 * this.data.categories.length > width - 66);
-    this.y = new Scale(...this.range.y, height - (this.slanted ? 118 : 44), 10, this.data.logY);
+    this.y = new Scale(...this.range.y, height - (this.slanted ? 118 : 44), 10, this.data.logY, uy);
     const longest = Math.max(0, ...this.y.ticks(6).map(({ text }) => text.length));
     const left = Math.max(66, 30 + DIGIT * longest);  // the axis's name stands left of its ticks
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.svg.style.height = `${height}px`;
-    this.x = new Scale(...this.range.x, left, width - 10, this.data.logX);
+    this.x = new Scale(...this.range.x, left, width - 10, this.data.logX, ux);
+    const marks = new Marks(this);
     const inside = shape("g", { "clip-path": `url(#${this.id}-clip)` });
-    inside.append(...this.spans(), ...this.visible().flatMap(({ series, n }) => this.marks(series, colour(n))));
+    inside.append(...this.spans(), ...this.visible().flatMap(({ series, n }) => marks.of(series, colour(n))));
     if (this.data.diagonal) inside.append(this.diagonal());
     const clip = shape("clipPath", { id: `${this.id}-clip` });
     clip.append(this.box({}));
@@ -121,9 +199,9 @@ class Plot {
       const at = y.pixel(value);
       made.push(line(x.from, at, x.to, at, "grid"), label(x.from - 7, at + 4, text, "end"));
     }
-    const up = label(0, 0, this.data.yLabel, "middle");
+    const up = label(0, 0, Units.label(this.data.yLabel), "middle");
     up.setAttribute("transform", `translate(13 ${(y.from + y.to) / 2}) rotate(-90)`);
-    made.push(label((x.from + x.to) / 2, height - 6, this.data.xLabel, "middle"), up);
+    made.push(label((x.from + x.to) / 2, height - 6, Units.label(this.data.xLabel), "middle"), up);
     return made;
   }
 
@@ -142,7 +220,8 @@ class Plot {
   }
 
   spans() {
-    return this.data.spans.map((span) => {
+    const seen = this.data.spans.filter(({ start, end }) => end >= this.x.low && start <= this.x.high);
+    return seen.map((span) => {
       const [a, b] = [this.x.pixel(span.start), this.x.pixel(span.end)];
       if (a === b) return line(a, this.y.from, a, this.y.to, "moment");
       return shape("rect", { class: "span", x: a, y: this.y.to, width: Math.max(b - a, 0.5), height: this.y.from - this.y.to });
@@ -156,62 +235,7 @@ class Plot {
     return line(this.x.pixel(low), this.y.pixel(low), this.x.pixel(high), this.y.pixel(high), "diagonal");
   }
 
-  marks(series, stroke) {
-    const made = [];
-    if (series.low) made.push(shape("path", { d: this.whiskers(series), stroke, "stroke-width": 1, fill: "none" }));
-    if (series.kind === "points") made.push(shape("path", { d: this.dots(series), fill: stroke }));
-    else if (series.kind === "bars") made.push(shape("path", { d: this.bars(series), fill: stroke, "fill-opacity": 0.75 }));
-    else made.push(shape("path", { d: this.curve(series), stroke, class: "curve" }));
-    return made;
-  }
-
-  at(series, n) {
-    const [x, y] = [series.x[n], series.y[n]];
-    if (x === null || y === null) return null;
-    if ((this.data.logX && x <= 0) || (this.data.logY && y <= 0)) return null;
-    return [this.x.pixel(x).toFixed(1), this.y.pixel(y).toFixed(1)];
-  }
-
-  curve(series) {
-    let path = "";
-    let pen = false;
-    for (let n = 0; n < series.x.length; n++) {
-      const place = this.at(series, n);
-      if (!place) {
-        pen = false;
-      } else {
-        if (pen && series.kind === "steps") path += `H${place[0]}`;
-        path += `${pen ? "L" : "M"}${place[0]} ${place[1]}`;
-        pen = true;
-      }
-    }
-    return path;
-  }
-
-  dots(series) {
-    const places = series.x.map((_, n) => this.at(series, n)).filter(Boolean);
-    const radius = places.length > 400 ? 2 : 3.5;
-    return places.map(([x, y]) => `M${x - radius} ${y}a${radius} ${radius} 0 1 0 ${2 * radius} 0a${radius} ${radius} 0 1 0 ${-2 * radius} 0`).join("");
-  }
-
-  bars(series) {
-    const count = series.x.length;
-    const half = Math.max(1, Math.min(24, ((this.x.to - this.x.from) / Math.max(count, 1)) * 0.35));
-    const floor = this.y.pixel(this.data.logY ? this.y.low : 0);
-    return series.x.map((_, n) => this.at(series, n)).filter(Boolean)
-      .map(([x, y]) => `M${x - half} ${floor}V${y}h${2 * half}V${floor}Z`).join("");
-  }
-
-  whiskers(series) {
-    let path = "";
-    for (let n = 0; n < series.x.length; n++) {
-      const [x, end, high] = [series.x[n], series.low[n], series.high[n]];
-      if (x === null || end === null || high === null || (this.data.logY && high <= 0)) continue;
-      const low = this.data.logY && end <= 0 ? this.y.low : end; // a logarithmic axis has no zero to reach down to
-      path += `M${this.x.pixel(x).toFixed(1)} ${this.y.pixel(low).toFixed(1)}V${this.y.pixel(high).toFixed(1)}`;
-    }
-    return path;
-  }
+  // What the reader does ------------------------------------------------------------------------------------------
 
   listen() {
     this.svg.addEventListener("pointermove", (event) => this.moved(event));
@@ -221,6 +245,7 @@ class Plot {
     this.svg.addEventListener("pointerleave", () => this.leave());
     this.svg.addEventListener("blur", () => this.leave());
     this.svg.addEventListener("dblclick", () => this.reset());
+    this.svg.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     this.svg.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -232,30 +257,32 @@ class Plot {
 
   moved(event) {
     const [px, py] = this.place(event);
-    if (this.start) this.stretch(px, py);
+    if (this.held) this.go(this.held.moved((this.heldAt - px) / (this.x.to - this.x.from)), this.range.y, false);
+    else if (this.start) this.stretch(px, py);
     else this.seek(px, py);
   }
 
   pressed(event) {
     this.seek(...this.place(event));
     if (event.pointerType === "touch" || event.button !== 0) return;
-    this.start = this.place(event);
+    if (event.shiftKey) [this.held, [this.heldAt]] = [this.x, this.place(event)];
+    else this.start = this.place(event);
     this.svg.setPointerCapture(event.pointerId);
   }
 
   released(event) {
-    if (!this.start) return;
+    if (!this.start) return this.drop();
     const [[ax, ay], [bx, by]] = [this.start, this.place(event)];
     this.drop();
     const between = (scale, a, b) => [scale.value(a), scale.value(b)].sort((m, n) => m - n);
     if (Math.abs(bx - ax) < 8) return;
     const tall = Math.abs(by - ay) > 24;
-    this.range = { x: between(this.x, ax, bx), y: tall ? between(this.y, ay, by) : this.range.y };
-    this.draw();
+    this.go(between(this.x, ax, bx), tall ? between(this.y, ay, by) : this.range.y);
   }
 
   drop() {
     this.start = null;
+    this.held = null;
     this.selection?.remove();
   }
 
@@ -271,32 +298,26 @@ class Plot {
     this.overlay.append(this.selection);
   }
 
-  leave() {
-    this.cursor = null;
-    this.showCursor(false);
+  // With ctrl, as pinching a touchpad sends it, zoom about the pointer; sideways, move. Else the page scrolls.
+  wheel(event) {
+    if (!event.ctrlKey && Math.abs(event.deltaX) <= Math.abs(event.deltaY)) return;
+    event.preventDefault();
+    const [px, py] = this.place(event);
+    if (event.ctrlKey) this.zoom(1.003 ** event.deltaY, { x: this.x.value(px), y: this.y.value(py) });
+    else this.go(this.x.moved(event.deltaX / (this.x.to - this.x.from)), this.range.y, false);
   }
 
-  // Nearest point of a curve along x, of a cloud in the plane.
-  seek(px, py) {
-    let best = null;
-    for (const { series, n } of this.visible()) {
-      const flat = series.kind !== "points";
-      for (let m = 0; m < series.x.length; m++) {
-        if (series.x[m] === null || series.y[m] === null) continue;
-        if (!this.x.holds(series.x[m]) || (!flat && !this.y.holds(series.y[m]))) continue;
-        const dx = this.x.pixel(series.x[m]) - px;
-        const dy = this.y.pixel(series.y[m]) - py;
-        const distance = dx * dx + dy * dy * (flat ? 0.05 : 1);
-        if (!best || distance < best.distance) best = { n, m, distance };
-      }
-    }
-    this.cursor = best;
-    this.showCursor(false);
+  leave() {
+    if (!this.cursor) return;
+    [this, ...this.linked()].forEach((plot) => plot.point(null));
   }
 
   key(event) {
+    const far = Math.max(1, Math.round(this.rowsInView() / 20));
     const actions = {
-      ArrowLeft: () => this.step(-1), ArrowRight: () => this.step(1),
+      ArrowLeft: () => (event.shiftKey ? this.move(-0.1) : this.step(-1)),
+      ArrowRight: () => (event.shiftKey ? this.move(0.1) : this.step(1)),
+      PageUp: () => this.step(-far), PageDown: () => this.step(far),
       ArrowUp: () => this.change(-1), ArrowDown: () => this.change(1),
       "+": () => this.zoom(0.5), "=": () => this.zoom(0.5), "-": () => this.zoom(2), 0: () => this.reset(), Escape: () => this.reset(),
     };
@@ -306,13 +327,56 @@ class Plot {
     action();
   }
 
+  // The cursor ----------------------------------------------------------------------------------------------------
+
+  // Nearest point of a curve along x, of a cloud in the plane.
+  seek(px, py) {
+    let best = null;
+    for (const { series, n } of this.visible()) {
+      const flat = series.kind !== "points";
+      const found = series.ascending ? [nearest(series, this.x.value(px))] : series.x.keys();
+      for (const m of found) {
+        if (m < 0 || Number.isNaN(series.x[m] + series.y[m])) continue;
+        if (!this.x.holds(series.x[m]) || (!flat && !this.y.holds(series.y[m]))) continue;
+        const dx = this.x.pixel(series.x[m]) - px;
+        const dy = this.y.pixel(series.y[m]) - py;
+        const distance = dx * dx + dy * dy * (flat ? 0.05 : 1);
+        if (!best || distance < best.distance) best = { n, m, distance };
+      }
+    }
+    this.point(best);
+    this.tell();
+  }
+
+  point(cursor, speak = false) {
+    this.cursor = cursor;
+    this.showCursor(speak);
+  }
+
+  // Let the linked plots that are on the screen point to the same x.
+  tell() {
+    if (!this.cursor) return;
+    const { x } = this.pointAt(this.cursor);
+    for (const plot of this.linked().filter(({ onScreen }) => onScreen)) {
+      const first = plot.visible().find(({ series }) => series.ascending);
+      plot.point(first ? { n: first.n, m: nearest(first.series, x) } : null);
+    }
+  }
+
+  rowsInView() {
+    const { series } = this.visible().find(({ n }) => n === (this.cursor?.n ?? n)) ?? {};
+    if (!series) return 0;
+    if (!series.ascending) return series.x.length;
+    return firstAtLeast(series.x, this.x.high) - firstAtLeast(series.x, this.x.low);
+  }
+
   step(by) {
     const shown = this.visible();
     if (!shown.length) return;
-    this.cursor ??= { n: shown[0].n, m: by > 0 ? -1 : 0 };
-    const { length } = this.data.series[this.cursor.n].x;
-    this.cursor = { n: this.cursor.n, m: (this.cursor.m + by + length) % length };
-    this.showCursor(true);
+    const { n, m } = this.cursor ?? { n: shown[0].n, m: by > 0 ? -1 : 0 };
+    const { length } = this.data.series[n].x;
+    this.point({ n, m: (((m + by) % length) + length) % length }, true);
+    this.tell();
   }
 
   change(by) {
@@ -320,8 +384,8 @@ class Plot {
     if (!shown.length) return;
     const now = Math.max(0, shown.findIndex(({ n }) => n === this.cursor?.n));
     const { n, series } = shown[(now + by + shown.length) % shown.length];
-    this.cursor = { n, m: Math.min(this.cursor?.m ?? 0, series.x.length - 1) };
-    this.showCursor(true);
+    this.point({ n, m: Math.min(this.cursor?.m ?? 0, series.x.length - 1) }, true);
+    this.tell();
   }
 
   pointAt({ n, m }) {
@@ -337,7 +401,7 @@ class Plot {
     const words = this.words();
     this.tip.replaceChildren(...words.map((text) => element("div", {}, text)));
     if (speak) this.spoken.textContent = words.join(", ");
-    if (x === null || y === null || !this.x.holds(x)) return;
+    if (Number.isNaN(x + y) || !this.x.holds(x)) return;
     const [px, py] = [this.x.pixel(x), this.y.pixel(y)];
     this.overlay.prepend(line(px, this.y.from, px, this.y.to, "cursor"),
       shape("circle", { cx: px, cy: py, r: 5, fill: "none", stroke: colour(this.cursor.n), "stroke-width": 2 }));
@@ -351,22 +415,33 @@ class Plot {
   words() {
     const { n, m } = this.cursor;
     const main = this.data.series[n];
-    const said = [this.data.categories[main.x[m]] ?? `${this.data.xLabel}: ${number(main.x[m])}`];
+    const inX = (value) => number(value * this.x.factor);
+    const inY = (value) => number(value * this.y.factor);
+    const said = [this.data.categories[main.x[m]] ?? `${Units.label(this.data.xLabel)}: ${inX(main.x[m])}`];
     for (const { series, n: other } of this.visible()) {
-      const at = other === n ? m : series.kind === "points" ? -1 : nearest(series.x, main.x[m]);
+      const at = other === n ? m : series.kind === "points" ? -1 : nearest(series, main.x[m]);
       if (at < 0) continue;
-      const interval = series.low ? ` (${number(series.low[at])} to ${number(series.high[at])})` : "";
-      said.push(`${series.name}: ${number(series.y[at])}${interval}`);
+      const interval = series.low ? ` (${inY(series.low[at])} to ${inY(series.high[at])})` : "";
+      said.push(`${series.name}: ${inY(series.y[at])}${interval}`);
     }
     if (main.labels) said.push(main.labels[m]);
     return said;
   }
 }
 
-function nearest(list, value) {
+// The row of a series whose x is nearest to a value, -1 where there is none.
+function nearest(series, value) {
+  const { x } = series;
+  if (series.ascending) {
+    const after = firstAtLeast(x, value);
+    if (after === x.length || (after > 0 && value - x[after - 1] < x[after] - value)) return after - 1;
+    return after;
+  }
   let best = -1;
-  for (let n = 0; n < list.length; n++) {
-    if (list[n] !== null && (best < 0 || Math.abs(list[n] - value) < Math.abs(list[best] - value))) best = n;
+  for (let n = 0; n < x.length; n++) {
+    if (!Number.isNaN(x[n]) && (best < 0 || Math.abs(x[n] - value) < Math.abs(x[best] - value))) best = n;
   }
   return best;
 }
+
+addEventListener("beforeprint", () => Plot.all.filter(({ stale }) => stale).forEach((plot) => plot.draw()));

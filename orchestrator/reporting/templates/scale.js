@@ -2,8 +2,9 @@
 
 // One axis: from data to pixels and back, and where its ticks go.
 class Scale {
-  constructor(low, high, from, to, logarithmic) {
+  constructor(low, high, from, to, logarithmic, factor = 1) {
     this.logarithmic = logarithmic;
+    this.factor = factor; // of the unit that is shown
     this.low = low;
     this.high = high;
     this.from = from;
@@ -32,15 +33,17 @@ class Scale {
   }
 
   ticks(count) {
-    return this.logarithmic && this.high / this.low > 8 ? this.decades(count) : this.even(count);
+    const [low, high] = [this.low * this.factor, this.high * this.factor];
+    const shown = this.logarithmic && high / low > 8 ? Scale.decades(low, high, count) : Scale.even(low, high, count);
+    return shown.map(({ value, text }) => ({ value: value / this.factor, text }));
   }
 
-  even(count) {
-    const rough = (this.high - this.low) / Math.max(count, 1);
+  static even(low, high, count) {
+    const rough = (high - low) / Math.max(count, 1);
     const power = 10 ** Math.floor(Math.log10(rough));
     const step = power * [1, 2, 5, 10].find((m) => m * power >= rough * 0.999);
-    const first = Math.ceil(this.low / step - 1e-9);
-    const last = Math.floor(this.high / step + 1e-9);
+    const first = Math.ceil(low / step - 1e-9);
+    const last = Math.floor(high / step + 1e-9);
     const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     return Array.from({ length: last - first + 1 }, (_, n) => {
       const value = (first + n) * step;
@@ -48,18 +51,24 @@ class Scale {
     });
   }
 
-  decades(count) {
-    const [a, b] = [this.low, this.high].map((v) => Math.floor(Math.log10(v)));
+  static decades(low, high, count) {
+    const [a, b] = [low, high].map((v) => Math.floor(Math.log10(v)));
     const stride = Math.max(1, Math.ceil((b - a) / count));
     const within = b - a <= 2 ? [1, 2, 5] : [1];
     const found = [];
     for (let decade = a; decade <= b; decade += stride) {
       for (const multiple of within) {
         const value = Number(`${multiple}e${decade}`);
-        if (value >= this.low * 0.9999 && value <= this.high * 1.0001) found.push({ value, text: number(value) });
+        if (value >= low * 0.9999 && value <= high * 1.0001) found.push({ value, text: number(value) });
       }
     }
     return found;
+  }
+
+  // The range after moving by `part` of its width.
+  moved(part) {
+    const [a, b] = [this.low, this.high].map((v) => Scale.forward(v, this.logarithmic));
+    return [a, b].map((v) => (this.logarithmic ? 10 ** (v + part * (b - a)) : v + part * (b - a)));
   }
 
   // The range after zooming by `factor` about `centre` (both in data).
@@ -91,7 +100,7 @@ function extent(lists, logarithmic) {
   let high = -Infinity;
   for (const list of lists) {
     for (const value of list) {
-      if (value === null || (logarithmic && value <= 0)) continue;
+      if (logarithmic && value <= 0) continue; // NaN is neither less nor more
       if (value < low) low = value;
       if (value > high) high = value;
     }
