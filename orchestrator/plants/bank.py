@@ -97,7 +97,7 @@ def _directional_friction(site: str) -> Effect:
     return Effect(
         "directional_friction", site, "speed", group("directional_friction", f"{site}.difference"), "difference",
         lambda s: {"difference": 0.01 * s.torque_at(site) / s.rms_speed(site)}, amplitudes=("difference",),
-        against="speed",
+        possible=lambda v, s: abs(v["difference"]) <= v["viscous"], against="speed",
     )  # fmt: skip
 
 

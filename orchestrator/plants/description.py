@@ -53,6 +53,7 @@ class Body:
         inertia: name of its parameter.
         geared: True if it lies behind the gear.
         encoder: name of the encoder that measures its angle: a column of a record and an output of the FMU.
+        viscous: name of its viscous friction; "": it has none.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Body:
     inertia: str
     encoder: str
     geared: bool = False
+    viscous: str = ""
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,8 @@ class Effect:
         bounds: signal scales -> short name -> (least, largest), narrower than the table's.
         priors: signal scales -> short name -> (mean, standard deviation).
         unreported: short name -> name in the plant's table: what is fitted beside its parameters and not reported.
-        possible: (values by short name, signal scales) -> whether a machine can have them, and the record can show it.
+        possible: (values by short name, signal scales) -> whether a machine can have them, and the record can show it;
+            ``viscous`` [N.m.s/rad] among the values is the viscous friction that the site has beside them.
         contains: name of the simpler effect at the same site that it stands for.
         both_encoders: it can be seen only with an encoder on either side.
         angular: it makes sense for an angle only, not for a position in metres.

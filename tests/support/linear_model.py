@@ -63,7 +63,7 @@ class LinearModel:
     def approximate_changes(self, point: ModelPoint, trials: Sequence[tuple[str, Values]]) -> list[Array | None]:
         return [None] * len(trials)
 
-    def is_possible(self, label: str, values: Values) -> bool:
+    def is_possible(self, label: str, point: ModelPoint) -> bool:
         return True
 
     def reference_signals(self, point: ModelPoint) -> Array:
@@ -78,7 +78,7 @@ class LinearModel:
 
 def linear_problem(
     sizes: Mapping[str, float], *, noise: float = 0.1, seed: int = 0, size: int = 2000, slope: float = 1.1,
-    alike: Mapping[str, str] | None = None,
+    alike: Mapping[str, str] | None = None, kinds: Mapping[str, str] | None = None,
 ) -> FitProblem:  # fmt: skip
     """Return the problem of a model that lacks effects of some sizes.
 
@@ -89,6 +89,7 @@ def linear_problem(
         size: rows.
         slope: the true one.
         alike: label -> label whose column it has too.
+        kinds: label -> kind; default: "speed".
 
     Returns:
         The problem.
@@ -99,5 +100,5 @@ def linear_problem(
     for label, other in (alike or {}).items():
         columns[label] = columns[other] + 1e-3 * columns[label]
     data = slope * ramp + sum(value * columns[label] for label, value in sizes.items())
-    model = LinearModel(data + noise * rng.standard_normal(size), ramp, columns, noise)
+    model = LinearModel(data + noise * rng.standard_normal(size), ramp, columns, noise, kinds)
     return fit_problem([model], FitSettings())

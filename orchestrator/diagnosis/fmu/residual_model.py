@@ -107,9 +107,9 @@ class FmuResiduals(ResidualModel):
         """
         return np.asarray(np.tensordot(point.parameters[len(self._order) :], self._start[:, :, :rows], 1))
 
-    def is_possible(self, label: str, values: Values) -> bool:
-        """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
-        effect, given = self.placed[label].at(values)
+    def is_possible(self, label: str, point: ModelPoint) -> bool:
+        """Tell whether a machine can have an effect as a point has it; see :class:`ResidualModel`."""
+        effect, given = self.placed[label].at(point.effects[label])
         return effect.kind.plausible(tuple(given), effect.scales)
 
     def reference_signals(self, point: ModelPoint) -> Array:

@@ -224,9 +224,10 @@ class FitProblem:
         weight = np.sqrt(self.overdispersion)
         return values * weight, slopes * weight
 
-    def is_possible(self, label: str, values: Values) -> bool:
-        """Tell whether a machine can have an effect of such values, and one of the records can show it."""
-        return any(model.is_possible(label, values) for model in self.models)
+    def is_possible(self, label: str, point: ModelPoint) -> bool:
+        """Tell whether a machine can have an effect as a point has it, and one of the records can show it."""
+        pairs = zip(self.models, self.record_points(point), strict=True)
+        return any(model.is_possible(label, seen) for model, seen in pairs)
 
 
 def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:

@@ -289,12 +289,12 @@ class ResidualModel(Protocol):
             The change (channels, n) for each; None: the residuals must be worked out.
         """
 
-    def is_possible(self, label: str, values: Values) -> bool:
-        """Tell whether a machine can have an effect of such values, and the record can show it.
+    def is_possible(self, label: str, point: ModelPoint) -> bool:
+        """Tell whether a machine can have an effect as a point has it, and the record can show it.
 
         Args:
             label: of the effect, ``name@site``.
-            values: of the effect, in its order.
+            point: values of the model, those of the effect among them.
 
         Returns:
             False for sizes that no machine has, or that act nowhere in the record.

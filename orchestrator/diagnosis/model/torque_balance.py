@@ -327,11 +327,13 @@ class TorqueBalance(ResidualModel):
             levels.append(np.median(power[top] / second_difference_gain(frequencies[top], self.step) ** 2))
         return np.array(levels)
 
-    def is_possible(self, label: str, values: Values) -> bool:
-        """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
+    def is_possible(self, label: str, point: ModelPoint) -> bool:
+        """Tell whether a machine can have an effect as a point has it; see :class:`ResidualModel`."""
         row = next(row for row in self.plant.bank if row.label == label)
-        named = effect_parameters(self.plant, self.effects[label], values)
+        named = effect_parameters(self.plant, self.effects[label], point.effects[label])
         short = {name: named[full] for name, full in row.parameters.items()}
+        viscous = next((body.viscous for body in self.plant.bodies if body.name == row.site), "")
+        short["viscous"] = self.plant.value(self.values_at(point), viscous) if viscous else 0.0
         return row.possible(short, self.scales)
 
 

@@ -207,8 +207,8 @@ PLANT = Plant(
     spread=0.05,
     states=(0, 1, 2, 3, 4),
     bodies=(
-        Body("motor", angle=0, speed=1, inertia="J_m", encoder="theta_m"),
-        Body("load", angle=2, speed=3, inertia="J_l", encoder="theta_l", geared=True),
+        Body("motor", angle=0, speed=1, inertia="J_m", encoder="theta_m", viscous="b_m"),
+        Body("load", angle=2, speed=3, inertia="J_l", encoder="theta_l", geared=True, viscous="b_l"),
     ),
     shaft=Shaft(stiffness="k", ratio="i", gap="alpha"),
     drive=Drive(

@@ -103,7 +103,7 @@ PLANT = Plant(
     table=ap.PARAMETERS,
     linear=("J", "b", "tau"),
     states=(0, 1, 4),
-    bodies=(Body("motor", angle=0, speed=1, inertia="J", encoder="theta_m"),),
+    bodies=(Body("motor", angle=0, speed=1, inertia="J", encoder="theta_m", viscous="b"),),
     drive=Drive(
         4,
         "tau",
