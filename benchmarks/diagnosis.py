@@ -50,6 +50,8 @@ def group_figures(group: str, rows: Sequence[Row]) -> dict[str, Any]:
         Counts by name.
     """
     figures: dict[str, Any] = {"records": len(rows), "refused": sum(bool(row.outcome.refused) for row in rows)}
+    if group == "none":
+        figures["false_alarms"] = sum(row.is_false_alarm() for row in rows)
     if group not in ("none", "unknown"):
         figures["right"] = sum(row.is_right() for row in rows)
         figures["all_found"] = sum(all(grade in NAMED for grade in row.judgement.found) for row in rows)

@@ -69,9 +69,14 @@ class Row:
         """
         return [n for n in self.outcome.labels(grades) if self.judgement.verdicts[n] in ("wrong", "untested")]
 
+    def is_false_alarm(self) -> bool:
+        """Tell whether a record in which nothing is hidden is said to lack something, if only by possible names."""
+        return self.group == "none" and self.outcome.alarms
+
     def is_right(self) -> bool:
-        """Tell whether every expected effect is named at least as likely, and no wrong one is."""
-        return all(grade in NAMED for grade in self.judgement.found) and not self.wrong()
+        """Tell whether every expected effect is named at least as likely, and nothing wrong is said."""
+        named = all(grade in NAMED for grade in self.judgement.found)
+        return named and not self.wrong() and not self.is_false_alarm()
 
 
 def judge(outcome: Outcome, truth: Truth) -> Judgement:

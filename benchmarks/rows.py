@@ -31,7 +31,7 @@ def show_row(row: Row) -> str:
     Returns:
         The line.
     """
-    mark = "WRONG" if row.wrong() else "ok" if row.is_right() else "miss"
+    mark = "WRONG" if row.wrong() or row.is_false_alarm() else "ok" if row.is_right() else "miss"
     names = ", ".join(f"{label} ({effect.grade})" for label, effect in row.outcome.names.items())
     said = f"refused: {row.outcome.refused}" if row.outcome.refused else names or "no name"
     return f"{mark:>5} {row.key} {row.hidden}: {said}, {row.outcome.seconds:.1f} s"

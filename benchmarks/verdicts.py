@@ -53,6 +53,7 @@ class Outcome:
         refused: why nothing is said; empty: something is.
         seconds: processor time.
         verdict: of the diagnosis.
+        trust: level of it, in a word.
     """
 
     names: dict[str, NamedEffect] = field(default_factory=dict)
@@ -61,6 +62,12 @@ class Outcome:
     refused: str = ""
     seconds: float = 0.0
     verdict: str = ""
+    trust: str = ""
+
+    @property
+    def alarms(self) -> bool:
+        """Whether it says that something is missing that it does not know, or that the model must not be used."""
+        return self.verdict == "unknown" or self.trust == "red"
 
     def labels(self, grades: tuple[str, ...] = NAMED) -> list[str]:
         """Return the labels of some grades.
@@ -144,7 +151,9 @@ def outcome_of(result: Any) -> Outcome:
         for n, part in enumerate(diagnosis.test)
         for one in part.signals
     }
-    return Outcome(names, _values(diagnosis.parameters), misfit, verdict=diagnosis.verdict)
+    return Outcome(
+        names, _values(diagnosis.parameters), misfit, verdict=diagnosis.verdict, trust=diagnosis.trust.level.word
+    )
 
 
 def _values(estimates: Mapping[str, Any]) -> dict[str, Estimate]:

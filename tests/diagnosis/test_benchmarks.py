@@ -136,3 +136,14 @@ def test_the_ablation_counts_the_names_whose_grade_would_rise_without_a_rule() -
     assert count_rule("sure size", rows) == RuleCount("sure size", records=2, wrong=1, right=1)
     assert count_rule("size", rows) == RuleCount("size", records=1, wrong=1, right=0)
     assert count_rule("inertia seen", rows) == RuleCount("inertia seen", records=0, wrong=0, right=0)
+
+
+def test_a_clean_record_that_is_said_to_lack_something_is_not_right() -> None:
+    def clean(verdict: str, trust: str) -> Row:
+        outcome = Outcome({"torque_ripple@motor": NamedEffect("possible", {})}, verdict=verdict, trust=trust)
+        return Row("none::1", "none", "none", outcome, judge(outcome, Truth()))
+
+    assert clean("parameters", "green").is_right()
+    assert not clean("unknown", "red").is_right()
+    assert not clean("effects", "red").is_right()
+    assert not replace(clean("unknown", "red"), group="unknown").is_false_alarm()
