@@ -58,7 +58,7 @@ def _rules() -> str:
     ]
     rows = [f"| {' | '.join(row)} |" for row in cells]
     head = "| rule | grade where it does not hold | statistic | threshold | reason |\n|---|---|---|---|---|\n"
-    text = "An effect is certain unless a rule lowers it. `disabled` names rules that are off."
+    text = "An effect is certain unless a rule lowers it. A threshold that every effect reaches switches its rule off."
     return "\n## Rules\n\n" + text + "\n\n" + head + "\n".join(rows) + "\n"
 
 
