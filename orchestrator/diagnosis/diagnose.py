@@ -30,6 +30,7 @@ from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, Par
 from orchestrator.diagnosis.selection.evidence import (
     effect_evidence,
     leave_out_possible,
+    possible_effects,
     record_evidence,
     torque_shares,
 )
@@ -108,15 +109,14 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     searched = workings.search
     record = record_evidence(searched)
     evidence = effect_evidence(searched)
-    result, evidence = leave_out_possible(searched, evidence, record, settings)
-    final = workings.balances[0].physical_values(result.problem.record_points(result.final.point)[0])
-    workings = replace(workings, search=result, final=final)
-    test = misfit_on_test_data(workings, model, settings)
-    compared = torque_comparison(workings, test, model, settings)
+    workings, evidence, test = _test(workings, evidence, record, model, settings)
+    while any(one.label in workings.search.final.labels for one in possible_effects(evidence, record, settings)):
+        workings, evidence, test = _test(workings, evidence, record, model, settings)  # without what the test refutes
+    result = workings.search
     labels = result.final.labels
     graded = tuple(
         _grade(result if one.label in labels else searched, one, record, model, settings, one.label in labels)
-        for one in add_test_evidence(evidence, result, test, misses_of(workings, model, settings), compared)
+        for one in evidence
     )
     graded = share_values(graded, labels, model.plant)
     effects = tuple(sorted((effect for effect in graded if not effect.of_log), key=lambda effect: -effect.grade))
@@ -136,6 +136,21 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
         notes=_notes(result, record, test), settings=settings, searched=bool(searched.steps),
         model=model, workings=workings,
     )  # fmt: skip
+
+
+def _test(
+    workings: Workings, evidence: Sequence[EffectEvidence], record: RecordEvidence, model: Model,
+    settings: DiagnosisSettings,
+) -> tuple[Workings, list[EffectEvidence], tuple[TestMisfit, ...]]:  # fmt: skip
+    """Return the workings without effects that are not even likely, what test data say of the others, and the misfits
+    on them.
+    """
+    result, evidence = leave_out_possible(workings.search, evidence, record, settings)
+    final = workings.balances[0].physical_values(result.problem.record_points(result.final.point)[0])
+    workings = replace(workings, search=result, final=final)
+    test = misfit_on_test_data(workings, model, settings)
+    compared = torque_comparison(workings, test, model, settings)
+    return workings, add_test_evidence(evidence, result, test, misses_of(workings, model, settings), compared), test
 
 
 def _grade(

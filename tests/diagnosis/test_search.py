@@ -39,6 +39,16 @@ def test_two_columns_that_are_alike_are_a_family():
     assert {label, *found.reviews[label].family} == {"a@motor", "b@motor"}
 
 
+def test_laws_of_two_kinds_that_do_the_same_are_a_family_though_one_is_more_exact():
+    for kind, family in (("constant", ("b@motor",)), ("speed", ())):
+        problem = linear_problem(
+            {"a@motor": 4.0, "b@motor": 0.0}, noise=0.003, alike={"b@motor": "a@motor"}, kinds={"b@motor": kind}
+        )
+        found = search_effects(problem, SETTINGS)
+        assert found.final.labels == ("a@motor",)
+        assert found.reviews["a@motor"].family == family
+
+
 def test_no_more_effects_than_the_settings_allow():
     problem = linear_problem(dict.fromkeys(NAMES, 0.3))
     none = SelectionSettings(most_effects=0)

@@ -30,6 +30,7 @@ from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.selection.evidence import (
     effect_evidence,
     leave_out_possible,
+    possible_effects,
     record_evidence,
     torque_shares,
 )
@@ -126,11 +127,16 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     searched, problem = workings.search, workings.problem
     record = record_evidence(searched)
     evidence = effect_evidence(searched)
-    found, evidence = leave_out_possible(searched, evidence, record, settings)
-    workings = replace(workings, search=found)
-    test = misfit_on_test_data(workings)
+    found = searched
+    while True:  # until test data refute none of what is left
+        found, evidence = leave_out_possible(found, evidence, record, settings)
+        workings = replace(workings, search=found)
+        test = misfit_on_test_data(workings)
+        evidence = add_test_evidence(evidence, found, test, misses_of(workings))
+        if not any(one.label in found.final.labels for one in possible_effects(evidence, record, settings)):
+            break
     graded = []
-    for one in add_test_evidence(evidence, found, test, misses_of(workings)):
+    for one in evidence:
         effect, in_model = workings.residuals[0].placed[one.label], one.label in found.final.labels
         source, units = found if in_model else searched, effect_units(problem, effect)
         graded.append(report_effect(source, one, effect.values_by_name, units, record, settings, in_model))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.report.corrected import BeforeAfter
-from orchestrator.diagnosis.report.summary import effect_words
+from orchestrator.diagnosis.report.words import effect_words
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.drawing import BLUE, GREY, ORANGE

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.report.words import list_effects
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, SignalMisfit, TestMisfit
 from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -20,16 +21,15 @@ def form_verdict(
 
     Returns:
         "effects": one at least is likely; "unknown": something is missing and nothing is likely; "none" or
-        "parameters":
-        the model explains the record as given, or re-fitted.
+        "parameters": the model explains the record as given, or re-fitted. A possible effect is a hint, as a curve is:
+        either tells that something is missing by what it surely takes of what is left.
     """
     if any(effect.grade >= Grade.LIKELY for effect in effects):
         return "effects"
-    strong = any(
-        one.comparison.t >= settings.grades.likely_t and one.comparison.gain >= settings.report.law_gain
-        for one in dependences
-    )
-    if effects or strong or not search.complete or record.left > settings.grades.timing_left:
+    takes = [(one.t, one.gain) for one in (effect.evidence for effect in effects)]
+    takes += [(one.t, one.gain) for one in (curve.comparison for curve in dependences)]
+    strong = any(t >= settings.grades.likely_t and gain >= settings.report.law_gain for t, gain in takes)
+    if strong or not search.complete or record.left > settings.grades.timing_left:
         return "unknown"
     return "none" if _nominal_explains(search) else "parameters"
 
@@ -68,8 +68,8 @@ def judge_trust(
                     f"free runs on the test part of {one.source} miss {signal.signal} by {signal.miss:.3g} times its "
                     f"noise{_of_motion(signal)}"
                 )
-    if any(effect.grade is Grade.LIKELY for effect in effects):
-        amber.append("at least one effect is likely, not certain")
+    if likely := [effect.label for effect in effects if effect.grade is Grade.LIKELY]:
+        amber.append(f"likely, not certain: {list_effects(likely)}")
     if record.left > 0.1:
         amber.append(f"{100.0 * record.left:.0f} % of the torque's power is left unexplained")
     for known in uncertain:

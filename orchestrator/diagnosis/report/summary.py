@@ -3,18 +3,17 @@ next.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
+from orchestrator.diagnosis.report.words import effect_words, list_effects
 from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, Nuisance, ValueEstimate
 from orchestrator.diagnosis.selection.grading import GRADE_RULES
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.plants.description import Plant
 from orchestrator.shared.play import Play
 
-SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the drive"}
 BODIES = {"motor": "the motor", "load": "the load"}
 SIGNALS = {"theta_m": "the motor", "theta_l": "the load"}
-PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
 # What each effect does to the motion.
 MOTION = {
     "backlash": "between the flanks the motor turns alone; the load follows late, and each contact is an impact",
@@ -94,36 +93,24 @@ def summarise_fmu(diagnosis: DiagnosisOutcome) -> Iterator[str]:
     yield from next_steps(diagnosis)
 
 
-def effect_words(label: str) -> str:
-    """Return an effect at a site, ``coulomb_friction@motor``, in words."""
-    name, _, site = label.partition("@")
-    parts = name.split("_")
-    words = " ".join(PROPER.get(word, word) for word in parts)
-    return words if site in parts else f"{words} {SITES.get(site, site)}".strip()
-
-
-def list_effects(labels: Sequence[str]) -> str:
-    """Return effects in words, as a list in a sentence."""
-    words = [effect_words(label) for label in labels]
-    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
-
-
 def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
     """Return the verdict in one sentence."""
-    if diagnosis.verdict in ("none", "parameters") and diagnosis.misses_test_data:
-        found = "No effect of the library is missing, yet" if diagnosis.searched else "No effect was looked for, and"
-        outside = " outside the library" if diagnosis.searched else ""
-        return (
-            f"Verdict: {diagnosis.verdict}. {found} the {compared} misses the test data by "
-            f"{diagnosis.largest_miss:.3g} times the noise: a disturbance, or an effect{outside}."
-        )
-    if diagnosis.verdict == "none":
-        return f"Verdict: none. Nothing is missing: the {compared} explains the record."
-    if diagnosis.verdict == "parameters":
-        return (
-            f"Verdict: parameters. Nothing is missing: the {compared} explains the record once its values are "
-            "re-fitted."
-        )
+    near = [effect.label for effect in diagnosis.effects]
+    if diagnosis.verdict in ("none", "parameters"):
+        refitted = " once its values are re-fitted" if diagnosis.verdict == "parameters" else ""
+        if diagnosis.misses_test_data:
+            found = "No effect of the library is likely, yet" if diagnosis.searched else "No effect was looked for, and"
+            outside = " outside the library" if diagnosis.searched else ""
+            said = (
+                f"{found} the {compared} misses the test data by {diagnosis.largest_miss:.3g} times the noise: "
+                f"a disturbance, or an effect{outside}"
+            )
+        elif near:
+            said = f"The {compared} explains the record{refitted}"
+        else:
+            said = f"Nothing is missing: the {compared} explains the record{refitted}"
+        hint = f" A hint, too weak to be an answer: {list_effects(near)}." if near else ""
+        return f"Verdict: {diagnosis.verdict}. {said}.{hint}"
     if diagnosis.verdict == "effects":
         named = [effect.label for effect in diagnosis.graded(Grade.LIKELY)]
         return (
@@ -131,7 +118,6 @@ def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
             if named
             else "Verdict: effects, in the log alone."
         )
-    near = [effect.label for effect in diagnosis.effects]
     why = "no effect of the library is likely" if diagnosis.searched else "no search was made"
     text = f"Verdict: unknown. The {compared} misses something, and {why}."
     return text + (f" Possible: {list_effects(near)}." if near else "")

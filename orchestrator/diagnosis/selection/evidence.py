@@ -48,7 +48,7 @@ def _effect_evidence(result: SearchResult, label: str, base: float, left: float)
         label, effect.kind, max(leaving.comparison.t, entry.comparison.t),
         max(leaving.comparison.gain, entry.comparison.gain), max(without - left, before - after) / base,
         size_over_error(problem, final, label), review.family, bool(kinds - {effect.kind}),
-        problem.is_possible(label, final.point.effects[label]),
+        problem.is_possible(label, final.point),
     )  # fmt: skip
 
 
@@ -118,15 +118,20 @@ def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, 
     return total, float(np.sqrt(variance)), spread
 
 
+def possible_effects(
+    evidence: Sequence[EffectEvidence], record: RecordEvidence, settings: DiagnosisSettings
+) -> list[EffectEvidence]:
+    """Return the effects that are not even likely."""
+    return [one for one in evidence if grade_effect(one, record, settings)[0] is Grade.POSSIBLE]
+
+
 def leave_out_possible(
     searched: SearchResult, evidence: Sequence[EffectEvidence], record: RecordEvidence, settings: DiagnosisSettings
 ) -> tuple[SearchResult, list[EffectEvidence]]:
     """Return result and evidence without effects that are not even likely: with them it might predict worse."""
     result = searched
     while labels := [
-        one.label
-        for one in evidence
-        if one.label in result.final.labels and grade_effect(one, record, settings)[0] is Grade.POSSIBLE
+        one.label for one in possible_effects(evidence, record, settings) if one.label in result.final.labels
     ]:
         result = leave_out(result, labels)
         sizes = {label: size_over_error(result.problem, result.final, label) for label in result.final.labels}

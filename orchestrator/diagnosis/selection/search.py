@@ -201,10 +201,21 @@ class _Search:
     def _simplest(
         self, problem: FitProblem, model: FittedModel, best: TriedEffect, tried: Sequence[TriedEffect]
     ) -> SearchStep:
-        """Return the step with the simplest of the effects over which the best one gains nothing."""
-        family = [one for one in tried if one is best or self._is_alike(problem, model, best, one)]
-        chosen = min(family, key=lambda trial: (problem.effects[trial.label].law_values, -trial.comparison.gain))
-        return SearchStep(model, tuple(tried), chosen.label, tuple(one.label for one in family if one is not chosen))
+        """Return the step with the simplest of the effects over which the best one gains nothing.
+
+        Its family are these, and those of another kind over which it gains next to nothing of the whole error: what is
+        left of two laws that do the same differs by how exact either is, and no law is.
+        """
+        alike = [one for one in tried if one is best or self._is_alike(problem, model, best, one)]
+        chosen = min(alike, key=lambda trial: (problem.effects[trial.label].law_values, -trial.comparison.gain))
+        kind, most = problem.effects[chosen.label].kind, chosen.fitted.score + self.settings.least_gain * model.score
+        family = [
+            one.label for one in tried
+            if one is not chosen and (one in alike or (
+                problem.effects[one.label].kind != kind and one.fitted.score < most and self._pays(problem, model, one)
+            ))
+        ]  # fmt: skip
+        return SearchStep(model, tuple(tried), chosen.label, tuple(family))
 
     def _try_effects(
         self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int
@@ -227,8 +238,7 @@ class _Search:
 
     def _pays(self, problem: FitProblem, model: FittedModel, tried: TriedEffect) -> bool:
         """Tell whether an effect gains enough, is possible, and pushes no parameter out of the model file."""
-        values = tried.fitted.point.effects[tried.label]
-        if not (self._gains(tried.comparison) and problem.is_possible(tried.label, values)):
+        if not (self._gains(tried.comparison) and problem.is_possible(tried.label, tried.fitted.point)):
             return False
         before, after = farthest_parameter(problem, model), farthest_parameter(problem, tried.fitted)
         return after < max(self.settings.prior_deviations, before + 1.0)

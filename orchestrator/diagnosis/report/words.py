@@ -1,0 +1,21 @@
+"""Effects at their sites in words."""
+
+from collections.abc import Sequence
+
+SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the drive",
+         "log": "of the log"}  # fmt: skip
+PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
+
+
+def effect_words(label: str) -> str:
+    """Return an effect at a site, ``coulomb_friction@motor``, in words."""
+    name, _, site = label.partition("@")
+    parts = name.split("_")
+    words = " ".join(PROPER.get(word, word) for word in parts)
+    return words if site in parts else f"{words} {SITES.get(site, site)}".strip()
+
+
+def list_effects(labels: Sequence[str]) -> str:
+    """Return effects in words, as a list in a sentence."""
+    words = [effect_words(label) for label in labels]
+    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))

@@ -1,0 +1,90 @@
+"""What is said of an axis: laws that a machine can have, names that test data refute, hints beside verdicts."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.diagnose import diagnose
+from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.model.torque_balance import balance_of
+from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
+from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.records.model_file import Model, read_model
+from tests.support.axis_record import MODEL, axis_record
+
+SETTINGS = DiagnosisSettings()
+FRICTION = "effects.coulomb_friction.motor.torque"
+CLEAN = RecordEvidence(1e-5, 1.0, 0.01, 0.1)
+
+
+@pytest.fixture
+def model(tmp_path) -> Model:
+    path = tmp_path / "axis.toml"
+    path.write_text(MODEL)
+    return read_model(path)
+
+
+def values(model: Model, **given: float) -> list[float]:
+    p = [entry.default for entry in model.plant.table]
+    for name, value in ({"J": 1.04, "b": 1.95} | given).items():
+        p[model.plant.index(name)] = value
+    return p
+
+
+def graded(grade: Grade, gain: float, t: float) -> Any:
+    evidence = EffectEvidence("torque_ripple@motor", "wave", t, gain, 0.01, 9.0, (), False, True)
+    return SimpleNamespace(label="torque_ripple@motor", grade=grade, evidence=evidence)
+
+
+def verdict_of(*effects: Any) -> str:
+    fitted: Any = SimpleNamespace(point=ModelPoint((1.0,)), cost=0.0)
+    problem = SimpleNamespace(
+        shared=("slope",), start=ModelPoint((1.0,)), whiten_residuals=lambda points: [np.full(9, 10.0)]
+    )
+    search: Any = SimpleNamespace(problem=problem, final=fitted, complete=True)
+    return form_verdict(search, effects, (), CLEAN, SETTINGS)
+
+
+def test_a_hint_is_no_verdict() -> None:
+    assert verdict_of(graded(Grade.POSSIBLE, 0.06, 3.4)) == "parameters"
+    assert verdict_of(graded(Grade.POSSIBLE, 0.6, 1.2)) == "parameters"
+
+
+def test_a_possible_effect_that_surely_takes_much_of_what_is_left_says_that_something_is_missing() -> None:
+    assert verdict_of(graded(Grade.POSSIBLE, 0.6, 8.0)) == "unknown"
+    assert verdict_of(graded(Grade.LIKELY, 0.06, 3.4)) == "effects"
+
+
+def test_trust_names_what_is_only_likely() -> None:
+    def reasons(*effects: Any) -> tuple[str, ...]:
+        return judge_trust("effects", effects, True, CLEAN, (), {}, (), SETTINGS).reasons
+
+    assert reasons(graded(Grade.CERTAIN, 0.6, 8.0)) == ()
+    assert reasons(graded(Grade.LIKELY, 0.6, 8.0)) == ("likely, not certain: torque ripple at the motor",)
+
+
+def test_friction_that_would_drive_the_axis_in_one_direction_is_no_law(model: Model) -> None:
+    balance = balance_of(axis_record(values(model), 3, "axis"), model, SETTINGS)
+    label = "directional_friction@motor"
+    (b,) = (n for n, entry in enumerate(balance.parameters) if entry.name == "b")
+    for viscous, difference, possible in ((2.0, 1.9, True), (2.0, -2.1, False), (3.0, -2.1, True)):
+        parameters = [entry.nominal for entry in balance.parameters]
+        parameters[b] = viscous
+        assert balance.is_possible(label, ModelPoint(tuple(parameters), {label: (difference,)})) is possible
+
+
+def test_what_test_data_refute_is_not_in_the_corrected_model(tmp_path) -> None:
+    (tmp_path / "known.toml").write_text(MODEL.replace("uncertainty = 0.1", "uncertainty = 0.001"))
+    model = read_model(tmp_path / "known.toml")
+    exact = values(model, J=1.0, b=2.0)
+    record = axis_record([*exact[: (n := model.plant.index(FRICTION))], 0.8, *exact[n + 1 :]], 3, "with friction")
+    found = diagnose(record, model, test=axis_record(exact, 4, "without friction"))
+    friction = [one for one in found.effects if "friction" in one.name]
+    assert friction
+    assert all(one.grade is Grade.POSSIBLE and not one.in_model for one in friction)
+    assert found.workings.search.final.labels == tuple(one.label for one in found.effects if one.in_model)
+    assert found.workings.final[model.plant.index(FRICTION)] == 0.0
+    assert found.verdict == "unknown"
