@@ -4,7 +4,7 @@ import gc
 import logging
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.heads import head_of
+from orchestrator.records.formats.mdf_conversions import apply_ranges, has_formula, hides_ranges, maps_ranges
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
     MAXIMUM_CHANNELS,
@@ -25,7 +26,6 @@ from orchestrator.records.formats.source import (
 from orchestrator.records.units import parse_unit
 from orchestrator.records.words import TIME, words_of
 
-FORMULA_4, FORMULA_3 = 3, 10  # conversion types of the two versions
 # What the master of a group of version 4 may be besides a time.
 MASTERS = {2: "angle", 3: "distance", 4: "index"}
 
@@ -61,11 +61,15 @@ class MdfSource(RecordSource):
             invalid = None
             try:
                 if index is None:
+                    self._refuse_conversion(group, self._file.masters_db[group], maps_ranges)
                     values = np.asarray(self._file.get_master(group), dtype=float)
                 else:
-                    self._refuse_formula(group, index)
-                    signal = self._file.get(group=group, index=index, ignore_invalidation_bits=True)
+                    self._refuse_conversion(group, index, hides_ranges)
+                    ranges = self._file.groups[group].channels[index].conversion
+                    ranges = ranges if maps_ranges(ranges, str(self._file.version)) else None
+                    signal = self._file.get(group=group, index=index, ignore_invalidation_bits=True, raw=bool(ranges))
                     values = np.asarray(signal.samples)
+                    values = apply_ranges(values, ranges) if ranges else values
                     invalid = signal.invalidation_bits
             except RecordError:
                 raise
@@ -77,15 +81,15 @@ class MdfSource(RecordSource):
             out.append(numbers)
         return out
 
-    def _refuse_formula(self, group: int, index: int) -> None:
-        """Refuse conversions that are formulas: a file's text is never run."""
-        conversion = self._file.groups[group].channels[index].conversion
-        kind = getattr(conversion, "conversion_type", None)
-        if conversion is not None and kind == (FORMULA_4 if str(self._file.version) >= "4" else FORMULA_3):
-            raise RecordError(
-                f"{self._path}: column `{self._file.groups[group].channels[index].name}` must have a linear "
-                "conversion, but has a formula: export it converted"
-            )
+    def _refuse_conversion(self, group: int, index: int, has_ranges: Callable[[Any, str], bool]) -> None:
+        """Refuse conversions that cannot be done: formulas, and ranges where they are not read here."""
+        channel, version = self._file.groups[group].channels[index], str(self._file.version)
+        for is_there, what in ((has_formula, "a formula"), (has_ranges, "a table of ranges")):
+            if is_there(channel.conversion, version):
+                raise RecordError(
+                    f"{self._path}: column `{channel.name}` must have a linear conversion, but has {what}: export it "
+                    "converted"
+                )
 
 
 def _master_head(channel: Any, group: int) -> Head:
