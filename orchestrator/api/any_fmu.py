@@ -14,7 +14,7 @@ from orchestrator.diagnosis.fmu.corrected_ssp import write_corrected
 from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnose_records
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
 from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor, read_fmu_record
-from orchestrator.diagnosis.fmu.report import FmuDiagnosis, misfit_on_record, stage_runs
+from orchestrator.diagnosis.fmu.report import FmuDiagnosis, first_test, misfit_on_record, stage_runs
 from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
 from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, misfit_found, steps_found
 from orchestrator.diagnosis.report.summary import summarise_fmu
@@ -87,9 +87,14 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
             step_cost=d.workings.problem.runner.step_cost,
             walls=support().in_words,
             runs=d.workings.problem.runner.runs,
+            test_start=self._test_start(),
             summary=tuple(summarise_fmu(d)),
             seconds=self.seconds,
         )
+
+    def _test_start(self) -> float | None:
+        problem, row = first_test(self.diagnosis.workings)
+        return float(problem.data.time[row]) if row < len(problem.data.time) else None
 
     def write_files(self, folder: Path) -> None:
         """Write measured and simulated outputs, a figure and the corrected system."""

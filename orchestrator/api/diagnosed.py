@@ -156,6 +156,7 @@ class DiagnosisResult(AnyDiagnosisResult):
             if self.validation is None
             else misfit_found(self.validation, self.diagnosis.settings.report),
             live=live_corrected_model(self.diagnosis, self.runs),
+            angle_unit=self.record.angle_unit,
             seconds=self.seconds,
         )
 

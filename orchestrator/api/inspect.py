@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.api.methods import MethodResult, method_entry
+from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.records import as_record
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.estimation.inspection.channels import (
@@ -28,7 +28,8 @@ from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.estimation.zeros import set_zeros
 from orchestrator.records.model_file import DEFAULT, Model, read_model
 from orchestrator.records.record import Record
-from orchestrator.shared.results.estimate import ExcitationFound, RecordFound
+from orchestrator.shared.output import write_arrays
+from orchestrator.shared.results.estimate import ExcitationFound
 from orchestrator.shared.results.inspect import (
     BandFound,
     ChannelFound,
@@ -155,7 +156,7 @@ class InspectResult(Result):
         """Return what ``inspect.json`` says."""
         r, found, angles = self.record, self.sufficiency, self.two_angles
         return InspectFound(
-            record=RecordFound(r.size, r.step, r.source, r.n_missing, tuple(r.notes)),
+            record=describe_record(r),
             channels=tuple(ChannelFound(**vars(c)) for c in self.channels),
             excitation=tuple(BandFound(**vars(b)) for b in self.excitation),
             reversals=ReversalsFound(*self.reversals),
@@ -175,8 +176,11 @@ class InspectResult(Result):
         )
 
     def write_files(self, folder: Path) -> None:
-        """Write the model file to start from, and the picture."""
+        """Write the model file to start from, the record as it was read, and its picture."""
         (folder / STARTER).write_text(self.starter, encoding="utf-8")
+        r = self.record
+        columns = {"time": r.time, "u": r.u if r.has_torque else None, "theta_m": r.theta_m, "theta_l": r.theta_l}
+        write_arrays(folder / "inspect_record.npz", {n: values for n, values in columns.items() if values is not None})
         self.plot(folder / "inspect_record.png")
 
 

@@ -33,7 +33,9 @@ class MethodResult:
 
 def describe_record(record: Record) -> RecordFound:
     """Return rows, step, source of a record, and what was detected and assumed when it was read."""
-    return RecordFound(record.size, record.step, record.source, record.n_missing, tuple(record.notes))
+    return RecordFound(
+        record.size, record.step, record.source, record.n_missing, tuple(record.notes), record.angle_unit
+    )
 
 
 def method_row(result: MethodResult) -> list[str]:

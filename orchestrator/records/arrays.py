@@ -34,6 +34,7 @@ class Record:
         timing: what the time stamps said, or None.
         notes: what was detected and assumed, one sentence each.
         averaged: how many samples of the file went into one of these by ``rate``.
+        angle_unit: in which the file has angles: rad, deg, arcmin or turns; rad where it is another.
     """
 
     time: Array
@@ -49,6 +50,7 @@ class Record:
     averaged: int = 1
     u_sampled: Array | None = None
     u_raster: float = 0.0
+    angle_unit: str = "rad"
 
     @property
     def size(self) -> int:

@@ -26,10 +26,13 @@ from orchestrator.records.rasters import bring_to_motor, make_uniform
 from orchestrator.records.requests import SAMPLED
 from orchestrator.records.stamps import seconds_of
 from orchestrator.records.topics import has_topics, split_topics
-from orchestrator.records.units import parse_unit
+from orchestrator.records.units import angle_unit, parse_unit
 from orchestrator.shared.numbers import exact_text
 
 MOST_NAMED = 12  # columns in a note
+
+
+ANGLES_OF = ("theta_l", "theta_m")
 
 
 @dataclass(frozen=True)
@@ -60,12 +63,14 @@ class Loaded:
         labels: their names in the file.
         notes: what was detected and assumed.
         torque_raster: step of the torque's own rows [s], where they are rarer than the angles'; else 0.0.
+        angle_unit: of the load's angles, else of the motor's; see ``Record``.
     """
 
     table: dict[str, Array]
     labels: dict[str, str]
     notes: tuple[str, ...]
     torque_raster: float = 0.0
+    angle_unit: str = "rad"
 
 
 @dataclass(frozen=True)
@@ -142,7 +147,8 @@ def load(
     if "u" not in chosen:
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
     table, more = make_uniform(table, reading.resample)
-    return Loaded(table, labels, (*notes, *more), raster)
+    texts = [columns.get(n, Column()).unit or source.heads[chosen[n].place].unit for n in ANGLES_OF if n in chosen]
+    return Loaded(table, labels, (*notes, *more), raster, angle_unit(texts))
 
 
 def _unused(source: RecordSource, places: Sequence[int]) -> list[str]:

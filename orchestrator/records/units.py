@@ -8,6 +8,8 @@ from orchestrator.shared import units
 from orchestrator.shared.units import dimension_of
 
 TURN = 2.0 * math.pi
+ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "arcmin": math.pi / 10800.0, "turns": TURN}
+"""Units in which angles are shown [rad]."""
 
 
 @dataclass(frozen=True)
@@ -61,3 +63,10 @@ def parse_unit(text: str, kinds: Sequence[str] = ()) -> RecordUnit | None:
         return None
     kind = _KINDS.get(unit.dimension, "")
     return RecordUnit(kind, 100.0 * unit.factor if kind == "share" else unit.factor)
+
+
+def angle_unit(texts: Sequence[str]) -> str:
+    """Return the unit of ``ANGLES`` that the first of some texts of units means which is an angle's; else rad."""
+    angles = [unit for text in texts if text and (unit := parse_unit(text, ("angle",))) and unit.kind == "angle"]
+    known = (name for name, factor in ANGLES.items() if angles and math.isclose(factor, angles[0].factor))
+    return next(known, "rad")

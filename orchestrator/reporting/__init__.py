@@ -6,7 +6,6 @@ from orchestrator.reporting.model import (
     Bars,
     Facts,
     Findings,
-    Picture,
     Plot,
     Remark,
     Report,
@@ -19,6 +18,6 @@ from orchestrator.reporting.model import (
 from orchestrator.reporting.page import render
 
 __all__ = [
-    "Bar", "Bars", "Facts", "Findings", "Picture", "Plot", "Remark", "Report", "ReportTable", "Series", "Span",
+    "Bar", "Bars", "Facts", "Findings", "Plot", "Remark", "Report", "ReportTable", "Series", "Span",
     "TableColumn", "Text", "render", "report_from_directory", "write_report",
 ]  # fmt: skip

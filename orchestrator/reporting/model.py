@@ -146,16 +146,7 @@ class Bars:
     note: str = ""
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A picture that a command has drawn; it becomes part of the page."""
-
-    title: str
-    path: Path
-    note: str = ""
-
-
-Section = Text | Facts | ReportTable | Plot | Findings | Bars | Picture
+Section = Text | Facts | ReportTable | Plot | Findings | Bars
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,6 @@ from orchestrator.reporting.model import (
     Cell,
     Facts,
     Findings,
-    Picture,
     Plot,
     Report,
     ReportTable,
@@ -33,7 +32,6 @@ _KINDS = {
     Plot: "plot",
     Findings: "findings",
     Bars: "bars",
-    Picture: "picture",
 }
 
 
@@ -69,7 +67,6 @@ def _environment() -> jinja2.Environment:
         "angle_attributes": angle_attributes,
         "sort_key": _sort_key,
         "cell_class": _cell_class,
-        "embedded": _embed,
     }
     environment.globals["kind"] = _kind
     return environment

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from orchestrator.reporting.model import Cell, ReportTable, TableColumn
 from orchestrator.shared.results import as_plain
 
 Array = NDArray[np.float64]
-DATA_SUFFIXES = (".csv", ".json", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")
+DATA_SUFFIXES = (".csv", ".json", ".npz", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")
 
 UNITS = {  # of arguments
     "alpha": "rad",
@@ -77,10 +78,12 @@ class ResultDocument:
         return by_column(header, rows)
 
     def signals(self, name: str) -> dict[str, Array]:
-        """Return a CSV file of numbers by column, NaN where one is missing; empty when there is no such file."""
+        """Return a CSV or NumPy file of numbers by column, NaN where one is missing; empty without such a file."""
         path = self.directory / name
         if not path.is_file():
             return {}
+        if path.suffix == ".npz":
+            return _arrays(path)
         with path.open(encoding="utf-8", newline="") as stream:
             header = next(csv.reader(stream), [])
             try:
@@ -106,6 +109,14 @@ class ResultDocument:
             for path in sorted(self.directory.iterdir())
             if path.suffix in DATA_SUFFIXES and path.is_file() and not path.name.startswith(".")
         )
+
+
+def _arrays(path: Path) -> dict[str, Array]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: np.asarray(file[name], dtype=float) for name in file.files}
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise ScenarioError(f"{path} must be a NumPy file with numbers, but is not: {error}") from None
 
 
 def load(directory: Path, command: str) -> ResultDocument:

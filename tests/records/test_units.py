@@ -13,6 +13,7 @@ from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import Head
 from orchestrator.records.model_file import read_model
 from orchestrator.records.record import read_record
+from orchestrator.records.units import angle_unit
 from orchestrator.shared.units import is_unit
 from tests.support.independent_plant import make_record
 from tests.support.unit_spellings import KNOWN, REFUSED, truth
@@ -201,3 +202,21 @@ def test_what_is_not_known_is_refused_until_it_is_stated(tmp_path: Path, columns
         read_record(path, {"u": Column("u")})
     record = read_record(path, {"u": Column(unit="N.m", factor=9.80665e-5)})
     np.testing.assert_allclose(record.u, columns["u"], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("units", "unit"),
+    [(("deg", "rad"), "deg"), (("", "rev"), "turns"), (("counts", "Grad"), "deg"), (("mm", ""), "rad"),
+     (("arcmin",), "arcmin"), (("mrad", "deg"), "rad"), ((), "rad")],
+)  # fmt: skip
+def test_angles_are_shown_in_the_unit_of_the_log(units: tuple[str, ...], unit: str) -> None:
+    assert angle_unit(units) == unit
+
+
+def test_a_record_knows_the_unit_of_its_angles(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
+    names = {"time": "time [s]", "u": "u [N.m]", "theta_m": "theta_m [rev]", "theta_l": "theta_l [deg]"}
+    scaled = columns | {"theta_m": columns["theta_m"] / (2 * np.pi), "theta_l": np.degrees(columns["theta_l"])}
+    path = tmp_path / "log.csv"
+    rows = zip(*(scaled[name].tolist() for name in names), strict=True)
+    path.write_text("\n".join([",".join(names.values()), *(",".join(map(repr, row)) for row in rows)]))
+    assert read_record(path).angle_unit == "deg"

@@ -1,9 +1,12 @@
 """From the results of `diagnose` and `estimate`, which start from a record, to their pages."""
 
+import numpy as np
 import pytest
 
-from orchestrator.reporting import Bars, Facts, Picture, Plot, ReportTable, Text, report_from_directory, write_report
+from orchestrator.errors import ScenarioError
+from orchestrator.reporting import Bars, Facts, Plot, ReportTable, Text, report_from_directory, write_report
 from orchestrator.shared.output import write_result
+from tests.support.page_results import INSPECT
 from tests.support.reports import sections
 
 
@@ -47,8 +50,17 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
         "t": 12.0,
         "family": ["stribeck_friction@motor"],
         "lowered_by": ["explained"],
-    }
-    hint = effect | {"name": "load_torque", "site": "load", "grade": "possible", "family": [], "lowered_by": ["size"]}
+        "block_values": {"torque": [1.4, 1.6, None, 1.5], "phase": [0.1, 0.2]},
+        "missing_torque": {
+            "x_label": "motor speed [rad/s]", "y_label": "torque at the motor [N.m]", "x": [-1.0, None, 1.0],
+            "missing": [-1.5, None, 1.6], "law": [-1.4, None, 1.4], "spread": [0.1, None, 0.2],
+        },
+    }  # fmt: skip
+    hint = (
+        effect
+        | {"missing_torque": None, "block_values": {}}
+        | {"name": "load_torque", "site": "load", "grade": "possible", "family": [], "lowered_by": ["size"]}
+    )
     test = {
         "source": "record.csv", "rows": 300, "misfit": {"theta_m": MISFIT}, "worse": True,
         "r_squared": {"theta_m": 0.99},
@@ -71,7 +83,6 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
         ],
     }
     write_result(tmp_path, "diagnose", {"data": "record.csv"}, None, results)
-    (tmp_path / "diagnose_missing_torque.png").write_bytes(b"png")
     (tmp_path / "diagnose.csv").write_text("time,theta_m,theta_m_before,theta_m_after\n0,0,0,0\n1,1,1.1,1.001\n")
     report = report_from_directory(tmp_path)
     assert "The model lacks Coulomb friction at the motor (likely)." in report.summary
@@ -95,8 +106,20 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     (bars,) = sections(report, Bars)
     assert [b.length for b in bars.items] == [1.0, 0.5, pytest.approx(0.01)]
     assert bars.items[2].text == "1.11 times noise"
-    assert [p.path.name for p in sections(report, Picture)] == ["diagnose_missing_torque.png"]
-    assert "data:image/png;base64,cG5n" in write_report(tmp_path).read_text()
+    missing, law = plots["Missing torque: Coulomb friction at the motor"].series
+    assert (missing.kind, law.kind) == ("points", "line")
+    np.testing.assert_allclose(missing.low, [-1.6, np.nan, 1.4])
+    np.testing.assert_allclose(missing.high, [-1.4, np.nan, 1.8])
+    assert plots["Missing torque: Coulomb friction at the motor"].x_label == "motor speed [rad/s]"
+    assert [title for title in plots if title.startswith(("Missing", "Block"))] == [
+        "Missing torque: Coulomb friction at the motor", "Block by block: Coulomb friction at the motor, torque",
+    ]  # fmt: skip
+    blocks = plots["Block by block: Coulomb friction at the motor, torque"].series
+    assert {s.name: list(s.y) for s in blocks} == {
+        "of each block by itself": [1.4, 1.6, None, 1.5], "of all": [1.5, 1.5], "95 % from": [1.4, 1.4],
+        "to": [1.6, 1.6],
+    }  # fmt: skip
+    assert "Missing torque" in write_report(tmp_path).read_text()
     assert [s.name for s in plots["Motor angle"].series] == ["measured", "before", "after"]
     before, after = plots["Motor angle: simulated minus measured"].series
     assert list(before.y) == [0.0, pytest.approx(0.1)]
@@ -235,12 +258,23 @@ def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delive
         "remaining": {"outputs": {"theta_m": 0.01}, "follows": []},
         "delivery": [{"file": "corrected.ssp", "parts": [part], "difference_over_noise": 0.5, "note": ""}],
         "runs": 1994,
+        "test": [{"source": "a.csv", "rows": 2, "misfit": {"theta_m": MISFIT}, "worse": False}],
+        "test_start": 2.0,
     }
     write_result(tmp_path, "diagnose", {}, None, results)
+    head = "time,u,theta_m,theta_m_nominal,theta_m_refitted,theta_m_corrected\n"
+    (tmp_path / "diagnose.csv").write_text(f"{head}0,1,0,0,0,0\n1,1,1,1.5,1.2,1\n2,1,2,3,nan,2\n3,1,3,4,nan,3\n")
     report = report_from_directory(tmp_path)
     assert report.summary == "The log has coulomb friction at the axis."
     assert report.badge == ("warn", "amber: effects are missing")
     texts = {text.title: text.paragraphs for text in sections(report, Text)}
+    difference, output = sections(report, Plot)
+    assert (difference.title, output.title) == ("theta_m: simulated minus measured", "theta_m")
+    assert [s.name for s in output.series] == [
+        "measured", "model as given", "with re-fitted parameters", "with the effects",
+    ]  # fmt: skip
+    np.testing.assert_allclose(difference.series[1].y, [0.0, 0.2, np.nan, np.nan])
+    assert [(s.start, s.end, s.name) for s in output.spans] == [(2.0, 3.0, "test data")]
     assert texts["In words"] == ("What is left follows nothing.",)
     assert texts["Take note"] == ("the record is short",)
     (left,) = sections(report, Facts)
@@ -249,3 +283,24 @@ def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delive
     assert tables["What is missing"][0][:4] == ("coulomb friction", "axis", "certain", "level")
     assert tables["Corrected system"][0][:3] == ("corrected.ssp", "coulomb_friction@axis", 0.5)
     assert ("runs of the FMU", 1994) in report.origin
+
+
+def test_the_page_of_an_inspection_plots_the_whole_record_in_the_log_s_unit(tmp_path):
+    write_result(tmp_path, "inspect", {}, None, INSPECT | {"record": INSPECT["record"] | {"angle_unit": "deg"}})
+    time = 0.01 * np.arange(5000)
+    theta_m = np.sin(time)
+    theta_m[7] = np.nan
+    np.savez(tmp_path / "inspect_record.npz", time=time, theta_m=theta_m, u=np.cos(time))
+    report = report_from_directory(tmp_path)
+    plots = {plot.title: plot for plot in sections(report, Plot)}
+    assert list(plots) == ["Motor angle", "Requested torque", "Excitation by frequency"]
+    np.testing.assert_array_equal(plots["Motor angle"].series[0].y, theta_m)
+    assert plots["Requested torque"].series[0].kind == "steps"
+    assert report.angle_unit == "deg"
+
+
+def test_a_damaged_record_beside_a_result_is_one_clear_error(tmp_path):
+    write_result(tmp_path, "inspect", {}, None, INSPECT)
+    (tmp_path / "inspect_record.npz").write_bytes(b"PK no archive")
+    with pytest.raises(ScenarioError, match=r"inspect_record\.npz must be a NumPy file with numbers"):
+        report_from_directory(tmp_path)

@@ -136,14 +136,19 @@ def _misses(workings: FmuWorkings, point: ModelPoint, problem: FmuProblem, first
     return np.asarray(np.sqrt(np.mean((problem.data.outputs - y)[first:] ** 2, axis=0)))
 
 
+def first_test(workings: FmuWorkings) -> tuple[FmuProblem, int]:
+    """Return the first record with a test part, and its first row of that; without one the first record and its end."""
+    first = next(((problem, row) for problem, row in _test_problems(workings) if row > 0), None)
+    return (workings.problem, workings.problem.n) if first is None else first
+
+
 def stage_runs(workings: FmuWorkings) -> tuple[FmuProblem, dict[str, Array], int]:
     """Return the runs of the three models over the first record as a whole, for figures.
 
     Returns:
         FMU and record, outputs (n, outputs) by the model's name, and the first row of the test part.
     """
-    first = next(((problem, row) for problem, row in _test_problems(workings) if row > 0), None)
-    problem, row = (workings.problem, workings.problem.n) if first is None else first
+    problem, row = first_test(workings)
     runs = problem.simulate(workings.models)
     empty = np.full(problem.data.outputs.shape, np.nan)
     return problem, {name: empty if y is None else y for name, y in zip(STAGES, runs, strict=True)}, row

@@ -8,20 +8,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.report.corrected import BeforeAfter
+from orchestrator.diagnosis.report.missing_torque import effect_row, missing_torques
 from orchestrator.diagnosis.report.words import effect_words
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect
-from orchestrator.plants.effects import Effect
 from orchestrator.shared.drawing import BLUE, GREY, ORANGE
 
-Array = NDArray[np.float64]
 DPI = 130
 TITLE_WIDTH = 90  # characters of a line
-BINS = 40
-WIDEST_GAP = 0.2  # of what a signal takes: no line is drawn over values that it does not take
 SHOWN = 6  # effects of a step that are drawn
 
 
@@ -110,81 +105,32 @@ def _draw_blocks(path: Path, diagnosis: Diagnosis) -> None:
 
 
 def _sizes(effect: GradedEffect, diagnosis: Diagnosis) -> list[str]:
-    row = _row(effect, diagnosis)
+    row = effect_row(effect, diagnosis)
     return [name for name in effect.block_values if name == row.size or name in row.amplitudes]
-
-
-def _row(effect: GradedEffect, diagnosis: Diagnosis) -> Effect:
-    return next(row for row in diagnosis.model.plant.bank if row.label == effect.label)
 
 
 def _draw_missing(path: Path, diagnosis: Diagnosis) -> None:
     """Draw, for each effect, the torque that is missing without it and the part of it that its law accounts for."""
-    labels = set(diagnosis.workings.search.final.labels)  # which has no gap that the estimator found
-    effects = [effect for effect in diagnosis.effects if effect.label in labels]
-    if not effects:
+    curves = list(missing_torques(diagnosis))
+    if not curves:
         return
-    figure = Figure(figsize=(8.0, 3.4 * len(effects)), layout="constrained")
+    grades = {effect.label: effect.grade.word for effect in diagnosis.effects}
+    figure = Figure(figsize=(8.0, 3.4 * len(curves)), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(len(effects), 1, squeeze=False)[:, 0]
-    for axis, effect in zip(axes, effects, strict=True):
-        _draw_effect(axis, diagnosis, effect)
-        axis.set_title(f"{effect_words(effect.label)}: {effect.grade.word}")
+    axes = figure.subplots(len(curves), 1, squeeze=False)[:, 0]
+    for axis, curve in zip(axes, curves, strict=True):
+        if curve.spread is None:
+            axis.plot(curve.x, curve.missing, color=ORANGE, linewidth=1.2, label="missing torque")
+            axis.plot(curve.x, curve.law, color=BLUE, linewidth=1.0, label="of it the effect")
+        else:
+            axis.plot(curve.x, curve.law, "-", color=BLUE, linewidth=1.4, label="of it the effect, mean")
+            axis.errorbar(curve.x, curve.missing, curve.spread, color=ORANGE, fmt="o", markersize=3.5, linewidth=0.8,
+                          label="missing torque, mean and spread")  # fmt: skip
+        axis.set_xlabel(curve.x_label)
+        axis.set_ylabel(curve.y_label)
+        axis.set_title(f"{effect_words(curve.label)}: {grades[curve.label]}")
     _finish(list(axes))
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
-
-
-def _draw_effect(axis: Axes, diagnosis: Diagnosis, effect: GradedEffect) -> None:
-    balance, found = diagnosis.workings.balances[0], diagnosis.workings.search
-    point = found.problem.record_points(found.final.point)[0]
-    with_it = balance.balance(balance.values_at(point))
-    without = balance.balance(balance.values_at(point.without_effects([effect.label])))
-    bodies = [n for n, name in enumerate(balance.channels) if name == effect.site]
-    channel = bodies[0] if bodies else int(np.argmax(np.mean((without - with_it) ** 2, axis=1)))
-    inner = slice(balance.size // 20, -(balance.size // 20))
-    cutoff = balance.cutoffs[channel]
-    missing, left = (smooth(values[channel], balance.step, cutoff)[inner] for values in (without, with_it))
-    missing, law = -missing, left - missing
-    x, label = _abscissa(diagnosis, effect, channel)
-    x = x[inner]
-    force = diagnosis.test[0].signals[0].unit == "m"
-    if label.startswith("time"):
-        shown = slice(0, min(x.size, round(4.0 / balance.step)))
-        axis.plot(x[shown], missing[shown], color=ORANGE, linewidth=1.2, label="missing torque")
-        axis.plot(x[shown], law[shown], color=BLUE, linewidth=1.0, label="of it the effect")
-    else:
-        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
-        at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
-        counts = np.maximum(np.bincount(at, minlength=edges.size - 1), 1)
-        centre, mean, fitted = (np.bincount(at, values, edges.size - 1) / counts for values in (x, missing, law))
-        spread = np.sqrt(np.maximum(np.bincount(at, missing**2, edges.size - 1) / counts - mean**2, 0.0))
-        gaps = np.flatnonzero(np.diff(centre) > WIDEST_GAP * np.ptp(centre)) + 1
-        broken = [np.insert(values, gaps, np.nan) for values in (centre, fitted)]
-        axis.plot(*broken, "-", color=BLUE, linewidth=1.4, label="of it the effect, mean")
-        axis.errorbar(centre, mean, spread, color=ORANGE, fmt="o", markersize=3.5, linewidth=0.8,
-                      label="missing torque, mean and spread")  # fmt: skip
-    axis.set_xlabel(label)
-    axis.set_ylabel(f"{'force' if force else 'torque'} at the {balance.channels[channel]} [{'N' if force else 'N.m'}]")
-
-
-def _abscissa(diagnosis: Diagnosis, effect: GradedEffect, channel: int) -> tuple[Array, str]:
-    balance, row, unit = diagnosis.workings.balances[0], _row(effect, diagnosis), diagnosis.test[0].signals[0].unit
-    scales = balance.scales
-    site = effect.site if effect.site in scales.speeds else balance.channels[channel]
-    if row.against == "speed":
-        return scales.speeds[site], f"{site} speed [{unit}/s]"
-    if row.wave_site:
-        cycles = effect.parameters["cycles_per_rev"].value
-        return np.mod(cycles * scales.angles[row.wave_site], 2.0 * np.pi), "phase of the cycle [rad]"
-    if row.against == "angle":
-        angle = scales.angles[site]
-        turns = np.ptp(angle) > 2.0 * np.pi
-        return np.mod(angle, 2.0 * np.pi) if turns else angle, "load angle [rad]"
-    if row.against == "position":
-        return scales.angles[site], f"load position [{unit}]"
-    if effect.site == "shaft" and scales.twist.size:
-        return scales.twist, "twist [rad]"
-    return np.asarray(balance.step * np.arange(balance.size)), "time [s]"
 
 
 def _draw_law(path: Path, diagnosis: Diagnosis) -> None:

@@ -3,6 +3,9 @@
 import math
 from collections.abc import Mapping
 
+import msgspec
+
+from orchestrator.diagnosis.report.missing_torque import Array, MissingTorque, missing_torques
 from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit, ValueEstimate
 from orchestrator.diagnosis.selection.outcome import Dependence, SearchResult
@@ -14,6 +17,7 @@ from orchestrator.shared.results.diagnose import (
     EffectFound,
     ExplainedFound,
     LearnedFound,
+    MissingTorqueFound,
     NuisanceFound,
     ParameterFound,
     RemainingFound,
@@ -29,9 +33,13 @@ from orchestrator.shared.settings import as_tables
 def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
     """Return the results for ``diagnose.json``, as far as the diagnosis knows them."""
     play, law = play_of(diagnosis), diagnosis.law
+    curves = {curve.label: _missing_torque(curve) for curve in missing_torques(diagnosis)}
     return DiagnoseFound(
         verdict=diagnosis.verdict,
-        effects=tuple(effect_found(effect) for effect in diagnosis.effects),
+        effects=tuple(
+            msgspec.structs.replace(effect_found(effect), missing_torque=curves.get(effect.label))
+            for effect in diagnosis.effects
+        ),
         play=None if play is None else play.to_result(),
         nuisances=tuple(NuisanceFound(n.name, n.grade.word, _values(n.parameters)) for n in diagnosis.nuisances),
         parameters={
@@ -88,6 +96,16 @@ def effect_found(effect: GradedEffect) -> EffectFound:
         _finite(evidence.gain), _finite(evidence.t), evidence.family, effect.lowered_by,
         {name: tuple(map(_finite, values)) for name, values in effect.block_values.items()}, effect.in_model,
     )  # fmt: skip
+
+
+def _missing_torque(curve: MissingTorque) -> MissingTorqueFound:
+    x, missing, law = map(_rounded, (curve.x, curve.missing, curve.law))
+    spread = None if curve.spread is None else _rounded(curve.spread)
+    return MissingTorqueFound(curve.x_label, curve.y_label, x, missing, law, spread)
+
+
+def _rounded(values: Array) -> tuple[float | None, ...]:
+    return tuple(_finite(float(f"{value:.6g}")) for value in values.tolist())
 
 
 def _values(parameters: Mapping[str, ValueEstimate]) -> dict[str, ValueFound]:

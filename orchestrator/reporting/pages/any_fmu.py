@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import msgspec
 
-from orchestrator.reporting.model import Badge, Cell, Facts, Picture, Report, Section, Text
+from orchestrator.reporting.model import Badge, Cell, Facts, Plot, Report, Section, Series, Span, Text
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import ResultDocument, table_of, words
 from orchestrator.reporting.trust import trust_badge, trust_section
@@ -18,6 +18,7 @@ VERDICTS: Mapping[str, tuple[Badge, str]] = {
     "effects": ("neutral", "effects are missing"),
     "unknown": ("bad", "unexplained"),
 }
+STAGES = {"nominal": "model as given", "refitted": "with re-fitted parameters", "corrected": "with the effects"}
 KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
 
 
@@ -73,17 +74,30 @@ def _rows(effect: EffectFound) -> list[dict[str, object]]:
 
 
 def _misfit(results: FmuDiagnosisFound, source: ResultDocument) -> list[Section]:
-    """Return the misfit as a table and as a picture."""
+    """Return the misfit as a table, and the outputs over the first record."""
     rows = [
         {"record": test.source, "output": name, **msgspec.structs.asdict(values)}
         for test in (*results.test, *([results.validation] if results.validation else []))
         for name, values in test.misfit.items()
     ]
     sections: list[Section] = [table_of("Misfit of runs on data that nothing was fitted to", rows)] if rows else []
-    picture = source.directory / "diagnose_signals.png"
-    if picture.is_file():
-        sections.append(Picture("Measured and simulated", picture, "Shaded: test data."))
-    return sections
+    return [*sections, *_output_plots(results, source)]
+
+
+def _output_plots(results: FmuDiagnosisFound, source: ResultDocument) -> list[Section]:
+    """Return each output, measured and simulated, and what each simulation misses of it; shaded: test data."""
+    table = source.signals("diagnose.csv")
+    units = {name: misfit.unit for test in results.test for name, misfit in test.misfit.items()}
+    made: list[Section] = []
+    for name in (n for n in units if n in table and "time" in table):
+        time, unit = table["time"], units[name]
+        test = () if results.test_start is None else (Span(results.test_start, float(time[-1]), "test data"),)
+        runs = {word: table[f"{name}_{stage}"] for stage, word in STAGES.items() if f"{name}_{stage}" in table}
+        left = tuple(Series(word, time, run - table[name]) for word, run in runs.items())
+        both = (Series("measured", time, table[name]), *(Series(word, time, run) for word, run in runs.items()))
+        made.append(Plot(f"{name}: simulated minus measured", "time [s]", f"difference [{unit}]", left, test))
+        made.append(Plot(name, "time [s]", f"{name} [{unit}]", both, test))
+    return made
 
 
 def _search_sections(results: FmuDiagnosisFound) -> list[Section]:

@@ -5,16 +5,19 @@ left.
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from orchestrator.reporting.model import (
     Badge,
     Bar,
     Bars,
     Cell,
     Facts,
-    Picture,
+    Plot,
     Report,
     ReportTable,
     Section,
+    Series,
     TableColumn,
     Text,
 )
@@ -47,8 +50,9 @@ VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "effects": ("neutral", "effects are missing", ""),
     "unknown": ("bad", "unexplained", "Something is missing in the model, and no effect of the library is likely."),
 }
-MISSING = "For each effect: the torque that the model misses without it, and how much of that its law accounts for."
-BLOCKS = "The size of each effect as every block of the record by itself says it. Where blocks agree, a size is sure."
+MISSING = "The torque that the model misses without the effect, and how much of that its law accounts for."
+BLOCKS = "The size as every block of the record by itself says it. Where blocks agree, a size is sure."
+UNSIZED = frozenset({"phase", "cycles_per_rev"})  # parameters that are no sizes
 TAKES = "error on blocks left out that it removes [%]"
 TEST = "Root mean square of free runs minus measured, on data that nothing was fitted to and nothing was chosen by."
 
@@ -69,9 +73,8 @@ def build(source: ResultDocument) -> Report:
     if results.validation is not None:
         sections.append(_test_table(f"Misfit on the other record, {results.validation.source}", results.validation))
     sections += _torque_left([*results.test, *([results.validation] if results.validation else [])])
-    sections += _figure(source, "missing_torque", "Missing torque", MISSING)
-    sections += _figure(source, "blocks", "Sizes block by block", BLOCKS)
-    sections += [*_residual_sections(results.remaining), *_law_sections(source, results.learned_law)]
+    sections += [*_missing_plots(results.effects), *_block_plots(results.effects)]
+    sections += [*_residual_sections(results.remaining), *_law_sections(results.learned_law)]
     metric = any(signal.unit == "m" for test in results.test for signal in test.misfit.values())
     sections += record_plots(source, "diagnose.csv", live.rows if live else (), metric)
     sections += [_parameter_table(results.parameters), *_candidate_table(results.candidates), *_analysis(results)]
@@ -83,6 +86,7 @@ def build(source: ResultDocument) -> Report:
         sections=tuple(sections),
         origin=source.origin(("corrected model", results.model), ("time taken [s]", results.seconds)),
         downloads=source.downloads(),
+        angle_unit=results.angle_unit,
     )
 
 
@@ -212,10 +216,43 @@ def _torque_left(tests: Sequence[TestFound]) -> list[Section]:
     return [ReportTable("Torque that is left", columns, rows, note)] if rows else []
 
 
-def _figure(source: ResultDocument, name: str, title: str, note: str) -> list[Section]:
-    """Return a figure of the diagnosis, where there is one."""
-    path = source.directory / f"diagnose_{name}.png"
-    return [Picture(title, path, note)] if path.is_file() else []
+def _missing_plots(effects: Sequence[EffectFound]) -> list[Section]:
+    """Return for each effect the torque that is missing without it, and what its law accounts for."""
+    made: list[Section] = []
+    for effect in effects:
+        curve = effect.missing_torque
+        if curve is None:
+            continue
+        missing = Series("missing torque", curve.x, curve.missing)
+        if curve.spread is not None:
+            mean, spread = (np.array(values, dtype=float) for values in (curve.missing, curve.spread))
+            missing = Series("missing torque, mean and spread", curve.x, mean, "points", mean - spread, mean + spread)
+        law = Series("of it the effect", curve.x, curve.law)
+        title = f"Missing torque: {_place_words(effect.name, effect.site)}"
+        made.append(Plot(title, curve.x_label, curve.y_label, (missing, law), note=MISSING))
+    return made
+
+
+def _block_plots(effects: Sequence[EffectFound]) -> list[Section]:
+    """Return the size of each effect as every block of the record by itself says it."""
+    made: list[Section] = []
+    for effect in effects:
+        for name, values in effect.block_values.items():
+            size = effect.parameters.get(name)
+            if name in UNSIZED or size is None or len(values) < 2:
+                continue
+            blocks = list(range(1, len(values) + 1))
+            low, high = size.interval or (None, None)
+            series = [Series("of each block by itself", blocks, values, "points")]
+            series += [
+                Series(label, (blocks[0], blocks[-1]), (value, value))
+                for label, value in (("of all", size.value), ("95 % from", low), ("to", high))
+                if value is not None
+            ]
+            label = f"{words(name)} [{size.unit or '1'}]"
+            title = f"Block by block: {_place_words(effect.name, effect.site)}, {words(name)}"
+            made.append(Plot(title, "block of the record", label, tuple(series), note=BLOCKS))
+    return made
 
 
 def _residual_sections(remaining: RemainingFound) -> list[Section]:
@@ -235,19 +272,20 @@ def _residual_sections(remaining: RemainingFound) -> list[Section]:
     return made
 
 
-def _law_sections(source: ResultDocument, law: LearnedFound | None) -> list[Section]:
+def _law_sections(law: LearnedFound | None) -> list[Section]:
     """Return the law that was learned from what no effect explains: sentence, curve and knots."""
-    figure = _figure(source, "learned_law", "The strongest curve of what is left", "")
     if law is None:
-        return figure
+        return []
     columns = (
         TableColumn("argument", law.argument_unit),
         *(TableColumn(name, law.unit) for name in ("value", "95 % from", "to")),
     )
     rows = tuple(zip(law.knots, law.values, *law.band, strict=True))
+    curve = Series("torque that is left, with its 95 % band", law.knots, law.values, "line", *law.band)
+    x_label = f"{law.argument} at the {law.site} [{law.argument_unit}]"
     return [
         Text("A law learned from what is left", (_sentence(law.words), *_in_the_fmu(law))),
-        *figure,
+        Plot("The strongest curve of what is left", x_label, f"torque [{law.unit}]", (curve,)),
         ReportTable("Knots of the learned law", columns, rows),
     ]
 

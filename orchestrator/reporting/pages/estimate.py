@@ -55,7 +55,8 @@ def build(source: ResultDocument) -> Report:
     sections += _design(source, results.design or ())
     sections += _diagnostics(found)
     badge, summary = _answer(results)
-    return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads())
+    unit = results.record.angle_unit if results.record else "rad"
+    return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads(), unit)
 
 
 def _diagnosis_sections(results: EstimateFound) -> list[Section]:

@@ -2,12 +2,13 @@
 
 from typing import Any
 
-from orchestrator.reporting.model import Badge, Facts, Picture, Report, ReportTable, Section, TableColumn, Text
+from orchestrator.reporting.model import Badge, Facts, Plot, Report, ReportTable, Section, Series, TableColumn, Text
+from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
 from orchestrator.shared.results.inspect import InspectFound
 
-PICTURE = "inspect_record.png"
+RECORD = "inspect_record.npz"
 
 
 def build(source: ResultDocument) -> Report:
@@ -17,8 +18,8 @@ def build(source: ResultDocument) -> Report:
     if results.assumed:
         sections.append(Text("Assumed: put right in the model file", results.assumed))
     sections.append(Text("How the file was read", results.record.notes))
-    if (source.directory / PICTURE).is_file():
-        sections.append(Picture("The record", source.directory / PICTURE))
+    sections += record_plots(source, RECORD)
+    sections += _spectrum(results)
     tables = (_excitation(results), _gaps(results), _effects(results))
     sections += [_facts(results), _channels(results), *(t for t in tables if t.rows)]
     sections += _better(results)
@@ -29,6 +30,7 @@ def build(source: ResultDocument) -> Report:
         _badge(results),
         source.origin(),
         source.downloads(),
+        results.record.angle_unit,
     )
 
 
@@ -79,6 +81,16 @@ def _excitation(results: InspectFound) -> ReportTable:
     return ReportTable(
         "Excitation", columns, rows, "Coherence: how far the motor's motion follows the torque in the band."
     )
+
+
+def _spectrum(results: InspectFound) -> list[Section]:
+    """Return the torque's power by frequency."""
+    bands = results.excitation
+    if not bands:
+        return []
+    shares = Series("share of the torque's power", list(range(len(bands))), [100.0 * b.share for b in bands], "bars")
+    names = tuple(f"{b.low:g} to {b.high:g}" for b in bands)
+    return [Plot("Excitation by frequency", "band [Hz]", "share of the power [%]", (shares,), categories=names)]
 
 
 def _gaps(results: InspectFound) -> ReportTable:

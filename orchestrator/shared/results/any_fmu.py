@@ -33,7 +33,10 @@ class DeliveredFound(msgspec.Struct, frozen=True):
 
 
 class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):
-    """``diagnose`` of any FMU: graded effects, misfit on test data, what was delivered, and how it was found."""
+    """``diagnose`` of any FMU: graded effects, misfit on test data, what was delivered, and how it was found.
+
+    ``test_start``: from which time on the first record is test data [s].
+    """
 
     schema_version: int = 3
     kind: Literal["fmu"] = "fmu"
@@ -52,6 +55,7 @@ class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):
     step_cost: float | None = None
     walls: str = ""
     runs: int | None = None
+    test_start: float | None = None
     summary: tuple[str, ...] = ()
     seconds: float | None = None
 

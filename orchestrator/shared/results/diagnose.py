@@ -34,13 +34,27 @@ class ExplainedFound(msgspec.Struct, frozen=True):
     test_torque: float | None = None
 
 
+class MissingTorqueFound(msgspec.Struct, frozen=True):
+    """The torque that is missing without an effect, over the signal that its law follows, and what of it is the law's.
+
+    ``spread`` is the standard deviation within bins of the signal, None over the time. None within: a wide gap.
+    """
+
+    x_label: str
+    y_label: str
+    x: tuple[float | None, ...]
+    missing: tuple[float | None, ...]
+    law: tuple[float | None, ...]
+    spread: tuple[float | None, ...] | None = None
+
+
 class EffectFound(msgspec.Struct, frozen=True):
     """An effect that the model lacks.
 
     ``grade`` is certain, likely or possible; ``lowered_by`` names the rules that lowered it. ``gain`` is the share of
     the squared error of blocks left out that it takes, ``t`` that gain over its standard error. ``family`` are
     effects that this record does not tell from it, ``block_values`` what each block by itself says of a parameter.
-    ``in_model``: the corrected model has it.
+    ``in_model``: the corrected model has it. ``missing_torque``: what its figure shows.
     """
 
     name: str
@@ -54,6 +68,7 @@ class EffectFound(msgspec.Struct, frozen=True):
     lowered_by: tuple[str, ...] = ()
     block_values: dict[str, tuple[float | None, ...]] = {}
     in_model: bool = True
+    missing_torque: MissingTorqueFound | None = None
 
 
 class NuisanceFound(msgspec.Struct, frozen=True):
@@ -201,5 +216,6 @@ class DiagnoseFound(ResultData, frozen=True, kw_only=True):
     candidates: tuple[StepFound, ...] = ()
     cosimulation: DifferenceFound = DifferenceFound()
     live: LiveFound | None = None
+    angle_unit: str = "rad"
     summary: tuple[str, ...] = ()
     seconds: float | None = None

@@ -29,13 +29,14 @@ class MethodFound(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 class RecordFound(msgspec.Struct, frozen=True):
-    """A record: rows, sample time [s], where it is from, rows with missing samples, and what was assumed."""
+    """A record: rows, sample time [s], source, rows with missing samples, what was assumed, and the file's angles."""
 
     rows: int
     step: float
     source: str
     missing: int = 0
     notes: tuple[str, ...] = ()
+    angle_unit: str = "rad"
 
 
 class RepeatsFound(msgspec.Struct, frozen=True):

@@ -1,0 +1,102 @@
+"""For each effect the torque that the model misses without it, and what of that its law accounts for."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.data.signals import smooth
+from orchestrator.diagnosis.result import Diagnosis, GradedEffect
+from orchestrator.plants.effects import Effect
+
+Array = NDArray[np.float64]
+BINS = 40
+WIDEST_GAP = 0.2  # of what a signal takes: no line is drawn over values that it does not take
+SHOWN_SECONDS = 4.0  # of an effect that follows the time
+
+
+@dataclass(frozen=True)
+class MissingTorque:
+    """The missing torque over the signal that an effect's law follows: means of bins, or values over the time.
+
+    Attributes:
+        label: of the effect.
+        x_label: signal and unit.
+        y_label: torque or force, its place and unit.
+        x: (n,) NaN where the signal leaves a wide gap.
+        missing: (n,) what is missing without the effect.
+        law: (n,) what of it the law accounts for.
+        spread: (n,) standard deviation within the bins; None over the time.
+    """
+
+    label: str
+    x_label: str
+    y_label: str
+    x: Array
+    missing: Array
+    law: Array
+    spread: Array | None
+
+
+def missing_torques(diagnosis: Diagnosis) -> Iterator[MissingTorque]:
+    """Yield the missing torque of each effect of the final model; a gap that the estimator found has none."""
+    labels = set(diagnosis.workings.search.final.labels)
+    return (_missing_torque(diagnosis, effect) for effect in diagnosis.effects if effect.label in labels)
+
+
+def effect_row(effect: GradedEffect, diagnosis: Diagnosis) -> Effect:
+    """Return an effect's row of the plant's bank."""
+    return next(row for row in diagnosis.model.plant.bank if row.label == effect.label)
+
+
+def _missing_torque(diagnosis: Diagnosis, effect: GradedEffect) -> MissingTorque:
+    balance, found = diagnosis.workings.balances[0], diagnosis.workings.search
+    point = found.problem.record_points(found.final.point)[0]
+    with_it = balance.balance(balance.values_at(point))
+    without = balance.balance(balance.values_at(point.without_effects([effect.label])))
+    bodies = [n for n, name in enumerate(balance.channels) if name == effect.site]
+    channel = bodies[0] if bodies else int(np.argmax(np.mean((without - with_it) ** 2, axis=1)))
+    inner = slice(balance.size // 20, -(balance.size // 20))
+    cutoff = balance.cutoffs[channel]
+    missing, left = (smooth(values[channel], balance.step, cutoff)[inner] for values in (without, with_it))
+    missing, law = -missing, left - missing
+    x, x_label = _abscissa(diagnosis, effect, channel)
+    x = x[inner]
+    force = diagnosis.test[0].signals[0].unit == "m"
+    y_label = f"{'force' if force else 'torque'} at the {balance.channels[channel]} [{'N' if force else 'N.m'}]"
+    if x_label.startswith("time"):
+        shown = slice(0, min(x.size, round(SHOWN_SECONDS / balance.step)))
+        return MissingTorque(effect.label, x_label, y_label, x[shown], missing[shown], law[shown], None)
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+    at = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
+    counts = np.maximum(np.bincount(at, minlength=edges.size - 1), 1)
+    centre, mean, fitted = (np.bincount(at, values, edges.size - 1) / counts for values in (x, missing, law))
+    spread = np.sqrt(np.maximum(np.bincount(at, missing**2, edges.size - 1) / counts - mean**2, 0.0))
+    gaps = np.flatnonzero(np.diff(centre) > WIDEST_GAP * np.ptp(centre)) + 1
+    parts = (np.insert(values, gaps, np.nan) for values in (centre, mean, fitted, spread))
+    return MissingTorque(effect.label, x_label, y_label, *parts)
+
+
+def _abscissa(diagnosis: Diagnosis, effect: GradedEffect, channel: int) -> tuple[Array, str]:
+    balance, row, unit = (
+        diagnosis.workings.balances[0],
+        effect_row(effect, diagnosis),
+        diagnosis.test[0].signals[0].unit,
+    )
+    scales = balance.scales
+    site = effect.site if effect.site in scales.speeds else balance.channels[channel]
+    if row.against == "speed":
+        return scales.speeds[site], f"{site} speed [{unit}/s]"
+    if row.wave_site:
+        cycles = effect.parameters["cycles_per_rev"].value
+        return np.mod(cycles * scales.angles[row.wave_site], 2.0 * np.pi), "phase of the cycle [rad]"
+    if row.against == "angle":
+        angle = scales.angles[site]
+        turns = np.ptp(angle) > 2.0 * np.pi
+        return np.mod(angle, 2.0 * np.pi) if turns else angle, "load angle [rad]"
+    if row.against == "position":
+        return scales.angles[site], f"load position [{unit}]"
+    if effect.site == "shaft" and scales.twist.size:
+        return scales.twist, "twist [rad]"
+    return np.asarray(balance.step * np.arange(balance.size)), "time [s]"
