@@ -14,20 +14,19 @@ same, the model file states the unit.
 In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
-from .bristles import bent_sign, has_settled, leaving_speed
-from .drive_request import UNASKED, request_rate
-from .drivetrain_parameters import BIG
-from .effects import (
+from .laws.bristles import bent_sign, has_settled, leaving_speed
+from .laws.drive import UNASKED, request_rate
+from .laws.friction import (
+    breakaway,
     bristle_rate,
     dependent_friction,
     directional_friction,
-    end_stop_torque,
-    periodic,
-    periodic_slope,
     quadratic_drag,
     sliding_friction,
-    spring_torque,
 )
+from .laws.stops import end_stop_torque, spring_torque
+from .laws.waves import inertia_at, inertia_torque, periodic
+from .parameter_rows import BIG
 from .servo_axis_parameters import AxisParameters
 
 State = tuple[float, float, float, float, float]
@@ -104,13 +103,8 @@ def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
             x[0], x[1], p.end_stop_lower, p.end_stop_upper, p.end_stop_stiffness, p.end_stop_dissipation
         )
     if p.varying_inertia_amplitude != 0.0:
-        torque -= (
-            0.5
-            * periodic_slope(
-                x[0], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
-            )
-            * x[1]
-            * x[1]
+        torque -= inertia_torque(
+            x[0], x[1], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
         )
     return torque
 
@@ -119,10 +113,7 @@ def inertia(x: State, p: Parameters) -> float:
     """Return the inertia [kg.m2] at a position; a wave larger than it leaves a thousandth of it."""
     if p.varying_inertia_amplitude == 0.0:
         return p.J
-    return max(
-        1e-3 * p.J,
-        p.J + periodic(x[0], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase),
-    )
+    return inertia_at(p.J, x[0], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase)
 
 
 def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
@@ -141,17 +132,19 @@ def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
     return (x[1], accelerated, lag, 0.0, follows)
 
 
-def rest(p: Parameters) -> float:
+def breakaway_torque(p: Parameters) -> float:
     """Return the breakaway torque [N.m] without what depends on the position."""
-    return p.coulomb_friction_motor_torque + max(p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway)
+    return breakaway(
+        p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway
+    )
 
 
 def capacity(x: State, p: Parameters) -> float:
     """Return the breakaway torque [N.m] below which an axis that stands still keeps standing."""
     if p.periodic_friction_motor_amplitude == 0.0:
-        return rest(p)
+        return breakaway_torque(p)
     return dependent_friction(
-        rest(p),
+        breakaway_torque(p),
         0.0,
         0.0,
         x[0],
@@ -163,12 +156,12 @@ def capacity(x: State, p: Parameters) -> float:
 
 def builds_up(p: Parameters) -> bool:
     """Tell whether friction builds up over a distance."""
-    return p.presliding_motor_distance > 0.0 and rest(p) > 0.0
+    return p.presliding_motor_distance > 0.0 and breakaway_torque(p) > 0.0
 
 
 def reach(x: State, p: Parameters) -> float:
     """Return the bending [rad] at which the bristle slides at its speed."""
-    return p.presliding_motor_distance * friction(x, p) / rest(p)
+    return p.presliding_motor_distance * friction(x, p) / breakaway_torque(p)
 
 
 def falls(p: Parameters) -> bool:
@@ -193,7 +186,11 @@ def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> Stat
         far = reach(x, p)
         bends = bristle_rate(x[3], x[1], far)
         r = rates(
-            x, bent_sign(x[3], bends, far, rest(p) / p.presliding_motor_distance, p.presliding_motor_damping), p, u, T_l
+            x,
+            bent_sign(x[3], bends, far, breakaway_torque(p) / p.presliding_motor_distance, p.presliding_motor_damping),
+            p,
+            u,
+            T_l,
         )
         return (r[0], r[1], r[2], bends, r[4])
     r = rates(x, 0.0, p, u, T_l)

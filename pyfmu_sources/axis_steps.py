@@ -9,16 +9,16 @@ from math import exp, sqrt
 from .axis_equations import (
     Parameters,
     State,
+    breakaway_torque,
     builds_up,
     falls,
     filtered,
     mode_rates,
     past_stop,
     reach,
-    rest,
     slip_at_rest,
 )
-from .drivetrain_parameters import BIG, TINY
+from .parameter_rows import BIG, TINY
 
 SHARE = 0.05  # of the time in which the fastest rate acts: a step
 AHEAD = 0.05  # of the time in which a sliding axis would stop: a step that comes no nearer to where friction falls
@@ -81,7 +81,7 @@ def further_rate(x: State, mode: int, p: Parameters) -> float:
     """Return the fastest rate [1/s] of bristle, filter, harmonics, spring, end stops and varying inertia."""
     rate = 0.0
     if mode == 0 and builds_up(p):
-        stiffness = rest(p) / p.presliding_motor_distance
+        stiffness = breakaway_torque(p) / p.presliding_motor_distance
         rate = max(sqrt(stiffness / p.J), p.presliding_motor_damping / p.J) + abs(x[1]) / (reach(x, p) + TINY)
     if p.drive_filter_time_constant > 0.0:
         rate = max(rate, 1.0 / p.drive_filter_time_constant)

@@ -1,41 +1,15 @@
 """Dry friction of motor and load: how large it may be at rest, and how it builds up over a distance.
 
-Friction that builds up is that of Dahl's and LuGre's bristle (Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE
-Trans. Automatic Control 40(3), 1995): the torque is ``stiffness z + damping z'`` with ``z' = v - |v| z / reach(v)``,
-where ``reach(v) = distance friction(v) / breakaway`` and ``stiffness = breakaway / distance``. Friction that grows with
-the torque of the shaft builds up at this stiffness, too, with 1 N.m of it in the breakaway; where there is no other, it
-is set-valued, for its reach goes to zero with that torque. The bristle ``z`` is a state while it bends; once it has
-settled, the part slides at the friction of its speed, without the stiff equation of the bristle, until it slows down.
-The elastic backlash models have it; rigid teeth do not.
+The bristle ``z`` (:mod:`laws.bristles`) is a state while it bends; once it has settled, the part slides at the friction
+of its speed, without the stiff equation of the bristle, until it slows down. The elastic backlash models have it; rigid
+teeth do not.
 
-In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it;
-``bristle``: its bending [rad]; ``reach``: bending at which it slides [rad].
+In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
 """
 
-from .effects import bristle_rate, dependent_friction
 from .equations import Mode, Parameters, State, elastic_torque, friction_l, friction_m, is_rigid, lever_arm
-
-# A bristle has settled when it is this near to its reach.
-SETTLED = 1e-6
-# Where friction falls with speed, a bristle follows its reach with a lag: it counts as settled so near to it where its
-# equation is quicker than this [1/s]; beyond these many Stribeck speeds friction falls no more.
-SETTLED_FALLING = 0.02
-QUICKEST = 5e3
-FALLEN = 4.0
-# Faster than it was left, so that no part goes to and fro between both ways of computing it.
-ENTER = 1.2
-LEAST_SPEED = 1e-9
-
-
-def breakaway(coulomb: float, sliding: float, static: float) -> float:
-    """Return the torque [N.m] below which a part that stands still keeps standing.
-
-    Args:
-        coulomb: Coulomb friction [N.m].
-        sliding: Stribeck's friction at high speed, above Coulomb's [N.m].
-        static: Stribeck's friction at rest, above Coulomb's [N.m].
-    """
-    return coulomb + max(sliding, static)
+from .laws.bristles import bent_sign, has_settled, leaving_speed
+from .laws.friction import breakaway, bristle_rate, dependent_friction
 
 
 def unloaded_m(p: Parameters) -> float:
@@ -142,16 +116,6 @@ def builds_up_l(p: Parameters) -> bool:
     return p.presliding_load_distance > 0.0 and unloaded_l(p) > 0.0 and not is_rigid(p)
 
 
-def leaving_speed(distance: float, falls: bool, stribeck_speed: float) -> float:
-    """Return the speed [rad/s] below which the bristle of a part that slides must be followed.
-
-    Args:
-        distance: over which friction builds up [rad].
-        stribeck_speed: [rad/s].
-    """
-    return min(FALLEN * stribeck_speed, QUICKEST * distance) if falls else 0.0
-
-
 def leaving_speed_m(p: Parameters) -> float:
     """Return :func:`leaving_speed` of the motor [rad/s]."""
     return leaving_speed(
@@ -178,32 +142,6 @@ def reach_m(x: State, contact: int, p: Parameters) -> float:
 def reach_l(x: State, contact: int, p: Parameters) -> float:
     """Return the bending [rad] at which the load's bristle slides at its speed."""
     return p.presliding_load_distance * friction_l(x, carried_l(x, contact, p), p) / rest_l(p)
-
-
-def bent_sign(bristle: float, rate: float, reach: float, stiffness: float, damping: float) -> float:
-    """Return the direction of friction (-1 to 1 without damping) of a bristle that bends at ``rate`` [rad/s].
-
-    Args:
-        stiffness: of the bristle [N.m/rad].
-        damping: of the bristle [N.m.s/rad].
-    """
-    if reach <= 0.0:
-        return 0.0
-    return (bristle + damping / stiffness * rate) / reach
-
-
-def has_settled(bristle: float, speed: float, reach: float, leaving: float, falls: bool) -> bool:
-    """Tell whether a bristle has settled at the reach of a part that slides.
-
-    Args:
-        speed: of the part [rad/s].
-        leaving: speed below which the bristle must be followed [rad/s].
-    """
-    side = 1.0 if speed > 0.0 else -1.0
-    if abs(speed) < max(LEAST_SPEED, ENTER * leaving) or reach <= 0.0:
-        return False
-    near = SETTLED_FALLING if falls and abs(speed) > QUICKEST * reach else SETTLED
-    return abs(side * bristle - reach) <= near * reach
 
 
 def bent(x: State, z_m: float, z_l: float) -> State:

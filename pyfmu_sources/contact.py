@@ -7,7 +7,6 @@ that holds a motor at rest [N.m]; ``held``: dry friction, load side, that holds 
 
 from .backlash_models import BOUNCING, HELD, RIGID
 from .bristles import resting_bristles
-from .drive_request import UNASKED
 from .drivetrain_parameters import NONE
 from .equations import (
     Parameters,
@@ -23,6 +22,7 @@ from .equations import (
     twist,
     twist_rate,
 )
+from .laws.drive import UNASKED
 
 Start = tuple[float, float, float, float, float, float, float, float]
 
@@ -63,7 +63,7 @@ def on_flank(x: State, side: int, p: Parameters) -> State:
     return collide((x[0], x[1], theta_l, x[3], x[4], x[5], x[6], 0.0, x[8], x[9], x[10], x[11]), 0.0, p)
 
 
-def joined(x: State, side: int, p: Parameters) -> State:
+def join_teeth(x: State, side: int, p: Parameters) -> State:
     """Return a state of rigid teeth in contact as it must be: at the flank and at one speed; mostly ``x`` itself."""
     apart = abs(twist(x, p) - side * p.alpha)
     sliding = abs(twist_rate(x, p))
@@ -72,12 +72,12 @@ def joined(x: State, side: int, p: Parameters) -> State:
     return on_flank(x, side, p)
 
 
-def parted(x: State, wound: float) -> State:
+def part_teeth(x: State, wound: float) -> State:
     """Return the state with the twist ``wound`` [rad] left in the shaft, whose hysteresis starts anew."""
     return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], wound, x[8], x[9], 0.0, x[11])
 
 
-def stopped(x: State) -> State:
+def stop_bodies(x: State) -> State:
     """Return the state with motor and load standing still."""
     return (x[0], 0.0, x[2], 0.0, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
 
@@ -104,13 +104,13 @@ def after_event(
             if closing > RESTING_SPEED and events < MAX_BOUNCES and p.restitution > 0.0:
                 return (collide(x, p.restitution, p), 0)
             return (collide(x, 0.0, p), flank)
-        return (parted(x, 0.0), flank)
+        return (part_teeth(x, 0.0), flank)
     if contact in (-2, 2):
         return (x, 0) if which == 0 else (x, contact // 2)
     if model in HELD:
-        return play_reversed(stopped(x), contact, push_m, push, held_m, held)
+        return play_reversed(stop_bodies(x), contact, push_m, push, held_m, held)
     if teeth_never_pull(p):
-        return (parted(x, parted_twist(x, contact, p)), 0)
+        return (part_teeth(x, parted_twist(x, contact, p)), 0)
     return (x, 0)
 
 
@@ -121,7 +121,7 @@ def play_engaged(
     after = collide(x, 0.0, p)
     if flank * after[1] > RESTING_SPEED:
         return (after, flank)
-    return play_reversed(stopped(after), flank, push_m, push, held_m, held)
+    return play_reversed(stop_bodies(after), flank, push_m, push, held_m, held)
 
 
 def play_reversed(x: State, flank: int, push_m: float, push: float, held_m: float, held: float) -> tuple[State, int]:
@@ -165,5 +165,5 @@ def consistent_start(start: Start, p: Parameters) -> State:
         return (x[0], x[1], x[2], 0.0, x[4], x[5], x[6], 0.0, x[8], x[9], x[10], x[11]) if model in HELD else x
     contact = contact_of(wound, half)
     if contact != 0 and teeth_never_pull(p) and initial_contact(x, p) == 0:
-        return resting_bristles(parted(x, parted_twist(x, contact, p)), 0, p)
-    return resting_bristles(parted(x, 0.0), contact, p)
+        return resting_bristles(part_teeth(x, parted_twist(x, contact, p)), 0, p)
+    return resting_bristles(part_teeth(x, 0.0), contact, p)

@@ -10,8 +10,8 @@ length of the step [s].
 from math import exp, sqrt
 
 from .bristles import builds_up_l, builds_up_m, turned_signs
-from .drivetrain_parameters import BIG
 from .equations import Mode, Parameters, State, rates
+from .parameter_rows import BIG
 
 RELATIVE_TOLERANCE = 1e-11
 ABSOLUTE_TOLERANCE = 1e-13

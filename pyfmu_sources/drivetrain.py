@@ -10,13 +10,14 @@ In all functions: ``h``: length of the step [s]; ``u``: requested torque [N.m], 
 from math import exp
 
 from .contact import consistent_start, initial_contact
-from .drive_request import UNASKED, ramp_end, ramp_target, ramp_time
-from .drivetrain_parameters import BIG, DEFAULTS, NONE, NONLINEAR
+from .drivetrain_parameters import DEFAULTS, NONE, NONLINEAR
 from .dry_friction import shaft_torque, slips
 from .equations import Mode, Parameters, State, backlash_model, contact_of, is_rigid, rates, twist, twist_rate
 from .event_numbers import NO_EVENT, TOO_MUCH
+from .laws.drive import UNASKED, ramp_end, ramp_target, ramp_time
 from .linear_mode import law_of
 from .linear_steps import Table, advance_linear, leap, linear_to_event
+from .parameter_rows import BIG
 from .smooth_mode import advance_smooth, advance_smooth_to_event, refused
 from .transition import relaxation_rate, transition
 

@@ -6,12 +6,13 @@ from functools import lru_cache
 from typing import ClassVar
 
 from . import drivetrain
-from .drive_request import UNASKED
 from .drivetrain import Mode, State
-from .drivetrain_parameters import PARAMETERS, Parameter
+from .drivetrain_parameters import PARAMETERS
 from .drivetrain_slave import T_L, T_SHAFT, Drivetrain, Parameters
+from .laws.drive import UNASKED
 from .learned_law import L_DRY, LOAD_SPEED, TWIST, Motion, kind_of
 from .learned_plant import LawValues, Pushes, WithLaw
+from .parameter_rows import Parameter
 
 _prepare = lru_cache(maxsize=256)(drivetrain.prepare)
 DIGITS = 12  # of a piece's length: equal pieces differ by rounding

@@ -6,10 +6,10 @@ In all functions: ``u``: requested torque [N.m], delayed and saturated already; 
 """
 
 from .dormand_prince import mode_rates
-from .drive_request import saturated
 from .dry_friction import NEVER, shaft_torque
 from .equations import Mode, Parameters, State
 from .event_numbers import NO_EVENT
+from .laws.drive import saturated
 from .smooth_events import guard, guard_room, settled, switched
 
 Indicators = tuple[float, float, float, float]
@@ -69,12 +69,12 @@ def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> O
         The derivatives, SI units per second.
     """
     r = state_rates(x, mode, p, u, T_l)
-    later = shaft_torque(beside(x, r, LITTLE), mode, p, T_l)
-    sooner = shaft_torque(beside(x, r, -LITTLE), mode, p, T_l)
+    later = shaft_torque(along(x, r, LITTLE), mode, p, T_l)
+    sooner = shaft_torque(along(x, r, -LITTLE), mode, p, T_l)
     return (r[0], r[2], r[1], r[3], r[4], (later - sooner) / (2.0 * LITTLE))
 
 
-def beside(x: State, r: State, h: float) -> State:
+def along(x: State, r: State, h: float) -> State:
     """Return ``x + h r``, ``h`` in s; the drive's filter, which may not have been asked yet, stays."""
     return (
         x[0] + h * r[0], x[1] + h * r[1], x[2] + h * r[2], x[3] + h * r[3], x[4] + h * r[4], x[5] + h * r[5],

@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
 from . import drivetrain
-from .drive_request import saturated
 from .drivetrain import Mode, Parameters, State, Table
 from .drivetrain_modes import (
     QUIET,
@@ -20,9 +19,11 @@ from .drivetrain_modes import (
     rates_and_outputs,
     state_rates,
 )
-from .drivetrain_parameters import BIG, NAMES, PARAMETERS, Parameter
+from .drivetrain_parameters import NAMES, PARAMETERS
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
+from .laws.drive import saturated
+from .parameter_rows import BIG, Parameter
 from .plant_slave import PlantSlave
 from .slave_base import TOO_STIFF, StepRefusedError
 

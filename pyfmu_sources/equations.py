@@ -21,23 +21,13 @@ friction, -1 to 1; ``T_l``: load torque [N.m].
 """
 
 from .backlash_models import GRADUAL, HELD, NEVER_PULLING, OWN_CONTACT, PLAIN_WHEN_CLOSED, RIGID
-from .drive_request import request_rate
-from .drivetrain_parameters import BIG, NONE, DrivetrainParameters
-from .effects import (
-    dependent_friction,
-    directional_friction,
-    end_stop_torque,
-    hardening_torque,
-    hysteresis_rate,
-    periodic,
-    periodic_curvature,
-    periodic_slope,
-    quadratic_drag,
-    resonance_torque,
-    set_in,
-    sliding_friction,
-    spring_torque,
-)
+from .drivetrain_parameters import NONE, DrivetrainParameters
+from .laws.drive import request_rate
+from .laws.friction import dependent_friction, directional_friction, quadratic_drag, sliding_friction
+from .laws.shaft import hardening_torque, hysteresis_rate, resonance_torque, set_in
+from .laws.stops import end_stop_torque, spring_torque
+from .laws.waves import inertia_at, inertia_torque, periodic, periodic_curvature, periodic_slope
+from .parameter_rows import BIG
 
 State = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 Mode = tuple[int, int, int]
@@ -223,13 +213,8 @@ def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l:
             x[2], x[3], p.end_stop_lower, p.end_stop_upper, p.end_stop_stiffness, p.end_stop_dissipation
         )
     if p.varying_inertia_amplitude != 0.0:
-        against += (
-            0.5
-            * periodic_slope(
-                x[2], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
-            )
-            * x[3]
-            * x[3]
+        against += inertia_torque(
+            x[2], x[3], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
         )
     return -against
 
@@ -238,9 +223,8 @@ def load_inertia(x: State, p: Parameters) -> float:
     """Return the load's inertia [kg.m2] at its angle; a wave larger than the inertia leaves a thousandth of it."""
     if p.varying_inertia_amplitude == 0.0:
         return p.J_l
-    return max(
-        1e-3 * p.J_l,
-        p.J_l + periodic(x[2], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase),
+    return inertia_at(
+        p.J_l, x[2], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
     )
 
 

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from math import ceil
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from .drivetrain_parameters import BIG, Parameter
 from .event_numbers import NO_EVENT
 from .fmu_variables import FmuVariable
 from .learned_law import (
@@ -28,6 +27,7 @@ from .learned_law import (
     longest_piece,
     until_knot,
 )
+from .parameter_rows import BIG, Parameter
 from .plant_slave import PlantSlave
 from .slave_base import TOO_STIFF, StepRefusedError
 

@@ -9,6 +9,7 @@ direction of sliding, 0: none.
 from .axis_equations import (
     Parameters,
     State,
+    breakaway_torque,
     builds_up,
     drive_torque,
     filtered,
@@ -20,15 +21,14 @@ from .axis_equations import (
     past_stop,
     rates,
     reach,
-    rest,
     settled,
     sliding_torque,
     slip_at_rest,
     start,
 )
 from .axis_steps import breaking_time, held, longest_step, slowing_time, smooth_step, stop_time
-from .drive_request import UNASKED, ramp_end, ramp_target, ramp_time
-from .drivetrain_parameters import BIG
+from .laws.drive import UNASKED, ramp_end, ramp_target, ramp_time
+from .parameter_rows import BIG
 
 __all__ = [
     "State", "advance", "advance_to_event", "drive_torque", "friction", "inertia", "initial_mode", "mode_rates",
@@ -114,7 +114,7 @@ def request_to_event(
         elapsed: time since the beginning of the step at which ``x`` is [s].
     """
     bends = builds_up(p)
-    dry = rest(p) + abs(p.periodic_friction_motor_amplitude) > 0.0
+    dry = breakaway_torque(p) + abs(p.periodic_friction_motor_amplitude) > 0.0
     least = leaves_sliding(p)
     if mode == 0 and not dry:
         mode = 1

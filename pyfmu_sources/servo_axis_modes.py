@@ -10,6 +10,7 @@ direction of sliding, 0: none.
 from .axis_equations import (
     Parameters,
     State,
+    breakaway_torque,
     builds_up,
     capacity,
     drive_torque,
@@ -18,12 +19,11 @@ from .axis_equations import (
     mode_rates,
     past_stop,
     reach,
-    rest,
     sliding_torque,
     slip_at_rest,
 )
-from .drive_request import saturated
-from .drivetrain_parameters import BIG
+from .laws.drive import saturated
+from .parameter_rows import BIG
 
 Indicators = tuple[float, float]
 Outputs = tuple[float, float, float]
@@ -44,7 +44,7 @@ def decided(x: State, mode: int, p: Parameters, u: float) -> int:
 
 def is_dry(p: Parameters) -> bool:
     """Tell whether the axis has dry friction."""
-    return rest(p) + abs(p.periodic_friction_motor_amplitude) > 0.0
+    return breakaway_torque(p) + abs(p.periodic_friction_motor_amplitude) > 0.0
 
 
 def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) -> tuple[State, Outputs]:

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from . import servo_axis
-from .drive_request import saturated
-from .drivetrain_parameters import BIG
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
+from .laws.drive import saturated
+from .parameter_rows import BIG
 from .plant_slave import PlantSlave
 from .servo_axis import State
 from .servo_axis_modes import UNDECIDED, Indicators, Outputs, after_events, decided, indicators, rates_and_outputs

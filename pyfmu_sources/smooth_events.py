@@ -8,7 +8,7 @@ In all functions: ``u``: requested torque [N.m], delayed and saturated already; 
 
 from .backlash_models import BOUNCING, HELD
 from .bristles import bent, builds_up_l, builds_up_m, capacity_l, capacity_m, reach_l, reach_m
-from .contact import after_event, joined, on_flank, stopped
+from .contact import after_event, join_teeth, on_flank, stop_bodies
 from .drivetrain_parameters import NONE
 from .dry_friction import (
     LOAD,
@@ -109,7 +109,7 @@ def switched(x: State, mode: Mode, which: int, events: int, p: Parameters, u: fl
     contact, slip_m, slip_l = mode
     if which == MOTOR and is_rigid(p) and contact != 0:
         if slip_m != 0:
-            x = stopped(x)
+            x = stop_bodies(x)
         slip = slip_after_stop(push_on_both(x, p, T_l), capacity_of_both(x, p))
         return (x, (contact, slip, slip))
     if which == MOTOR:
@@ -155,7 +155,7 @@ def joined_body(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State,
     contact = mode[0]
     if contact == 0 or not is_rigid(p):
         return (x, mode)
-    x = joined(x, direction(contact), p)
+    x = join_teeth(x, direction(contact), p)
     if capacity_of_both(x, p) > 0.0 and contact in (-1, 1) and mode[1] != mode[2]:
         slip_m, slip_l = slips(x, contact, p, T_l)
         return (x, (contact, slip_m, slip_l))

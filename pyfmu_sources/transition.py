@@ -73,29 +73,29 @@ def transition(law: Law, p: Parameters, h: float) -> Transition:
         (a[4], b[4], c[4], d[4], e[4], f[4]),
     )
     for _ in range(doublings):
-        rows = doubled(rows, p.i)
+        rows = double_step(rows, p.i)
     return rows
 
 
-def doubled(rows: Transition, i: float) -> Transition:
+def double_step(rows: Transition, i: float) -> Transition:
     """Return the transition rows of two steps in a row: a stiff law needs too many Taylor steps for one."""
     r0, r1, r2, r3, r4 = rows
-    wound = added(scaled(r0, 1.0 / i), scaled(r2, -1.0))
+    wound = add(scale(r0, 1.0 / i), scale(r2, -1.0))
     return (
-        added(r0, followed(r0, wound, r1, r3, r4)),
-        added(r1, followed(r1, wound, r1, r3, r4)),
-        added(r2, followed(r2, wound, r1, r3, r4)),
-        added(r3, followed(r3, wound, r1, r3, r4)),
-        added(r4, followed(r4, wound, r1, r3, r4)),
+        add(r0, followed(r0, wound, r1, r3, r4)),
+        add(r1, followed(r1, wound, r1, r3, r4)),
+        add(r2, followed(r2, wound, r1, r3, r4)),
+        add(r3, followed(r3, wound, r1, r3, r4)),
+        add(r4, followed(r4, wound, r1, r3, r4)),
     )
 
 
-def scaled(row: Row, f: float) -> Row:
+def scale(row: Row, f: float) -> Row:
     """Return ``f row``."""
     return (f * row[0], f * row[1], f * row[2], f * row[3], f * row[4], f * row[5])
 
 
-def added(a: Row, b: Row) -> Row:
+def add(a: Row, b: Row) -> Row:
     """Return ``a + b``."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
 
@@ -106,7 +106,5 @@ def followed(row: Row, wound: Row, motor: Row, load: Row, torque: Row) -> Row:
     Args:
         row: of the second step.
     """
-    moved = added(
-        added(scaled(wound, row[0]), scaled(motor, row[1])), added(scaled(load, row[2]), scaled(torque, row[3]))
-    )
-    return added(row, moved)
+    moved = add(add(scale(wound, row[0]), scale(motor, row[1])), add(scale(load, row[2]), scale(torque, row[3])))
+    return add(row, moved)

@@ -34,7 +34,7 @@ def test_words_that_are_not_names_are_read_from_the_page():
 
 
 def test_names_are_no_riddles():
-    assert not [name for path, tree in files_of([ROOT / "orchestrator"]) for name in riddles(path, tree)]
+    assert not [name for path, tree in files_of(PACKAGES) for name in riddles(path, tree)]
 
 
 def test_no_product_name_looks_like_a_test():

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.kernel import run_filter, run_free, transition
-from pyfmu_sources.drivetrain_parameters import BIG, DEAD_ZONE, DrivetrainParameters
+from pyfmu_sources.drivetrain_parameters import DEAD_ZONE, DrivetrainParameters
 from pyfmu_sources.equations import State, rates
+from pyfmu_sources.parameter_rows import BIG
 
 Array = NDArray[np.float64]
 STATES = 5

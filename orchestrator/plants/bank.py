@@ -1,6 +1,6 @@
 """The effects that the drivetrain may lack, one row each.
 
-An effect is added in three places: its law in :mod:`pyfmu_sources.effects` (and where the equations call it), its
+An effect is added in three places: its law in :mod:`pyfmu_sources.laws` (and where the equations call it), its
 parameters in the plant's table, and one row here; ``docs/extending.md`` walks through an example.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.plants.effects import Effect, SignalScales, rms
 from orchestrator.plants.measurement import longest_time, times
-from pyfmu_sources.drivetrain_parameters import BIG, Parameter
+from pyfmu_sources.parameter_rows import BIG, Parameter
 
 # Of the analysis alone: logarithm [rad] of the distance over which dry friction builds up, or of the penetration over
 # which the damping of teeth in contact does.

@@ -27,7 +27,7 @@ from orchestrator.shared.output import write_whole
 INLINED = ("rates", "elastic_torque", "motor_torque", "load_torque")
 """Functions whose call costs more than their body: every stage of every step makes it."""
 
-FORMULAS = ("axis_equations", "effects", "equations")
+FORMULAS = ("axis_equations", "equations", "laws.friction", "laws.shaft", "laws.stops", "laws.waves")
 """Modules of the plants' own equations, which every stage of every step runs."""
 
 LISTING = ("attachment", "backlash_estimator", "dead_time", "linear_mode")
@@ -56,7 +56,7 @@ def compile_module(name: str) -> ModuleType:
             value.__module__ = full_name
             setattr(copy, attribute, njit_on_disk(forceinline=attribute in INLINED, **options)(value))
         elif value.__module__.startswith(PACKAGE + "."):
-            setattr(copy, attribute, getattr(compile_module(home), attribute))
+            setattr(copy, attribute, getattr(compile_module(home), value.__name__))
     return copy
 
 

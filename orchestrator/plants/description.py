@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.plants.effects import Effect
-from pyfmu_sources.drivetrain_parameters import BIG, Parameter
+from pyfmu_sources.parameter_rows import BIG, Parameter
 
 Array = NDArray[np.float64]
 
@@ -214,7 +214,7 @@ class Plant:
         request = float(u[0])
         from orchestrator.plants.compiled import compile_module  # numba takes its time to import
 
-        follow = compile_module("drive_request").followed_request
+        follow = compile_module("laws.drive").followed_request
         for n, asked in enumerate(u.tolist()):
             begins[n] = request
             request, means[n] = follow(request, asked, lag, rate, h)

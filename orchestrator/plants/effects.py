@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pyfmu_sources.drivetrain_parameters import Parameter
+from pyfmu_sources.parameter_rows import Parameter
 
 Array = NDArray[np.float64]
 Starts = Mapping[str, tuple[float, ...]]

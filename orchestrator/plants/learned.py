@@ -14,8 +14,8 @@ from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.description import CompiledEquations, Plant
 from orchestrator.plants.sample import complete_equations, sample_of
 from orchestrator.shared.cores import cache_once
-from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 from pyfmu_sources.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
+from pyfmu_sources.parameter_rows import BIG, Parameter
 
 Array = NDArray[np.float64]
 

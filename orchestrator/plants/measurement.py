@@ -3,7 +3,7 @@
 import numpy as np
 
 from orchestrator.plants.effects import Effect, SignalScales
-from pyfmu_sources.drivetrain_parameters import Parameter
+from pyfmu_sources.parameter_rows import Parameter
 
 LEAD = Parameter("measurement.lead", "s", 0.0, 0.0, 1.0, "Time by which torques act before their stamp")
 SHIFT = Parameter("measurement.shift", "s", 0.0, -1.0, 1.0, "Time by which the load's angle is stamped later")

@@ -68,7 +68,7 @@ def test_names_taken_from_compiled_modules_exist(file: str) -> None:
 
 def test_the_places_are_seen() -> None:
     modules = {module for found in TAKEN.values() for module, _, _ in found}
-    assert {"equations", "drivetrain", "servo_axis", "port_laws", "drive_request", "closed_loop"} <= modules
+    assert {"equations", "drivetrain", "servo_axis", "laws.port", "laws.drive", "closed_loop"} <= modules
     wrong = ast.parse(
         'def f():\n    s, n = compile_module("equations"), 1\n'
         '    return s.rates, s.ratez, compile_module("drivetrain").x'

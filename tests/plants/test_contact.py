@@ -180,17 +180,17 @@ def test_parting_teeth_leave_the_shaft_its_twist() -> None:
 def test_rigid_teeth_are_put_on_their_flank_at_one_speed(side: int) -> None:
     p = p_of(dt.RIGID_IMPACT)
     off = state(side * 0.013, 2.0, 0.1, s=0.5)
-    on = c.joined(off, side, p)
+    on = c.join_teeth(off, side, p)
     assert eq.twist(on, p) == pytest.approx(side * ALPHA, abs=1e-15)
     assert on[1] / I == pytest.approx(on[3])
     assert on[7] == 0.0
-    assert c.joined(on, side, p) is on
+    assert c.join_teeth(on, side, p) is on
     near = state(side * ALPHA, I * 0.1, 0.1)
-    assert c.joined(near, side, p) is near
+    assert c.join_teeth(near, side, p) is near
     sliding = state(side * ALPHA, I * 0.1 + 1e-6, 0.1)
-    assert c.joined(sliding, side, p) is not sliding
+    assert c.join_teeth(sliding, side, p) is not sliding
     apart = state(side * (ALPHA + 1e-8), I * 0.1, 0.1)
-    assert c.joined(apart, side, p) is not apart
+    assert c.join_teeth(apart, side, p) is not apart
 
 
 def after(x, contact, which, model, events=0, push_m=0.0, push=0.0, held_m=0.0, held=0.0, **values):

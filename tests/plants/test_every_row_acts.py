@@ -5,8 +5,9 @@ import math
 import pytest
 
 from pyfmu_sources import drivetrain, drivetrain_parameters, servo_axis_parameters
-from pyfmu_sources.drivetrain_parameters import BIG, NAMES, Parameter, parameters, with_values
+from pyfmu_sources.drivetrain_parameters import NAMES, parameters, with_values
 from pyfmu_sources.drivetrain_slave import Drivetrain
+from pyfmu_sources.parameter_rows import BIG, Parameter
 from pyfmu_sources.servo_axis_slave import ServoAxis
 
 # What a row is set to, by its unit; a half of what is usual where that is not zero.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pyfmu_sources import port_laws as laws
+from pyfmu_sources.laws import port as laws
 
 Array = NDArray[np.float64]
 Values = tuple[float, ...]

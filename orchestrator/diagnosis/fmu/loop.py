@@ -21,7 +21,7 @@ from orchestrator.shared.numba_cache import njit_on_disk
 
 Array = NDArray[np.float64]
 
-_laws = compile_module("port_laws")
+_laws = compile_module("laws.port")
 _built_up: Any = _laws.built_up
 _has_memory: Any = _laws.has_memory
 _distance: Any = _laws.distance_of

@@ -15,7 +15,7 @@ from orchestrator.diagnosis.fmu.record import FmuRecord, divide_samples
 from orchestrator.diagnosis.fmu.runner import Runner
 from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import Value
-from pyfmu_sources.port_laws import COMPLIANCE
+from pyfmu_sources.laws.port import COMPLIANCE
 
 Array = NDArray[np.float64]
 ABSURD = 1e9  # times an output's largest value, beyond which a run has failed

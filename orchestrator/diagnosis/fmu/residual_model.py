@@ -25,7 +25,7 @@ from orchestrator.diagnosis.model.interface import (
     UncertainParameter,
     Values,
 )
-from pyfmu_sources.port_laws import COMPLIANCE
+from pyfmu_sources.laws.port import COMPLIANCE
 
 Array = NDArray[np.float64]
 FAILED = 1e3  # times the span of an output: residual of a run that failed, from which every fit turns back

@@ -21,7 +21,7 @@ from orchestrator.plants.linear_run import is_linear, linear_run_of
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import residual_noise
-from pyfmu_sources.drive_request import UNASKED
+from pyfmu_sources.laws.drive import UNASKED
 
 Array = NDArray[np.float64]
 Kernel = Callable[[Array, Array, Array, Array], None]

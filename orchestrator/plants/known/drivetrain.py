@@ -14,6 +14,7 @@ from orchestrator.shared.cores import cache_once
 from pyfmu_sources import drivetrain_parameters as dt
 from pyfmu_sources.backlash_models import GRADUAL, MODELS
 from pyfmu_sources.bristles import unloaded_l, unloaded_m
+from pyfmu_sources.parameter_rows import BIG
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ def _flanks() -> tuple[Any, Any]:
 
     source, whole = compile_module("equations"), _whole()
     twist, twist_slope = source.twist, source.twist_slope
-    named, onset_at, far = named_of(dt.DrivetrainParameters), dt.COUNT + 2, dt.BIG
+    named, onset_at, far = named_of(dt.DrivetrainParameters), dt.COUNT + 2, BIG
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def flanks(values: Any) -> Any:

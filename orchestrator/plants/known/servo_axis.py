@@ -10,7 +10,8 @@ from orchestrator.plants.description import Body, CompiledEquations, Drive, Plan
 from orchestrator.plants.measurement import EARLY_TORQUE, LEAD, SAMPLED, SAMPLED_TORQUE
 from orchestrator.shared.cores import cache_once
 from pyfmu_sources import servo_axis_parameters as ap
-from pyfmu_sources.axis_equations import rest
+from pyfmu_sources.axis_equations import breakaway_torque
+from pyfmu_sources.parameter_rows import BIG
 
 Array = NDArray[np.float64]
 
@@ -34,8 +35,8 @@ def stage() -> CompiledEquations:
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, njit_on_disk
 
     source = compile_module("servo_axis")
-    rates, level, breakaway = source.rates, source.friction, compile_module("axis_equations").rest
-    named, end, far = named_of(ap.AxisParameters), ap.COUNT, ap.BIG
+    rates, level, breakaway = source.rates, source.friction, compile_module("axis_equations").breakaway_torque
+    named, end, far = named_of(ap.AxisParameters), ap.COUNT, BIG
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def friction(x: Any, values: Any) -> Any:
@@ -92,7 +93,7 @@ def runner() -> Any:
 def _fmu_parameters(p: Array) -> Array:
     """Return the FMU's own parameters of a model (n,): the fitted distance of friction included."""
     own = ap.AxisParameters._make(p[: ap.COUNT])
-    if rest(own) > 0.0:
+    if breakaway_torque(own) > 0.0:
         distance = build_up_distance(own.presliding_motor_distance, float(p[ap.COUNT]))
         own = own._replace(presliding_motor_distance=distance)
     return np.array(own)

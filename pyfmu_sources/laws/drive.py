@@ -1,10 +1,34 @@
-"""What a drive makes of a request: its limit, its lag and its largest rate.
+"""What goes in and out: a drive's limit, lag and largest rate, a constant load, the zeros of encoders.
 
 In all functions: ``u``: what it follows [N.m]; ``request``: behind the lag, at the beginning [N.m];
 ``time_constant``: of the lag [s]; 0: none.
 """
 
 from math import exp
+
+from ..parameter_rows import BIG, TINY, Parameter, mark_linear
+
+INPUT = mark_linear(
+    Parameter("effects.input_delay.delay", "s", 0.0, 0.0, 10.0, "Dead time of the requested torque"),
+    Parameter("effects.torque_saturation.limit", "N.m", BIG, 0.0, BIG, "Largest torque that the drive delivers"),
+)
+REQUEST = (
+    Parameter("effects.drive_filter.time_constant", "s", 0.0, 0.0, BIG, "Second lag of the drive (0: none)"),
+    Parameter("effects.rate_limit.rate", "N.m/s", BIG, TINY, BIG, "Fastest change of the drive's torque request"),
+)
+
+
+def load_rows(name: str) -> tuple[Parameter, ...]:
+    """Return the row of a constant torque against the body ``name``."""
+    text = f"Constant torque against the {name}"
+    return mark_linear(Parameter("effects.load_torque.torque", "N.m", 0.0, -BIG, BIG, text))
+
+
+def encoder_rows(site: str, name: str) -> tuple[Parameter, ...]:
+    """Return the row of the zero of an encoder."""
+    text = f"Offset of the {name}"
+    return mark_linear(Parameter(f"effects.sensor_offset.{site}.offset", "rad", 0.0, -BIG, BIG, text))
+
 
 UNASKED = 1e300  # N.m, of a filtered request before the first step: the drive has settled at what is asked first
 RAMP_END = 1e-4  # s, of a request that is reached: any time constant, as nothing moves any more
@@ -56,10 +80,10 @@ def followed_request(request: float, u: float, time_constant: float, limit: floa
     slope = limit if u > request else -limit
     total = (request + 0.5 * slope * ramp) * ramp
     reached = request + slope * ramp
-    rest = h - ramp
-    if rest <= 0.0:
+    left_over = h - ramp
+    if left_over <= 0.0:
         return (reached, total / h)
     if time_constant == 0.0:
-        return (u, (total + u * rest) / h)
-    left = (u - reached) * exp(-rest / time_constant)
-    return (u - left, (total + u * rest - time_constant * (u - reached - left)) / h)
+        return (u, (total + u * left_over) / h)
+    left = (u - reached) * exp(-left_over / time_constant)
+    return (u - left, (total + u * left_over - time_constant * (u - reached - left)) / h)

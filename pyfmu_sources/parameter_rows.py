@@ -1,0 +1,31 @@
+"""Rows that describe the parameters of a plant, and how its named tuple ``p`` comes of them."""
+
+from typing import NamedTuple
+
+BIG = 1e12
+TINY = 1e-9
+
+
+class Parameter(NamedTuple):
+    """One parameter: name as in the FMU, unit, default, closed bounds and a one-line description.
+
+    ``linear``: whatever its value, the plant stays linear while no other parameter is off its default.
+    """
+
+    name: str
+    unit: str
+    default: float
+    minimum: float
+    maximum: float
+    description: str
+    linear: bool = False
+
+
+def field_name(name: str) -> str:
+    """Return what the equations call a parameter: ``effects.load_torque.torque`` is ``p.load_torque_torque``."""
+    return name.removeprefix("effects.").replace(".", "_")
+
+
+def mark_linear(*rows: Parameter) -> tuple[Parameter, ...]:
+    """Return rows that leave the plant linear: of the plant without effects, and of what only shapes an effect."""
+    return tuple(row._replace(linear=True) for row in rows)
