@@ -162,7 +162,7 @@ def test_parting_teeth_leave_the_shaft_its_twist() -> None:
     assert c.parted_twist(state(0.008), 1, p_of(dt.NORDIN, c=0.0)) == 0.0
     assert c.parted_twist(state(0.008), 1, p_of(dt.NORDIN, c=3e-4)) == 0.0  # relaxes within 1e-7 s
     assert c.parted_twist(state(0.008), 1, p_of(dt.NORDIN, c=4e-4)) == pytest.approx(-0.002)
-    assert c.parted((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, *REST), 0.5) == (
+    assert c.part_teeth((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, *REST), 0.5) == (
         1.0,
         2.0,
         3.0,
@@ -173,7 +173,8 @@ def test_parting_teeth_leave_the_shaft_its_twist() -> None:
         0.5,
         *REST,
     )
-    assert c.stopped((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, *REST)) == (1.0, 0.0, 3.0, 0.0, 5.0, 6.0, 7.0, 8.0, *REST)
+    turning = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, *REST)
+    assert c.stop_bodies(turning) == (1.0, 0.0, 3.0, 0.0, 5.0, 6.0, 7.0, 8.0, *REST)
 
 
 @pytest.mark.parametrize("side", [-1, 1])
@@ -237,7 +238,7 @@ def test_the_play_model_engages_turns_and_rests() -> None:
     assert after(still, 1, 0, dt.HYSTERESIS, push_m=1.0, push=0.2, held=0.2) == (still, 2)
     assert after(still, 1, 0, dt.HYSTERESIS, push_m=1.0, push=0.3, held=0.2) == (still, 1)
     assert after(still, -1, 0, dt.HYSTERESIS, push_m=-1.0, push=-0.3, held=0.2) == (still, -1)
-    assert after(moving, 1, 0, dt.HYSTERESIS, push_m=1.0, push=1.0)[0] == c.stopped(moving)
+    assert after(moving, 1, 0, dt.HYSTERESIS, push_m=1.0, push=1.0)[0] == c.stop_bodies(moving)
     for contact in (-2, 2):
         assert after(still, contact, 0, dt.HYSTERESIS) == (still, 0)
         assert after(still, contact, 1, dt.HYSTERESIS) == (still, contact // 2)
