@@ -6,6 +6,7 @@ from orchestrator.reporting.model import (
     Bars,
     Facts,
     Findings,
+    Fold,
     Plot,
     Remark,
     Report,
@@ -18,6 +19,6 @@ from orchestrator.reporting.model import (
 from orchestrator.reporting.page import render
 
 __all__ = [
-    "Bar", "Bars", "Facts", "Findings", "Plot", "Remark", "Report", "ReportTable", "Series", "Span",
+    "Bar", "Bars", "Facts", "Findings", "Fold", "Plot", "Remark", "Report", "ReportTable", "Series", "Span",
     "TableColumn", "Text", "render", "report_from_directory", "write_report",
 ]  # fmt: skip

@@ -1,6 +1,6 @@
 """What a report consists of: small immutable parts that know nothing of HTML."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -146,7 +146,15 @@ class Bars:
     note: str = ""
 
 
-Section = Text | Facts | ReportTable | Plot | Findings | Bars
+@dataclass(frozen=True)
+class Fold:
+    """Sections that are closed at first, under a title that says what they tell; folds hold no folds."""
+
+    title: str
+    sections: "tuple[Section, ...]"
+
+
+Section = Text | Facts | ReportTable | Plot | Findings | Bars | Fold
 
 
 @dataclass(frozen=True)
@@ -170,3 +178,8 @@ class Report:
     origin: tuple[tuple[str, Cell], ...] = ()
     downloads: tuple[Path, ...] = field(default=())
     angle_unit: str = "rad"
+
+    def all_sections(self) -> Iterator[Section]:
+        """Yield the sections in the order of the page, those of folds in their place."""
+        for section in self.sections:
+            yield from section.sections if isinstance(section, Fold) else (section,)

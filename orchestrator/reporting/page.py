@@ -13,6 +13,7 @@ from orchestrator.reporting.model import (
     Cell,
     Facts,
     Findings,
+    Fold,
     Plot,
     Report,
     ReportTable,
@@ -21,7 +22,7 @@ from orchestrator.reporting.model import (
 )
 from orchestrator.reporting.numbers import in_words
 from orchestrator.reporting.plots import asset, in_script, plot_data, plot_script, plot_style, rows_of_a_curve
-from orchestrator.reporting.quantities import angle_attributes, mark_angles, mark_unit
+from orchestrator.reporting.quantities import angle_attributes, mark_prose, mark_unit
 
 EMBED_LIMIT = 1_000_000
 LONG_TEXT = 40
@@ -32,6 +33,7 @@ _KINDS = {
     Plot: "plot",
     Findings: "findings",
     Bars: "bars",
+    Fold: "fold",
 }
 
 
@@ -42,7 +44,8 @@ def render(report: Report) -> str:
         .get_template("page.html")
         .render(
             report=report,
-            rows=rows_of_a_curve([section for section in report.sections if isinstance(section, Plot)]),
+            rows=rows_of_a_curve([section for section in report.all_sections() if isinstance(section, Plot)]),
+            folds=any(isinstance(section, Fold) for section in report.sections),
             downloads=[_download(path) for path in report.downloads],
             style=Markup(plot_style()),
             script=Markup(f"{plot_script()}\n{asset('page.js')}"),
@@ -62,7 +65,7 @@ def _environment() -> jinja2.Environment:
     environment.filters |= {
         "words": in_words,
         "plot_data": lambda plot, rows: in_script(plot_data(plot, rows)),
-        "angles": mark_angles,
+        "prose": mark_prose,
         "unit_marked": mark_unit,
         "angle_attributes": angle_attributes,
         "sort_key": _sort_key,

@@ -1,4 +1,4 @@
-"""Angles in sentences, marked so that the page's switch of units reaches them."""
+"""Sentences as HTML: angles marked so that the page's switch of units reaches them, and code."""
 
 import re
 
@@ -7,20 +7,30 @@ from markupsafe import Markup, escape
 from orchestrator.reporting.model import Cell
 
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
-_RANGE = rf"{_NUMBER}(?: (?:to|and|or|±) {_NUMBER})*"
-# Amounts and their unit; an interval in brackets behind it has the same unit.
-ANGULAR = re.compile(rf"(?<![\w.]){_RANGE} (?P<unit>rad(?:/s2?)?)(?![\w/*^]|\.\w)(?: \((?:95 %: )?{_RANGE}\))?")
+_RANGE = rf"{_NUMBER}(?: (?:to|and|or|±|->|instead of) {_NUMBER})*"
+# Amounts and their unit, and amounts in brackets behind it, of the same unit. What stands in a list before may have
+# that unit or another: then all stays as it is.
+_ANGULAR = (
+    rf"(?P<list>(?<![\w.]){_NUMBER}, (?={_NUMBER}))?(?<![\w.]){_RANGE} (?P<unit>rad(?:/s2?)?)(?![\w/*^]|\.\w)"
+    rf"(?: \((?:95 %: |noise |noise: )?{_RANGE}\))?"
+)
+_MARKS = re.compile(rf"`(?P<code>[^`\n]+)`|{_ANGULAR}")
+_CODE = Markup("<code>{}</code>")
 BRACKETED = re.compile(r"(?P<name>.*)\[(?P<unit>rad(?:/s2?)?)\]$", re.S)
 
 
 _MARKED = Markup('<span data-unit="{}">{}</span>')
 
 
-def mark_angles(text: str) -> Markup:
-    """Return text as HTML in which ``0.02 rad`` or ``0.01 to 0.02 rad/s`` is an element with its unit."""
+def mark_prose(text: str) -> Markup:
+    """Return text as HTML: ``0.01 to 0.02 rad`` is an element with a unit, what is in backticks is code."""
     parts, end = [], 0
-    for found in ANGULAR.finditer(text):
-        parts += [escape(text[end : found.start()]), _MARKED.format(found["unit"], found[0])]
+    for found in _MARKS.finditer(text):
+        parts.append(escape(text[end : found.start()]))
+        if found["code"]:
+            parts.append(_CODE.format(found["code"]))
+        else:
+            parts.append(escape(found[0]) if found["list"] else _MARKED.format(found["unit"], found[0]))
         end = found.end()
     return Markup("").join([*parts, escape(text[end:])])
 

@@ -24,5 +24,5 @@ def trust_section(trust: TrustFound | None) -> list[Section]:
     """Return the section that says why a result is not green; empty where it is."""
     if trust is None or not trust.reasons:
         return []
-    lines = tuple(text if text.endswith(".") else f"{text}." for text in trust.reasons)
+    lines = tuple(f"{text[:1].upper()}{text[1:]}".rstrip(".") + "." for text in trust.reasons)
     return [Text("How far this can be trusted", (MEANINGS.get(trust.level, trust.level), *lines))]

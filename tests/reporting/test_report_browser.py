@@ -6,8 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from orchestrator.reporting import Facts, Plot, Report, ReportTable, Series, TableColumn, render
+from orchestrator.reporting import Facts, Plot, Report, ReportTable, Series, TableColumn, render, write_report
+from orchestrator.shared.output import write_result
 from tests.support import browser as browsers
+from tests.support.page_results import PAGES
 from tests.support.report import example
 
 pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing() or "never")
@@ -355,3 +357,74 @@ def test_a_plot_can_be_made_from_data_of_another_program(long_opened):
     assert (pens, legend) == (2, "b")
     assert x == pytest.approx([-0.2, 5.2])
     assert y == pytest.approx([6.92, 9.08])
+
+
+CUT = """
+const cut = [...document.querySelectorAll("svg")].flatMap((svg) => {
+  const box = svg.getBoundingClientRect();
+  return [...svg.querySelectorAll("text")].filter((text) => {
+    const own = text.getBoundingClientRect();
+    const across = own.left < box.left - 1 || own.right > box.right + 1;
+    return own.width && (across || own.top < box.top - 1 || own.bottom > box.bottom + 1);
+  }).map((text) => text.textContent);
+});
+const wide = [...document.querySelectorAll("main *, header *")].filter((e) =>
+  e.checkVisibility() && !e.closest(".quiet, svg, .scroll thead") && e.getBoundingClientRect().right > innerWidth + 1);
+return [cut, wide.map((e) => e.outerHTML.slice(0, 60))];
+"""
+
+
+@pytest.fixture(scope="module")
+def diagnosis_page(tmp_path_factory):
+    """A diagnosis with all that one may have, words in backticks included."""
+    folder = tmp_path_factory.mktemp("diagnosis")
+    command, arguments, results, files = PAGES["diagnose"]
+    summary = [
+        "Verdict: effects. The model lacks backlash in the shaft.", "  It explains 99 %.",
+        "Next: log with `--rate 500`, the half-gap being 0.02 rad.",
+    ]  # fmt: skip
+    write_result(folder, command, arguments, 5, results | {"summary": summary, "angle_unit": "arcmin"})
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    return write_report(folder)
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_diagnosis_says_the_answer_first_and_cuts_nothing(driver, diagnosis_page, width, scheme):
+    driver.get_log("browser")
+    browsers.set_screen(driver, width, 900, scheme)
+    browsers.open_page(driver, diagnosis_page.as_uri())
+    shown = driver.execute_script("return document.body.innerText")
+    assert "The model lacks backlash in the shaft." in shown
+    assert "Log with --rate 500, the half-gap being 69 arcmin." in shown
+    assert "What was tried" not in shown  # folded
+    seen = "return [...document.querySelectorAll('svg')].map((svg) => svg.checkVisibility())"
+    assert driver.execute_script(seen).count(True) == 1
+    assert driver.execute_script(seen).count(False) > 1
+    keys(driver, "details.fold:last-of-type summary", " ")
+    assert "What was tried" in driver.execute_script("return document.body.innerText")
+    driver.execute_script("document.querySelectorAll('details').forEach((fold) => (fold.open = true))")
+    driver.execute_async_script("const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done))")
+    assert driver.execute_script(CUT) == [[], []]
+    whole = driver.execute_script("return document.body.innerText")
+    assert "`" not in whole
+    assert driver.execute_script(CONTRAST) == []
+    assert driver.get_log("browser") == []
+
+
+def test_what_is_folded_is_printed_and_reached_by_links(driver, diagnosis_page):
+    browsers.set_screen(driver, 1280, 900, "light")
+    browsers.open_page(driver, diagnosis_page.as_uri())
+    closed = "return [...document.querySelectorAll('details.fold')].filter((fold) => !fold.open).length"
+    folds = driver.execute_script(closed)
+    driver.execute_script("dispatchEvent(new Event('beforeprint'))")
+    assert driver.execute_script(closed) == 0
+    driver.execute_script("dispatchEvent(new Event('afterprint'))")
+    assert driver.execute_script(closed) == folds > 3
+    inside = driver.execute_script("return document.querySelector('details.fold section').id")
+    driver.execute_async_script(
+        "const [id, done] = arguments; addEventListener('hashchange', () => setTimeout(done)); location.hash = id",
+        inside,
+    )
+    assert driver.execute_script(closed) == folds - 1

@@ -20,6 +20,7 @@ from orchestrator.reporting.plots import (
     rows_of_a_curve,
     thin_series,
 )
+from orchestrator.reporting.quantities import mark_prose
 from tests.support.report import example
 
 
@@ -197,3 +198,22 @@ def test_a_page_shares_its_room_between_long_curves():
     assert rows_of_a_curve(plots(1000, 1_000_000)) == CURVE_LIMIT
     limit = rows_of_a_curve(plots(*[2_000_000] * 10, 1000))
     assert limit == (PAGE_LIMIT - 1000) // 10
+
+
+@pytest.mark.parametrize(
+    ("text", "marked"),
+    [("a gap of 0.02 rad.", ["0.02 rad"]), ("0.02 rad (95 %: 0.01 to 0.03), 5", ["0.02 rad (95 %: 0.01 to 0.03)"]),
+     ("between 0.01 and 0.03 rad/s", ["0.01 and 0.03 rad/s"]),
+     ("1e-05 instead of 0.2 rad", ["1e-05 instead of 0.2 rad"]),
+     ("0.138 -> 0.002 rad (noise 0.0003); x", ["0.138 -> 0.002 rad (noise 0.0003)"]),
+     ("0.02 rad (1.1 deg)", ["0.02 rad"]),
+     ("3300 N.m/rad", []), ("2 rad/sample", []), ("0.1, 0.2 rad", []), ("0.2 rad.s", []), ("x = 2rad", [])],
+)  # fmt: skip
+def test_angles_in_sentences_are_marked_or_left_alone(text, marked):
+    html = str(mark_prose(text))
+    assert re.findall(r'<span data-unit="rad[^"]*">([^<]*)</span>', html.replace("&gt;", ">")) == marked
+    assert re.sub("<[^>]*>", "", html.replace("&gt;", "\0")).replace("\0", ">") == text
+
+
+def test_what_stands_in_backticks_is_code_and_stays_harmless():
+    assert mark_prose("use `--a <b>` now, `") == "use <code>--a &lt;b&gt;</code> now, `"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.reporting import Bars, Facts, Plot, ReportTable, Text, report_from_directory, write_report
+from orchestrator.reporting import Bars, Facts, Fold, Plot, ReportTable, Text, report_from_directory, write_report
 from orchestrator.shared.output import write_result
 from tests.support.page_results import INSPECT
 from tests.support.reports import sections
@@ -31,9 +31,11 @@ def test_restarts_and_what_the_log_adds_have_their_places_on_the_page_of_a_diagn
     (tmp_path / "diagnose.csv").write_text("time,theta_m,theta_m_after\n0,0,0\n0.5,1,1\n1,2,2\n")
     report = report_from_directory(tmp_path)
     tables = {table.title: table.rows for table in sections(report, ReportTable)}
-    assert tables["What the log has, and the machine has not"][0][:3] == ("late load", "certain", "shift")
+    assert tables["What is missing"] == (("late load (in the log)", "certain", "shift 0.005 ± 5e-05 s"),)
     assert tables["What was analysed"] == (("a.csv", 200.0, 400, 5, "motor 12"),)
-    difference, angle = sections(report, Plot)
+    worth, difference, angle = sections(report, Plot)
+    assert worth.title == "What the corrected model is worth on test data"
+    assert worth.spans == difference.spans
     assert [(span.start, span.end) for span in difference.spans] == [(0.0, 0.0), (0.5, 0.5)]
     assert angle.spans == difference.spans
     assert "Fit" not in [section.title for section in report.sections]
@@ -87,10 +89,9 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     report = report_from_directory(tmp_path)
     assert "The model lacks Coulomb friction at the motor (likely)." in report.summary
     assert "load torque" not in report.summary
-    assert "of the motor angle goes from 0.1 to 0.001 rad (noise: 0.0009)" in report.summary
     tables = {t.title: t for t in sections(report, ReportTable)}
-    lacking = tables["What the model lacks"].rows
-    assert lacking[0] == ("Coulomb friction at the motor", "likely", "torque", "1.5 N.m (95 %: 1.4 to 1.6)")
+    lacking = tables["What is missing"].rows
+    assert lacking[0] == ("Coulomb friction at the motor", "likely", "torque 1.5 N.m (95 %: 1.4 to 1.6)")
     assert lacking[1][1] == "possible"
     why = tables["How sure"].rows[0]
     assert why[2:6] == (pytest.approx(80.0), 12.0, pytest.approx(70.0), pytest.approx(90.0))
@@ -103,6 +104,17 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     assert tables["Parameters"].rows[0][6] == pytest.approx(5.0)
     assert tables["What was tried"].rows[0][2] == "input delay in the drive"
     plots = {p.title: p for p in sections(report, Plot)}
+    worth = plots["What the corrected model is worth on test data"]
+    assert worth.y_label == "error of the motor angle [rad]"
+    assert [(s.name, s.y.tolist()) for s in worth.series] == [
+        ("model as given", [0.0, pytest.approx(0.1)]), ("corrected model", [0.0, pytest.approx(0.001)]),
+    ]  # fmt: skip
+    assert worth.note.startswith(
+        "The rms misfit of the motor angle goes from 0.1 to 0.001 rad, 100 times less; the noise"
+    )
+    assert worth.note.endswith("The corrected model does worse than re-fitted parameters.")
+    first = [section.title for section in report.sections if not isinstance(section, Fold)]
+    assert first == ["What is missing", worth.title, "What to do next"]
     (bars,) = sections(report, Bars)
     assert [b.length for b in bars.items] == [1.0, 0.5, pytest.approx(0.01)]
     assert bars.items[2].text == "1.11 times noise"
@@ -120,7 +132,7 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
         "to": [1.6, 1.6],
     }  # fmt: skip
     assert "Missing torque" in write_report(tmp_path).read_text()
-    assert [s.name for s in plots["Motor angle"].series] == ["measured", "before", "after"]
+    assert [s.name for s in plots["Motor angle"].series] == ["measured", "model as given", "corrected model"]
     before, after = plots["Motor angle: simulated minus measured"].series
     assert list(before.y) == [0.0, pytest.approx(0.1)]
     assert list(after.y) == [0.0, pytest.approx(0.001)]
@@ -268,7 +280,11 @@ def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delive
     assert report.summary == "The log has coulomb friction at the axis."
     assert report.badge == ("warn", "amber: effects are missing")
     texts = {text.title: text.paragraphs for text in sections(report, Text)}
-    difference, output = sections(report, Plot)
+    worth, difference, output = sections(report, Plot)
+    np.testing.assert_array_equal(worth.series[0].x, [2.0, 3.0])
+    assert [(s.name, s.y.tolist()) for s in worth.series] == [
+        ("model as given", [1.0, 1.0]), ("corrected model", [0.0, 0.0]),
+    ]  # fmt: skip
     assert (difference.title, output.title) == ("theta_m: simulated minus measured", "theta_m")
     assert [s.name for s in output.series] == [
         "measured", "model as given", "with re-fitted parameters", "with the effects",
@@ -276,11 +292,11 @@ def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delive
     np.testing.assert_allclose(difference.series[1].y, [0.0, 0.2, np.nan, np.nan])
     assert [(s.start, s.end, s.name) for s in output.spans] == [(2.0, 3.0, "test data")]
     assert texts["In words"] == ("What is left follows nothing.",)
-    assert texts["Take note"] == ("the record is short",)
+    assert texts["Notes"] == ("the record is short",)
     (left,) = sections(report, Facts)
     assert left.items == (("share of the power of theta_m [%]", 1.0),)
     tables = {table.title: table.rows for table in sections(report, ReportTable)}
-    assert tables["What is missing"][0][:4] == ("coulomb friction", "axis", "certain", "level")
+    assert tables["What is missing"] == (("Coulomb friction at axis", "certain", "level 0.8 N.m (95 %: 0.79 to 0.81)"),)
     assert tables["Corrected system"][0][:3] == ("corrected.ssp", "coulomb_friction@axis", 0.5)
     assert ("runs of the FMU", 1994) in report.origin
 

@@ -9,4 +9,4 @@ T = TypeVar("T")
 
 def sections(report: Report, kind: type[T]) -> list[T]:
     """Return the sections of one kind, in the order of the page."""
-    return [section for section in report.sections if isinstance(section, kind)]
+    return [section for section in report.all_sections() if isinstance(section, kind)]

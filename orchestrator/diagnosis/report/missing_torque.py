@@ -21,8 +21,8 @@ class MissingTorque:
     """The missing torque over the signal that an effect's law follows: means of bins, or values over the time.
 
     Attributes:
-        label: of the effect.
-        x_label: signal and unit.
+        label: name and site, as the bank of effects has them.
+        x_label: the signal that the law follows, with its unit in brackets.
         y_label: torque or force, its place and unit.
         x: (n,) NaN where the signal leaves a wide gap.
         missing: (n,) what is missing without the effect.

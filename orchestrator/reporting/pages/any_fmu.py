@@ -1,12 +1,20 @@
 """The page of a diagnosis of any FMU: what is missing around it, how far the misfit shrinks, what is left."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
-from orchestrator.reporting.model import Badge, Cell, Facts, Plot, Report, Section, Series, Span, Text
+from orchestrator.reporting.model import Badge, Cell, Facts, Fold, Plot, Report, Section, Series, Span, Text
+from orchestrator.reporting.pages.diagnosis_answer import (
+    answer_table,
+    headline,
+    in_words,
+    next_steps,
+    place_words,
+    worth_on_test_data,
+)
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.source import ResultDocument, table_of, words
+from orchestrator.reporting.source import Array, ResultDocument, table_of
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
@@ -26,67 +34,73 @@ def build(source: ResultDocument) -> Report:
     """Return the page."""
     found = read(source.results, FmuDiagnosisFound)
     badge, label = VERDICTS.get(found.verdict, ("neutral", found.verdict))
-    sentence = found.summary[0].partition(". ")[2] if found.summary else f"{label[:1].upper()}{label[1:]}."
+    table = source.signals("diagnose.csv")
     made = (("walls", found.walls), ("runs of the FMU", found.runs), ("time taken [s]", found.seconds))
-    return Report(
-        title="Diagnosis of an FMU",
-        summary=sentence,
-        badge=trust_badge(found.trust, label, badge),
-        sections=(
-            *trust_section(found.trust),
-            *_effect_sections(found),
-            *_misfit(found, source),
+    reasons = () if found.trust is None else found.trust.reasons
+    notes = tuple(text for text in found.notes if text not in reasons)
+    folds: dict[str, list[Section]] = {
+        "Take note": [Text("Notes", notes)] if notes else [],
+        "In words": in_words([text for text in found.summary if text not in reasons]),
+        "Evidence for each effect": _evidence(found.effects),
+        "Test data": [*_misfit(found), *_output_plots(found, table)],
+        "What is left": _residual_sections(found.remaining),
+        "Values and search": [
             *_search_sections(found),
             *sections_of("More", {k: v for k, v in source.results.items() if k not in KNOWN}),
+        ],
+    }
+    return Report(
+        title="Diagnosis of an FMU",
+        summary=headline(found.summary) or f"{label[:1].upper()}{label[1:]}.",
+        badge=trust_badge(found.trust, label, badge),
+        sections=(
+            *answer_table(found.effects),
+            *trust_section(found.trust),
+            *worth_on_test_data(found.test, _test_part(found, table), ("nominal", "corrected")),
+            *next_steps(found.summary),
+            *_delivery_sections(found.delivery),
+            *(Fold(title, tuple(inside)) for title, inside in folds.items() if inside),
         ),
         origin=source.origin(*made),
         downloads=source.downloads(),
     )
 
 
-def _effect_sections(results: FmuDiagnosisFound) -> list[Section]:
-    """Return the effects, and what is said in sentences."""
-    sections: list[Section] = []
-    if results.effects:
-        sections.append(table_of("What is missing", [row for effect in results.effects for row in _rows(effect)]))
-    reasons = () if results.trust is None else results.trust.reasons
-    for title, texts in (("In words", results.summary[1:]), ("Take note", results.notes)):
-        lines = tuple(text for text in texts if text not in reasons)
-        if lines:
-            sections.append(Text(title, lines))
-    return sections
+def _test_part(results: FmuDiagnosisFound, table: dict[str, Array]) -> dict[str, Array]:
+    """Return the rows of a record that are test data, all where no part of it is."""
+    if results.test_start is None or "time" not in table:
+        return table
+    rows = table["time"] >= results.test_start
+    return {name: values[rows] for name, values in table.items()}
 
 
-def _rows(effect: EffectFound) -> list[dict[str, object]]:
-    return [
+def _evidence(effects: Sequence[EffectFound]) -> list[Section]:
+    rows = [
         {
-            "effect": words(effect.name),
-            "at": effect.site,
+            "effect": place_words(effect.name, effect.site),
             "grade": effect.grade,
-            "parameter": name,
-            "value": value.value,
-            "95 % interval": "" if value.interval is None else "{:.6g} to {:.6g}".format(*value.interval),
-            "unit": value.unit,
+            "error on blocks left out that it removes [%]": None if effect.gain is None else 100.0 * effect.gain,
+            "over its uncertainty": effect.t,
             "not told from": ", ".join(effect.family),
+            "rules that lower the grade": ", ".join(effect.lowered_by),
         }
-        for name, value in effect.parameters.items()
+        for effect in effects
     ]
+    return [table_of("How sure", rows)] if rows else []
 
 
-def _misfit(results: FmuDiagnosisFound, source: ResultDocument) -> list[Section]:
-    """Return the misfit as a table, and the outputs over the first record."""
+def _misfit(results: FmuDiagnosisFound) -> list[Section]:
+    """Return the misfit as a table."""
     rows = [
         {"record": test.source, "output": name, **msgspec.structs.asdict(values)}
         for test in (*results.test, *([results.validation] if results.validation else []))
         for name, values in test.misfit.items()
     ]
-    sections: list[Section] = [table_of("Misfit of runs on data that nothing was fitted to", rows)] if rows else []
-    return [*sections, *_output_plots(results, source)]
+    return [table_of("Misfit of runs on data that nothing was fitted to", rows)] if rows else []
 
 
-def _output_plots(results: FmuDiagnosisFound, source: ResultDocument) -> list[Section]:
+def _output_plots(results: FmuDiagnosisFound, table: dict[str, Array]) -> list[Section]:
     """Return each output, measured and simulated, and what each simulation misses of it; shaded: test data."""
-    table = source.signals("diagnose.csv")
     units = {name: misfit.unit for test in results.test for name, misfit in test.misfit.items()}
     made: list[Section] = []
     for name in (n for n in units if n in table and "time" in table):
@@ -101,7 +115,7 @@ def _output_plots(results: FmuDiagnosisFound, source: ResultDocument) -> list[Se
 
 
 def _search_sections(results: FmuDiagnosisFound) -> list[Section]:
-    """Return parameters, candidates, what is left, and the corrected system."""
+    """Return parameters and candidates."""
     sections: list[Section] = []
     parameters = [{"parameter": name, **msgspec.structs.asdict(p)} for name, p in results.parameters.items()]
     if parameters:
@@ -118,7 +132,7 @@ def _search_sections(results: FmuDiagnosisFound) -> list[Section]:
     ]
     if tried:
         sections.append(table_of("Candidates", tried))
-    return [*sections, *_residual_sections(results.remaining), *_delivery_sections(results.delivery)]
+    return sections
 
 
 def _residual_sections(remaining: FmuRemainingFound) -> list[Section]:

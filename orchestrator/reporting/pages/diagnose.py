@@ -4,6 +4,7 @@ left.
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from orchestrator.reporting.model import (
     Bars,
     Cell,
     Facts,
+    Fold,
     Plot,
     Report,
     ReportTable,
@@ -22,8 +24,18 @@ from orchestrator.reporting.model import (
     Text,
 )
 from orchestrator.reporting.pages import any_fmu
+from orchestrator.reporting.pages.diagnosis_answer import (
+    SIGNALS,
+    SIZES,
+    answer_table,
+    headline,
+    in_words,
+    next_steps,
+    place_words,
+    worth_on_test_data,
+)
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.pages.record import record_plots
+from orchestrator.reporting.pages.record import signal_plots
 from orchestrator.reporting.source import ResultDocument, words
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
@@ -32,17 +44,13 @@ from orchestrator.shared.results.diagnose import (
     DiagnoseFound,
     EffectFound,
     LearnedFound,
-    NuisanceFound,
     ParameterFound,
     RemainingFound,
     StepFound,
     TestFound,
-    ValueFound,
 )
 
 KNOWN = frozenset(DiagnoseFound.__struct_fields__)
-SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
-SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the drive"}
 MODELS = {"nominal": "model as given", "parameters": "with re-fitted parameters", "final": "with the effects"}
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "none": ("good", "nothing is missing", "The model explains the record."),
@@ -63,25 +71,37 @@ def build(source: ResultDocument) -> Report:
         return any_fmu.build(source)
     results = read(source.results, DiagnoseFound)
     badge, label, sentence = VERDICTS[results.verdict]
-    live = results.live
-    sections: list[Section] = [*_in_short(results), *trust_section(results.trust), *_effect_tables(results.effects)]
-    sections += _nuisances(results.nuisances)
-    if results.notes:
-        sections.append(Text("Take note", tuple(_sentence(note) for note in results.notes)))
-    for test in results.test:
-        sections += [*_misfit_sections(test), _test_table(f"Misfit on test data of {test.source}", test)]
-    if results.validation is not None:
-        sections.append(_test_table(f"Misfit on the other record, {results.validation.source}", results.validation))
-    sections += _torque_left([*results.test, *([results.validation] if results.validation else [])])
-    sections += [*_missing_plots(results.effects), *_block_plots(results.effects)]
-    sections += [*_residual_sections(results.remaining), *_law_sections(results.learned_law)]
+    table, live = source.signals("diagnose.csv"), results.live
+    restarts = live.rows if live else ()
+    sections: list[Section] = [
+        *answer_table(results.effects, results.nuisances),
+        *trust_section(results.trust),
+        *worth_on_test_data(results.test, table, ("before", "after"), restarts),
+        *next_steps(results.summary, _on_the_corrected_model(results)),
+    ]
+    notes = tuple(_sentence(note) for note in results.notes)
     metric = any(signal.unit == "m" for test in results.test for signal in test.misfit.values())
-    sections += record_plots(source, "diagnose.csv", live.rows if live else (), metric)
-    sections += [_parameter_table(results.parameters), *_candidate_table(results.candidates), *_analysis(results)]
-    sections += sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"})
+    folds: dict[str, list[Section]] = {
+        "Take note": [Text("Notes", notes)] if notes else [],
+        "In words": in_words(results.summary),
+        "Evidence for each effect": [
+            *_reasons(results.effects),
+            *_missing_plots(results.effects),
+            *_block_plots(results.effects),
+        ],
+        "Test data": [*_tests(results), *signal_plots(table, restarts, metric)],
+        "What is left": [*_residual_sections(results.remaining), *_law_sections(results.learned_law)],
+        "Values, search and analysis": [
+            _parameter_table(results.parameters),
+            *_candidate_table(results.candidates),
+            *_analysis(results),
+            *sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"}),
+        ],
+    }
+    sections += [Fold(title, tuple(inside)) for title, inside in folds.items() if inside]
     return Report(
         title="Diagnosis",
-        summary=" ".join(filter(None, [sentence, _effect_names(results.effects), _note_on_closed_loop(results.test)])),
+        summary=headline(results.summary) or " ".join(filter(None, [sentence, _effect_names(results.effects)])),
         badge=trust_badge(results.trust, label, badge),
         sections=tuple(sections),
         origin=source.origin(("corrected model", results.model), ("time taken [s]", results.seconds)),
@@ -90,60 +110,44 @@ def build(source: ResultDocument) -> Report:
     )
 
 
-def _in_short(results: DiagnoseFound) -> list[Section]:
-    """Return the answer in words, and how the corrected model is used."""
-    lines = [line.strip() for line in results.summary]
-    if not lines:
-        return []
-    if results.model:
-        lines.append(
-            f"The corrected model is {results.model}: variables as in the model that was given, corrected values as "
-            "start values, for any FMI 2.0 tool. corrected.toml beside it is its model file: a diagnosis with it "
-            "as the model, without search, judges a new record."
-        )
-    return [Text("In short", tuple(lines))]
+def _on_the_corrected_model(results: DiagnoseFound) -> str:
+    """Return how the corrected model is used; empty where there is none."""
+    if not results.model:
+        return ""
+    return (
+        f"The corrected model is {Path(results.model).name}: for any FMI 2.0 tool, variables as in the given model, "
+        "corrected values as start values. corrected.toml beside it is its model file: a diagnosis with it, without "
+        "search, judges a new record."
+    )
+
+
+def _tests(results: DiagnoseFound) -> list[Section]:
+    """Return how the models do on test data and on another record."""
+    made: list[Section] = []
+    for test in results.test:
+        made += [*_misfit_sections(test), _test_table(f"Misfit on test data of {test.source}", test)]
+    if results.validation is not None:
+        made.append(_test_table(f"Misfit on the other record, {results.validation.source}", results.validation))
+    return made + _torque_left([*results.test, *([results.validation] if results.validation else [])])
 
 
 def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
 
 
-def _place_words(name: str, site: str) -> str:
-    """Return an effect at its site in words."""
-    name = words(name).replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
-    return f"{name} {SITES.get(site, site)}"
-
-
 def _effect_names(effects: Sequence[EffectFound]) -> str:
-    named = [f"{_place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
+    named = [f"{place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
     listed = " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]]))
     return f"The model lacks {listed}." if named else ""
 
 
-def _note_on_closed_loop(tests: Sequence[TestFound]) -> str:
-    parts = []
-    for test in tests[:1]:
-        for signal, g in test.misfit.items():
-            if g.nominal is None or g.final is None:
-                continue
-            noise = f" (noise: {g.noise:.3g})" if g.noise is not None else ""
-            name = SIGNALS.get(signal, signal)
-            parts.append(f"of the {name} goes from {g.nominal:.3g} to {g.final:.3g} {g.unit}{noise}")
-    return f"On test data the rms misfit {'; that '.join(parts)}." if parts else ""
-
-
-def _effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
-    """Return what the model lacks, how sure each effect is, and why: two tables, none without effects."""
+def _reasons(effects: Sequence[EffectFound]) -> list[Section]:
+    """Return how sure each effect is, and why; none without effects."""
     if not effects:
         return []
-    sizes = tuple(
-        (_place_words(e.name, e.site), e.grade, words(name), _quantity(p))
-        for e in effects
-        for name, p in e.parameters.items()
-    )
     reasons = tuple(
         (
-            _place_words(e.name, e.site), e.grade, _percent(e.gain), e.t, _percent(e.explains.torque),
+            place_words(e.name, e.site), e.grade, _percent(e.gain), e.t, _percent(e.explains.torque),
             _percent(e.explains.motion), "yes" if e.in_model else "no",
             ", ".join(_label_words(label) for label in e.family) or None, ", ".join(e.lowered_by) or None,
         )
@@ -153,37 +157,13 @@ def _effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
         "effect", "grade", TAKES, "over its uncertainty", "explains of the missing torque [%]",
         "of the misfit on test data [%]", "in the corrected model", "not told from", "rules that lower the grade",
     )  # fmt: skip
-    columns = tuple(map(TableColumn, ("effect", "grade", "quantity", "value")))
     note = "The corrected model has the effects that are likely before the test data are opened."
-    return [
-        ReportTable("What the model lacks", columns, sizes, note),
-        ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons),
-    ]
+    return [ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons, note)]
 
 
 def _label_words(label: str) -> str:
     name, _, site = label.partition("@")
-    return _place_words(name, site)
-
-
-def _nuisances(nuisances: Sequence[NuisanceFound]) -> list[Section]:
-    rows = tuple(
-        (words(n.name), n.grade, words(name), _quantity(p)) for n in nuisances for name, p in n.parameters.items()
-    )
-    columns = tuple(map(TableColumn, ("property", "grade", "quantity", "value")))
-    return [ReportTable("What the log has, and the machine has not", columns, rows)] if rows else []
-
-
-def _quantity(p: ValueFound) -> str:
-    """Return a value with its interval and unit."""
-    if p.value is None:
-        return "unknown"
-    unit = "" if p.unit in (None, "1") else f" {p.unit}"
-    low, high = p.interval or (None, None)
-    if low is not None and high is not None:
-        return f"{p.value:.5g}{unit} (95 %: {low:.5g} to {high:.5g})"
-    error = f" ± {p.standard_error:.2g}" if p.standard_error is not None else ""
-    return f"{p.value:.5g}{error}{unit}"
+    return place_words(name, site)
 
 
 def _misfit_sections(test: TestFound) -> list[Section]:
@@ -228,7 +208,7 @@ def _missing_plots(effects: Sequence[EffectFound]) -> list[Section]:
             mean, spread = (np.array(values, dtype=float) for values in (curve.missing, curve.spread))
             missing = Series("missing torque, mean and spread", curve.x, mean, "points", mean - spread, mean + spread)
         law = Series("of it the effect", curve.x, curve.law)
-        title = f"Missing torque: {_place_words(effect.name, effect.site)}"
+        title = f"Missing torque: {place_words(effect.name, effect.site)}"
         made.append(Plot(title, curve.x_label, curve.y_label, (missing, law), note=MISSING))
     return made
 
@@ -249,8 +229,9 @@ def _block_plots(effects: Sequence[EffectFound]) -> list[Section]:
                 for label, value in (("of all", size.value), ("95 % from", low), ("to", high))
                 if value is not None
             ]
-            label = f"{words(name)} [{size.unit or '1'}]"
-            title = f"Block by block: {_place_words(effect.name, effect.site)}, {words(name)}"
+            what = SIZES.get(name, words(name))
+            label = f"{what} [{size.unit or '1'}]"
+            title = f"Block by block: {place_words(effect.name, effect.site)}, {what}"
             made.append(Plot(title, "block of the record", label, tuple(series), note=BLOCKS))
     return made
 
@@ -325,7 +306,7 @@ def _candidate_table(steps: Sequence[StepFound]) -> list[Section]:
         ]
     if not rows:
         return []
-    columns = ("step", "on top of", "tried", TAKES, "over its uncertainty", "")
+    columns = ("step", "on top of", "tried", TAKES, "over its uncertainty", "in the model")
     return [ReportTable("What was tried", tuple(TableColumn(c, "", 3) for c in columns), tuple(rows), limit=200)]
 
 

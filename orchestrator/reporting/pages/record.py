@@ -20,6 +20,7 @@ SIGNALS = {
 # The same of an axis that moves in metres.
 METRIC = {"rad": "m", "rad/s": "m/s", "N.m": "N", "angle": "position", "torque": "force", "Twist": "Stretch"}
 GIVEN = {"u": "requested"}  # what is not measured
+RUNS = {"before": "model as given", "after": "corrected model"}
 HELD = frozenset({"u"})  # from sample to sample
 MOST_SPANS = 1000
 Array = NDArray[np.float64]
@@ -39,12 +40,13 @@ def record_plots(
     For each signal with simulated columns a plot of simulated minus measured comes first. Empty where there is no
     such file, or no column ``time``. ``metric``: the axis moves in metres.
     """
-    table = source.signals(name)
-    return list(signal_plots(table, restarts, metric)) if "time" in table else []
+    return list(signal_plots(source.signals(name), restarts, metric))
 
 
 def signal_plots(table: Table, restarts: Sequence[int] = (), metric: bool = False) -> Iterator[Plot]:
     """Yield the plots of a table; see ``record_plots``."""
+    if "time" not in table:
+        return
     time = table["time"]
     moments = tuple(Span(float(t), float(t), "free run starts anew") for t in time[list(restarts)] if np.isfinite(t))
     spans = out_of_contact(time, table["contact"]) if "contact" in table else ()
@@ -66,7 +68,8 @@ def signal_plots(table: Table, restarts: Sequence[int] = (), metric: bool = Fals
 
 
 def _words(column: str, signal: str) -> str:
-    return column.removeprefix(f"{signal}_").replace("_", " ")
+    ending = column.removeprefix(f"{signal}_")
+    return RUNS.get(ending, ending.replace("_", " "))
 
 
 def out_of_contact(time: Array, contact: Array) -> tuple[Span, ...]:

@@ -86,3 +86,17 @@ document.querySelectorAll("table.sortable").forEach(sortable);
 document.querySelectorAll("table.sortable").forEach(fitted);
 document.querySelectorAll("figure.plot").forEach((figure) => new Plot(figure));
 unitSwitch(document.getElementById("units"));
+
+// Paper shows what is folded, and a link into a fold opens it.
+function openFolds(folds) {
+  folds.forEach((fold) => (fold.open = true));
+  return folds;
+}
+
+let opened = [];
+addEventListener("beforeprint", () => (opened = openFolds([...document.querySelectorAll("details.fold:not([open])")])));
+addEventListener("afterprint", () => opened.forEach((fold) => (fold.open = false)));
+addEventListener("hashchange", () => {
+  const fold = document.getElementById(location.hash.slice(1))?.closest("details.fold");
+  if (fold) openFolds([fold]);
+});

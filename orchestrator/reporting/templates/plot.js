@@ -51,7 +51,7 @@ class Plot {
       this.button("−", "Zoom out", () => this.zoom(2)),
       this.button("◀", "Move left", () => this.move(-0.25)),
       this.button("▶", "Move right", () => this.move(0.25)),
-      this.button("Reset", "Show everything", () => this.reset()));
+      this.button("Reset", "Reset", () => this.reset()));
     this.svg = shape("svg", { tabindex: 0, role: "img", "aria-label": this.description() });
     this.tip = element("div", { class: "tip", hidden: "" });
     this.spoken = element("div", { class: "quiet", "aria-live": "polite" });
@@ -201,6 +201,8 @@ class Plot {
     }
     const up = label(0, 0, Units.label(this.data.yLabel), "middle");
     up.setAttribute("transform", `translate(13 ${(y.from + y.to) / 2}) rotate(-90)`);
+    if (6.5 * up.textContent.length > y.from) up.setAttribute("textLength", y.from); // narrower letters, none cut
+    up.setAttribute("lengthAdjust", "spacingAndGlyphs");
     made.push(label((x.from + x.to) / 2, height - 6, Units.label(this.data.xLabel), "middle"), up);
     return made;
   }

@@ -1,0 +1,111 @@
+"""What a page of a diagnosis says first: what is missing, how sure, how large, what it is worth, what to do next."""
+
+from collections.abc import Mapping, Sequence
+
+from orchestrator.reporting.model import Plot, ReportTable, Section, Series, Span, TableColumn, Text
+from orchestrator.reporting.source import Array, words
+from orchestrator.shared.results.diagnose import EffectFound, NuisanceFound, SignalMisfitFound, TestFound, ValueFound
+
+SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the drive"}
+SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
+SIZES = {"alpha": "half-gap"}
+NEXT = "Next: "
+AS_GIVEN, CORRECTED = "model as given", "corrected model"
+
+
+def headline(summary: Sequence[str]) -> str:
+    """Return the verdict's sentence out of a summary, without the verdict's word; empty where there is none."""
+    return summary[0].partition(". ")[2] if summary else ""
+
+
+def answer_table(effects: Sequence[EffectFound], nuisances: Sequence[NuisanceFound] = ()) -> list[Section]:
+    """Return a table of what is missing, how sure and how large; empty where nothing is."""
+    rows = [(place_words(e.name, e.site), e.grade, _sizes(e.parameters)) for e in effects]
+    rows += [(f"{words(n.name)} (in the log)", n.grade, _sizes(n.parameters)) for n in nuisances]
+    columns = (TableColumn("effect"), TableColumn("how sure"), TableColumn("how large"))
+    return [ReportTable("What is missing", columns, tuple(rows))] if rows else []
+
+
+def worth_on_test_data(
+    tests: Sequence[TestFound], table: Mapping[str, Array], runs: tuple[str, str], restarts: Sequence[int] = ()
+) -> list[Section]:
+    """Return what the corrected model is worth: the misfit of the signal that it betters most, over the test time.
+
+    Args:
+        tests: misfits on test data; the first is that of ``table``.
+        table: ``time`` [s], measured signals, and simulated ones by the endings of their names.
+        runs: endings of the columns of the model as given and of the corrected one.
+        restarts: rows from which free runs start anew.
+    """
+    if not tests or not tests[0].misfit:
+        return []
+    name, misfit = max(tests[0].misfit.items(), key=lambda item: _share(item[1]))
+    said = [_misfit_sentence(signal, one) for signal, one in tests[0].misfit.items()]
+    said += ["The corrected model does worse than re-fitted parameters."] * tests[0].worse
+    note = " ".join(filter(None, said))
+    columns = [f"{name}_{ending}" for ending in runs]
+    if "time" not in table or name not in table or not any(column in table for column in columns):
+        return [Text(WORTH, (note,))] if note else []
+    time = table["time"]
+    series = tuple(
+        Series(label, time, table[column] - table[name])
+        for label, column in zip((AS_GIVEN, CORRECTED), columns, strict=True)
+        if column in table
+    )
+    moments = tuple(Span(float(time[row]), float(time[row]), "free run starts anew") for row in restarts)
+    label = f"error of the {SIGNALS.get(name, name)} [{misfit.unit or '1'}]"
+    return [Plot(WORTH, "time [s]", label, series, moments, note=note)]
+
+
+WORTH = "What the corrected model is worth on test data"
+
+
+def next_steps(summary: Sequence[str], more: str = "") -> list[Section]:
+    """Return what to do next, as the summary says it."""
+    steps = [line.strip().removeprefix(NEXT) for line in summary if line.strip().startswith(NEXT)]
+    lines = tuple(f"{step[:1].upper()}{step[1:]}" for step in steps) + ((more,) if more else ())
+    return [Text("What to do next", lines)] if lines else []
+
+
+def in_words(summary: Sequence[str]) -> list[Section]:
+    """Return the rest of a summary."""
+    lines = tuple(line.strip() for line in summary[1:] if not line.strip().startswith(NEXT))
+    return [Text("In words", lines)] if lines else []
+
+
+def place_words(name: str, site: str) -> str:
+    """Return an effect at its site in words."""
+    name = words(name).replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
+    return f"{name} {SITES.get(site, f'at {site}')}"
+
+
+def quantity(p: ValueFound) -> str:
+    """Return a value with its interval and unit."""
+    if p.value is None:
+        return "unknown"
+    unit = "" if p.unit in (None, "1") else f" {p.unit}"
+    low, high = p.interval or (None, None)
+    if low is not None and high is not None:
+        return f"{p.value:.5g}{unit} (95 %: {low:.5g} to {high:.5g})"
+    error = f" ± {p.standard_error:.2g}" if p.standard_error is not None else ""
+    return f"{p.value:.5g}{error}{unit}"
+
+
+def _sizes(parameters: Mapping[str, ValueFound]) -> str:
+    return "; ".join(f"{SIZES.get(name, words(name))} {quantity(p)}" for name, p in parameters.items())
+
+
+def _share(misfit: SignalMisfitFound) -> float:
+    """Return how many times smaller the misfit has become."""
+    return 0.0 if misfit.nominal is None or not misfit.final else misfit.nominal / misfit.final
+
+
+def _misfit_sentence(signal: str, g: SignalMisfitFound) -> str:
+    if g.nominal is None or g.final is None:
+        return ""
+    unit = "" if g.unit in (None, "1") else f" {g.unit}"
+    ratio = _share(g)
+    times = f", {f'{ratio:.0f}' if ratio >= 10.0 else f'{ratio:.2g}'} times less" if ratio > 1.05 else ""
+    noise = f"; the noise is {g.noise:.3g}{unit}" if g.noise is not None else ""
+    name = SIGNALS.get(signal, signal)
+    return f"The rms misfit of the {name} goes from {g.nominal:.3g} to {g.final:.3g}{unit}{times}{noise}."
