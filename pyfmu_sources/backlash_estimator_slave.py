@@ -13,6 +13,7 @@ U, THETA_M, THETA_L, ALPHA_HAT, ALPHA_DEVIATION, CONTACT_HAT, FIRST_ESTIMATE = r
 FIRST_MODEL = FIRST_ESTIMATE + 6
 FIRST_SETTING = FIRST_MODEL + 8
 SAMPLE_TIME = FIRST_SETTING + 9
+OFFSET_HAT = SAMPLE_TIME + 1
 
 _MEASURED = ("theta_m", "theta_l")
 _STATES = (
@@ -78,7 +79,12 @@ class BacklashEstimator(SampledSlave):
             for name, unit, text, least in _SETTINGS
         ),
         FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1.0),
-    )
+        # Behind the others, whose value references stay.
+        FmuVariable(
+            "offset_hat", "output", "rad", None, "Estimated twist in mid-gap", variability="discrete",
+            depends_on=_MEASURED,
+        ),
+    )  # fmt: skip
     terminals: ClassVar[Terminals] = {"encoder": {"motor": "theta_m", "load": "theta_l"}}
 
     _model: Model
@@ -126,3 +132,4 @@ class BacklashEstimator(SampledSlave):
         real[CONTACT_HAT] = float(source.contact(state, self._model[6]))
         for n in range(6):
             real[FIRST_ESTIMATE + n] = state[n]
+        real[OFFSET_HAT] = state[8]

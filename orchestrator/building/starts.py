@@ -1,4 +1,4 @@
-"""Default gains of the controller's and the estimator's FMU, so that each runs alone in any tool.
+"""Default gains of the controllers' and the estimator's FMUs, so that each runs alone in any tool.
 
 They are the design of the default experiment: thesis values, 1 ms. The designed values are stored, not computed at
 every build: the linear algebra libraries of two machines differ by up to 3e-8 in a gain, which would show in the FMUs'
@@ -19,14 +19,15 @@ ENCODER_NOISE = 1e-4
 
 
 def default_starts(class_name: str) -> dict[str, float]:
-    """Return the stored start values that are designed rather than written down: those of two FMUs, else none."""
+    """Return the stored start values that are designed rather than written down: those of three FMUs, else none."""
     stored: dict[str, dict[str, float]] = json.loads(STORED.read_text(encoding="ascii"))
     return stored.get(class_name, {})
 
 
 def design_starts() -> dict[str, dict[str, float]]:
     """Return the start values as this machine designs them, by class name, to twelve digits."""
-    designs = {"LqrController": _controller(), "KalmanEstimator": _estimator()}
+    controller = _controller()
+    designs = {"LqrController": controller, "KalmanEstimator": _estimator(), "BacklashCompensator": controller}
     return {name: {key: float(f"{value:.12g}") for key, value in values.items()} for name, values in designs.items()}
 
 

@@ -18,6 +18,7 @@ NAMES = {
     "LqrController": "lqr_slave",
     "KalmanEstimator": "kalman_slave",
     "BacklashEstimator": "backlash_estimator_slave",
+    "BacklashCompensator": "backlash_compensator_slave",
     "ServoAxis": "servo_axis_slave",
 }
 

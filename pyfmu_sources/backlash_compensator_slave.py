@@ -1,0 +1,146 @@
+"""The FMU ``BacklashCompensator``: adapter from FMI to :mod:`backlash_compensator`."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from .backlash_compensator import Gap, Movement, Train, Tuning, act, start_movement
+from .fmu_variables import FmuVariable
+from .gap_traversal import Traversal
+from .lqr import Estimate, Gains
+from .sampled_slave import SampledSlave
+
+REFERENCE, REFERENCE_SPEED, FIRST_ESTIMATE = range(3)
+ALPHA, DEVIATION, OFFSET, U, FLANK, CROSSING, FIRST_GAIN = range(FIRST_ESTIMATE + 6, FIRST_ESTIMATE + 13)
+FIRST_TRAIN = FIRST_GAIN + 5
+FIRST_TUNING = FIRST_TRAIN + 7
+SAMPLE_TIME = FIRST_TUNING + 5
+
+_INPUTS = (
+    ("reference", "rad", "Wanted load angle"),
+    ("reference_speed", "rad/s", "Wanted load speed"),
+    ("theta_m_hat", "rad", "Estimated motor angle"),
+    ("omega_m_hat", "rad/s", "Estimated motor speed"),
+    ("theta_l_hat", "rad", "Estimated load angle"),
+    ("omega_l_hat", "rad/s", "Estimated load speed"),
+    ("T_l_hat", "N.m", "Estimated load torque"),
+    ("T_m_hat", "N.m", "Estimated motor torque"),
+    ("alpha_hat", "rad", "Estimated half-gap; 0: not known"),
+    ("alpha_deviation", "rad", "Standard deviation of the estimated half-gap"),
+    ("offset_hat", "rad", "Estimated twist in mid-gap"),
+)
+_OUTPUTS = (
+    ("u", "N.m", "Requested motor torque", 100.0),
+    ("flank", "1", "Flank that is held or approached: -1 or 1", 1.0),
+    ("crossing", "1", "1 while the wanted flank is approached, 0 while it is held", 1.0),
+)
+_GAINS = (
+    ("K[1]", "N.m/rad", "Gain of the motor angle"),
+    ("K[2]", "N.m.s/rad", "Gain of the motor speed"),
+    ("K[3]", "N.m/rad", "Gain of the load angle"),
+    ("K[4]", "N.m.s/rad", "Gain of the load speed"),
+    ("K[5]", "1", "Gain of the motor torque"),
+)
+_TRAIN = (
+    ("J_m", "kg.m2", 0.4, "Motor inertia", 1e-9),
+    ("J_l", "kg.m2", 5.6, "Load inertia", 1e-9),
+    ("b_m", "N.m.s/rad", 0.1, "Viscous friction of the motor", 0.0),
+    ("b_l", "N.m.s/rad", 1.0, "Viscous friction of the load", 0.0),
+    ("i", "1", 3.984, "Gear ratio: motor angle over load angle", 1e-9),
+    ("compliance", "rad/(N.m)", 1.0 / 3300.0, "Compliance of the shaft", 0.0),
+    ("tau", "s", 1.0, "Time constant of the motor's torque", 1e-6),
+)
+_TUNING = (
+    ("impact_speed", "rad/s", 0.1, "Speed of the twist at which to land", 1e-6, 1e6),
+    ("torque_share", "1", 0.85, "Share of the torque limit that a plan uses", 0.01, 1.0),
+    ("u_max", "N.m", 1e4, "Torque limit", 1e-9, 1e12),
+    ("flank_torque", "N.m", 2.0, "Wanted torque against a flank from which it is left", 0.0, 1e12),
+    ("margin", "rad", 3e-4, "Way before the flank at which a plan ends: noise of the encoders", 0.0, 1e6),
+)
+_INPUT_NAMES = tuple(row[0] for row in _INPUTS)
+_PARAMETER_NAMES = tuple(row[0] for row in (*_GAINS, *_TRAIN, *_TUNING))
+
+
+class BacklashCompensator(SampledSlave):
+    """Sampled-data controller that crosses the gap in little time, lands softly, and holds on one flank."""
+
+    title = "Controller that crosses the gap of a drivetrain quickly and lands softly, around the gains of an LQR"
+    sample_time_reference = SAMPLE_TIME
+    table: ClassVar[tuple[FmuVariable, ...]] = (
+        *(FmuVariable(name, "input", unit, 0.0, text) for name, unit, text in _INPUTS),
+        *(
+            FmuVariable(
+                name, "output", unit, None, text, nominal=nominal, variability="discrete", depends_on=_INPUT_NAMES,
+                starts_from=(*_INPUT_NAMES, *_PARAMETER_NAMES),
+            )
+            for name, unit, text, nominal in _OUTPUTS
+        ),
+        *(FmuVariable(name, "parameter", unit, 0.0, text) for name, unit, text in _GAINS),
+        *(FmuVariable(name, "parameter", unit, start, text, least, 1e12) for name, unit, start, text, least in _TRAIN),
+        *(FmuVariable(name, "parameter", unit, start, text, least, most)
+            for name, unit, start, text, least, most in _TUNING),
+        FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
+    )  # fmt: skip
+
+    _gains: Gains
+    _movement: int
+    _flank: int
+    _age: int
+    _wanted: float
+    _plan: Traversal
+    _next_movement: int
+    _next_flank: int
+    _next_age: int
+    _next_wanted: float
+    _next_plan: Traversal
+
+    def take_parameters(self) -> None:
+        """Collect the gains."""
+        real = self.real
+        n = FIRST_GAIN
+        self._gains = (real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4])
+
+    def begin(self) -> None:
+        """Hold on the side on which the twist is."""
+        movement = start_movement(self._estimate(), self.real[FIRST_TRAIN + 4])
+        self._movement = movement.phase
+        self._flank = movement.flank
+        self._age = movement.samples
+        self._wanted = movement.wanted
+        self._plan = movement.traversal
+        self.correct()
+
+    def predict(self) -> None:
+        """Take over the movement of the last sample."""
+        self._movement = self._next_movement
+        self._flank = self._next_flank
+        self._age = self._next_age
+        self._wanted = self._next_wanted
+        self._plan = self._next_plan
+
+    def correct(self) -> None:
+        """Compute the torque request of this sample."""
+        real = self.real
+        movement = Movement(self._movement, self._flank, self._age, self._wanted, self._plan)
+        n = FIRST_TRAIN
+        train = Train(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6])
+        n = FIRST_TUNING
+        tuning = Tuning(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[SAMPLE_TIME])
+        gap = Gap(real[ALPHA], real[DEVIATION])
+        movement, u = act(
+            movement, real[REFERENCE], real[REFERENCE_SPEED], self._estimate(), gap, self._gains, train, tuning
+        )
+        self._next_movement = movement.phase
+        self._next_flank = movement.flank
+        self._next_age = movement.samples
+        self._next_wanted = movement.wanted
+        self._next_plan = movement.traversal
+        real[U] = u
+        real[FLANK] = float(movement.flank)
+        real[CROSSING] = float(movement.phase)
+
+    def _estimate(self) -> Estimate:
+        """Return the estimate with the twist zero in mid-gap."""
+        real = self.real
+        theta_m = real[2] - real[FIRST_TRAIN + 4] * real[OFFSET]
+        return (theta_m, real[3], real[4], real[5], real[6], real[7])

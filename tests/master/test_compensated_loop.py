@@ -1,0 +1,51 @@
+"""The compensated loop of docs/examples beside the same loop with the plain LQR, on native FMUs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.scenarios.scenario import load_scenario, simulate
+from tests.support.c_fmu import have_compiler
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "soft_landing.toml"
+NAMES = ["Drivetrain", "BacklashEstimator", "BacklashCompensator", "LqrController"]
+SETTLED = 1000  # samples after which the estimator has seen the gap
+
+pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
+
+
+def run(folder, native, known=True):
+    """The signals of the example; without a known half-gap the compensator is the plain LQR."""
+    text = EXAMPLE.read_text(encoding="utf-8").replace('"plant.T_m"', '"plant.omega_m", "plant.omega_l"')
+    for name in NAMES:
+        text = text.replace(f'fmu = "{name}"', f'fmu = "{native[name]}"')
+    if not known:
+        text = text.replace('[[connections]]\nfrom = "estimator.alpha_hat"\nto = "compensator.alpha_hat"\n', "")
+    path = folder / f"{known}.toml"
+    path.write_text(text, encoding="utf-8")
+    return simulate(load_scenario(path))
+
+
+def impacts(result):
+    """Speeds of the twist in the last sample before the teeth meet [rad/s]."""
+    contact = np.asarray(result["plant.contact"])
+    speed = np.asarray(result["plant.omega_m"]) / 3.984 - np.asarray(result["plant.omega_l"])
+    met = np.flatnonzero((contact[1:] != 0) & (contact[:-1] == 0))
+    return np.abs(speed[met[met > SETTLED]])
+
+
+@pytest.fixture(scope="module")
+def native(build_native):
+    return build_native(NAMES)
+
+
+def test_it_lands_softer_and_follows_closer_than_the_plain_lqr(tmp_path, native):
+    soft, plain = run(tmp_path, native), run(tmp_path, native, known=False)
+    time = np.asarray(soft.time)
+    wanted = 0.25 - 0.25 * np.cos(np.pi * time)
+    errors = [np.std((np.asarray(r["plant.theta_l"]) - wanted)[SETTLED:]) for r in (soft, plain)]
+    assert impacts(plain).max() > 0.3
+    assert impacts(soft).size > 2
+    assert impacts(soft).max() < 0.6 * impacts(plain).max()
+    assert errors[0] < 0.7 * errors[1]
