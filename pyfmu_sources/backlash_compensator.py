@@ -23,7 +23,7 @@ HOLD, CROSS = 0, 1
 ANY_TORQUE = 1e300  # limit of a request that is not to be limited [N.m]
 DEVIATIONS = 2.0  # of the half-gap, by which its interval reaches down and up
 LEAST_SHARE = 0.5  # of the half-gap, that the lower end of its interval must reach for a plan
-SMOOTHING = 0.02  # time constant [s] of the wanted torque: the estimated speed of the load is noisy
+SMOOTHING = 0.02  # time constant [s] of the part of the wanted torque that has the noise of estimated speeds
 SOFTEST = 0.2  # share of the impact speed with which a flank is met at rest: the impact itself moves the load
 PER_CROSSING = 5.0  # poles of the feedback times the duration of a plan
 PER_SAMPLE = 0.07  # largest poles of the feedback times the sample time
@@ -62,27 +62,31 @@ class Gap(NamedTuple):
     deviation: float
 
 
-class Movement(NamedTuple):
-    """Where it is: phase, wanted flank, samples since its plan began, smoothed wanted torque [N.m], plan."""
+class CrossingState(NamedTuple):
+    """Phase, wanted flank, samples since the plan began, smoothed part of the wanted torque [N.m], plan."""
 
     phase: int
     flank: int
     samples: int
-    wanted: float
+    smoothed: float
     traversal: Traversal
 
 
-def start_movement(x: Estimate, i: float) -> Movement:
-    """Return the movement at the first sample: hold on the side on which the twist is."""
+def start_state(x: Estimate, i: float) -> CrossingState:
+    """Return the state at the first sample: hold on the side on which the twist is."""
     flank = 1 if x[0] / i >= x[2] else -1
-    return Movement(HOLD, flank, 0, 0.0, Traversal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return CrossingState(HOLD, flank, 0, 0.0, Traversal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def wanted_torque(reference: float, reference_speed: float, x: Estimate, gains: Gains, d: Train) -> float:
-    """Return the torque [N.m] that the LQR asks of a motor that follows the load rigidly."""
+def wanted_torque(reference: float, reference_speed: float, x: Estimate, gains: Gains, d: Train) -> tuple[float, float]:
+    """Return the torque [N.m] that the LQR asks of a motor that follows the load rigidly, and the part of the angles.
+
+    The other part, of speed and load torque, has their noise.
+    """
     theta_l, omega_l, T_l = x[2], x[3], x[4]
     rigid = (d.i * (theta_l + T_l * d.compliance), d.i * omega_l, theta_l, omega_l, T_l, T_l / d.i)
-    return control(reference, reference_speed, rigid, gains, d.i, d.compliance, ANY_TORQUE)
+    whole = control(reference, reference_speed, rigid, gains, d.i, d.compliance, ANY_TORQUE)
+    return (whole, (gains[0] * d.i + gains[2]) * (reference - theta_l))
 
 
 def after_crossing(x: Estimate, duration: float, d: Train) -> Estimate:
@@ -98,17 +102,17 @@ def impact_speed(reference: float, reference_speed: float, x: Estimate, alpha: f
     return s.impact_speed * max(SOFTEST, min(1.0, need))
 
 
-def follow(movement: Movement, x: Estimate, d: Train, s: Tuning) -> float:
+def follow(state: CrossingState, x: Estimate, d: Train, s: Tuning) -> float:
     """Return the request [N.m] along the plan of a crossing.
 
     With ``e`` the error of the way the gains make ``e''' + 2.4 p e'' + 2.4 p^2 e' + p^3 e = 0`` of the chain of way,
     speed and torque. What else accelerates the twist, friction and load, is a torque that the request cancels.
     """
-    t = movement.traversal
-    side = float(movement.flank)
+    t = state.traversal
+    side = float(state.flank)
     M = d.J_m * d.i
     extra = side * (M * (d.b_l * x[3] + x[4]) / d.J_l - d.b_m * x[1])
-    time = movement.samples * s.sample_time
+    time = state.samples * s.sample_time
     aim = point_at(t, time, d.tau, M)
     duration = t.first + t.second + t.third
     p = PER_SAMPLE / s.sample_time
@@ -130,7 +134,7 @@ def plan_crossing(flank: int, x: Estimate, end: float, speed: float, d: Train, s
 
 
 def act(
-    movement: Movement,
+    state: CrossingState,
     reference: float,
     reference_speed: float,
     x: Estimate,
@@ -138,41 +142,42 @@ def act(
     gains: Gains,
     d: Train,
     s: Tuning,
-) -> tuple[Movement, float]:
-    """Return the movement and the request [N.m] of this sample.
+) -> tuple[CrossingState, float]:
+    """Return the state and the request [N.m] of this sample.
 
     Args:
         reference: wanted load angle [rad].
         reference_speed: [rad/s].
         x: estimate ``(theta_m, omega_m, theta_l, omega_l, T_l, T_m)``, whose twist is zero in mid-gap.
     """
-    phase, flank, samples, wanted, traversal = movement
-    now = wanted_torque(reference, reference_speed, x, gains, d)
-    wanted += (now - wanted) * s.sample_time / (s.sample_time + SMOOTHING)
+    phase, flank, samples, smoothed, traversal = state
+    whole, of_angles = wanted_torque(reference, reference_speed, x, gains, d)
+    smoothed += (whole - of_angles - smoothed) * s.sample_time / (s.sample_time + SMOOTHING)
+    wanted = of_angles + smoothed
     lowest = gap.alpha - DEVIATIONS * gap.deviation
     if lowest <= LEAST_SHARE * gap.alpha:
         plain = control(reference, reference_speed, x, gains, d.i, d.compliance, s.u_max)
-        return (Movement(HOLD, flank, 0, wanted, traversal), plain)
+        return (CrossingState(HOLD, flank, 0, smoothed, traversal), plain)
     end = lowest - s.margin
     speed = impact_speed(reference, reference_speed, x, gap.alpha, s)
     if phase == HOLD and wanted * flank < -s.flank_torque:
         ahead = plan((-gap.alpha, 0.0, 0.0), end, speed, s.torque_share * s.u_max, d.tau, d.J_m * d.i)
         h = ahead.first + ahead.second + ahead.third + (gap.alpha - end) / speed
-        coming = wanted_torque(reference + h * reference_speed, reference_speed, after_crossing(x, h, d), gains, d)
+        coming, _ = wanted_torque(reference + h * reference_speed, reference_speed, after_crossing(x, h, d), gains, d)
         if coming * flank < -s.flank_torque:
             phase, flank, samples = CROSS, -flank, 0
     shifted = (x[0] - flank * d.i * gap.alpha, x[1], x[2], x[3], x[4], x[5])
     held = control(reference, reference_speed, shifted, gains, d.i, d.compliance, s.u_max)
     way = flank * (x[0] / d.i - x[2])
     if way > gap.alpha:
-        return (Movement(HOLD, flank, 0, wanted, traversal), held)
+        return (CrossingState(HOLD, flank, 0, smoothed, traversal), held)
     if phase == HOLD:
         if held * flank >= 0.0:
-            return (Movement(HOLD, flank, 0, wanted, traversal), held)
+            return (CrossingState(HOLD, flank, 0, smoothed, traversal), held)
         samples = 0
     if samples == 0 or way < -gap.alpha - s.margin:
         # Still on the other flank: the way begins where that is left.
         samples = 0
         traversal = plan_crossing(flank, x, end, speed, d, s)
-    u = follow(Movement(CROSS, flank, samples, wanted, traversal), x, d, s)
-    return (Movement(CROSS, flank, samples + 1, wanted, traversal), u)
+    u = follow(CrossingState(CROSS, flank, samples, smoothed, traversal), x, d, s)
+    return (CrossingState(CROSS, flank, samples + 1, smoothed, traversal), u)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .backlash_compensator import Gap, Movement, Train, Tuning, act, start_movement
+from .backlash_compensator import CrossingState, Gap, Train, Tuning, act, start_state
 from .fmu_variables import FmuVariable
 from .gap_traversal import Traversal
 from .lqr import Estimate, Gains
@@ -83,15 +83,15 @@ class BacklashCompensator(SampledSlave):
     )  # fmt: skip
 
     _gains: Gains
-    _movement: int
+    _stage: int
     _flank: int
     _age: int
-    _wanted: float
+    _smoothed: float
     _plan: Traversal
-    _next_movement: int
+    _next_stage: int
     _next_flank: int
     _next_age: int
-    _next_wanted: float
+    _next_smoothed: float
     _next_plan: Traversal
 
     def take_parameters(self) -> None:
@@ -102,42 +102,40 @@ class BacklashCompensator(SampledSlave):
 
     def begin(self) -> None:
         """Hold on the side on which the twist is."""
-        movement = start_movement(self._estimate(), self.real[FIRST_TRAIN + 4])
-        self._movement = movement.phase
-        self._flank = movement.flank
-        self._age = movement.samples
-        self._wanted = movement.wanted
-        self._plan = movement.traversal
+        state = start_state(self._estimate(), self.real[FIRST_TRAIN + 4])
+        self._stage = state.phase
+        self._flank = state.flank
+        self._age = state.samples
+        self._smoothed = state.smoothed
+        self._plan = state.traversal
         self.correct()
 
     def predict(self) -> None:
-        """Take over the movement of the last sample."""
-        self._movement = self._next_movement
+        """Take over the state of the last sample."""
+        self._stage = self._next_stage
         self._flank = self._next_flank
         self._age = self._next_age
-        self._wanted = self._next_wanted
+        self._smoothed = self._next_smoothed
         self._plan = self._next_plan
 
     def correct(self) -> None:
         """Compute the torque request of this sample."""
         real = self.real
-        movement = Movement(self._movement, self._flank, self._age, self._wanted, self._plan)
+        state = CrossingState(self._stage, self._flank, self._age, self._smoothed, self._plan)
         n = FIRST_TRAIN
         train = Train(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6])
         n = FIRST_TUNING
         tuning = Tuning(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[SAMPLE_TIME])
         gap = Gap(real[ALPHA], real[DEVIATION])
-        movement, u = act(
-            movement, real[REFERENCE], real[REFERENCE_SPEED], self._estimate(), gap, self._gains, train, tuning
-        )
-        self._next_movement = movement.phase
-        self._next_flank = movement.flank
-        self._next_age = movement.samples
-        self._next_wanted = movement.wanted
-        self._next_plan = movement.traversal
+        state, u = act(state, real[REFERENCE], real[REFERENCE_SPEED], self._estimate(), gap, self._gains, train, tuning)
+        self._next_stage = state.phase
+        self._next_flank = state.flank
+        self._next_age = state.samples
+        self._next_smoothed = state.smoothed
+        self._next_plan = state.traversal
         real[U] = u
-        real[FLANK] = float(movement.flank)
-        real[CROSSING] = float(movement.phase)
+        real[FLANK] = float(state.flank)
+        real[CROSSING] = float(state.phase)
 
     def _estimate(self) -> Estimate:
         """Return the estimate with the twist zero in mid-gap."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pyfmu_sources.backlash_compensator import CROSS, HOLD, Gap, Movement, Train, Tuning, act, start_movement
+from pyfmu_sources.backlash_compensator import CROSS, HOLD, CrossingState, Gap, Train, Tuning, act, start_state
 from pyfmu_sources.gap_traversal import Traversal
 from pyfmu_sources.lqr import control
 
@@ -23,10 +23,10 @@ def draw_estimate(rng, way=None):
 @pytest.mark.parametrize("gap", [Gap(0.0, 0.0), Gap(0.02, 0.006), Gap(0.02, 1.0)])
 def test_without_a_known_gap_it_is_the_plain_lqr(gap):
     rng = np.random.default_rng(1)
-    movement = Movement(HOLD, 1, 0, 0.0, NO_PLAN)
+    state = CrossingState(HOLD, 1, 0, 0.0, NO_PLAN)
     for _ in range(200):
         x, reference = draw_estimate(rng), rng.uniform(-1.0, 1.0)
-        movement, u = act(movement, reference, 0.0, x, gap, GAINS, TRAIN, TUNING)
+        state, u = act(state, reference, 0.0, x, gap, GAINS, TRAIN, TUNING)
         assert u == control(reference, 0.0, x, GAINS, 3.984, 1.0 / 3300.0, 300.0)
 
 
@@ -36,8 +36,8 @@ def test_it_holds_with_the_lqr_of_the_motor_less_the_half_gap():
         x = (3.984 * (0.3 + 0.021 * flank), 0.0, 0.3, 0.0, rng.normal(), rng.normal())
         reference = 0.3 + 0.1 * flank
         shifted = (x[0] - flank * 3.984 * 0.02, *x[1:])
-        movement, u = act(start_movement(x, 3.984), reference, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
-        assert (movement.phase, movement.flank) == (HOLD, flank)
+        state, u = act(start_state(x, 3.984), reference, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        assert (state.phase, state.flank) == (HOLD, flank)
         assert u == control(reference, 0.0, shifted, GAINS, 3.984, 1.0 / 3300.0, 300.0)
 
 
@@ -48,11 +48,11 @@ def test_it_pushes_or_plans_where_the_teeth_have_parted():
     for _ in range(300):
         x, flank = draw_estimate(rng, way=rng.uniform(-0.015, 0.015)), rng.choice([-1, 1])
         gap = Gap(0.02, 1e-4)
-        movement, u = act(
-            Movement(HOLD, int(flank), 0, 0.0, NO_PLAN), x[2] + 0.1 * flank, 0.0, x, gap, GAINS, TRAIN, TUNING
+        state, u = act(
+            CrossingState(HOLD, int(flank), 0, 0.0, NO_PLAN), x[2] + 0.1 * flank, 0.0, x, gap, GAINS, TRAIN, TUNING
         )
-        assert movement.phase == CROSS or u * movement.flank >= 0.0
-        planned += movement.phase == CROSS
+        assert state.phase == CROSS or u * state.flank >= 0.0
+        planned += state.phase == CROSS
     assert 20 < planned < 280
 
 
@@ -60,14 +60,16 @@ def test_a_crossing_begins_only_if_the_torque_is_still_wanted_at_its_end():
     """The load falls back towards the reference by itself: what is wanted now is not wanted after the crossing."""
     for load_torque, phase in ((0.0, CROSS), (2000.0, HOLD)):
         x = (3.984 * 0.021, 0.0, 0.0, 0.0, load_torque, load_torque / 3.984)
-        movement, _ = act(Movement(HOLD, 1, 0, -400.0, NO_PLAN), -0.05, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
-        assert movement.phase == phase
+        state, _ = act(CrossingState(HOLD, 1, 0, -400.0, NO_PLAN), -0.05, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        assert state.phase == phase
 
 
 def test_the_end_of_a_plan_leaves_two_deviations_to_the_flank():
     x = (-3.984 * 0.0205, 0.0, 0.0, 0.0, 0.0, 0.0)
     for deviation in (0.0, 1e-4, 1e-3):
-        movement, _ = act(Movement(HOLD, -1, 0, 50.0, NO_PLAN), 1.0, 0.0, x, Gap(0.02, deviation), GAINS, TRAIN, TUNING)
-        assert (movement.phase, movement.flank) == (CROSS, 1)
-        assert movement.traversal.end_way == pytest.approx(0.02 - 2.0 * deviation - 3e-4)
-        assert movement.traversal.end_speed == 0.1
+        state, _ = act(
+            CrossingState(HOLD, -1, 0, 50.0, NO_PLAN), 1.0, 0.0, x, Gap(0.02, deviation), GAINS, TRAIN, TUNING
+        )
+        assert (state.phase, state.flank) == (CROSS, 1)
+        assert state.traversal.end_way == pytest.approx(0.02 - 2.0 * deviation - 3e-4)
+        assert state.traversal.end_speed == 0.1
