@@ -10,7 +10,8 @@ from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.reference import ReferencePlant
-from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters
+from pyfmu_sources.backlash_models import BACKLASH_MODELS
+from pyfmu_sources.equations import parameters
 from tests.support.reference_runs import linear_solution, reference_solution
 
 H, STEPS = 1e-3, 2000

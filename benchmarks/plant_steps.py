@@ -13,14 +13,9 @@ from types import ModuleType
 import numpy as np
 
 from orchestrator.plants.compiled import compile_module
-from pyfmu_sources.drivetrain_parameters import (
-    BACKLASH_MODELS,
-    DEFAULTS,
-    NAMES,
-    PARAMETERS,
-    DrivetrainParameters,
-    with_values,
-)
+from pyfmu_sources.backlash_models import BACKLASH_MODELS
+from pyfmu_sources.equations import DEFAULTS, NAMES, PARAMETERS, DrivetrainParameters
+from pyfmu_sources.parameter_rows import with_values
 
 STEPS = (1e-5, 2e-4, 1e-3, 5e-3, 1e-2, 2e-2)
 

@@ -14,6 +14,10 @@ same, the model file states the unit.
 In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .laws import drive, stops, waves
+from .laws import friction as friction_laws
 from .laws.bristles import bent_sign, has_settled, leaving_speed
 from .laws.drive import UNASKED, request_rate
 from .laws.friction import (
@@ -26,8 +30,43 @@ from .laws.friction import (
 )
 from .laws.stops import end_stop_torque, spring_torque
 from .laws.waves import inertia_at, inertia_torque, periodic
-from .parameter_rows import BIG
-from .servo_axis_parameters import AxisParameters
+from .parameter_rows import BIG, TINY, Parameter, field_name, mark_linear
+
+PARAMETERS = (
+    *mark_linear(
+        Parameter("J", "kg.m2", 1.0, TINY, BIG, "Inertia (or mass)"),
+        Parameter("b", "N.m.s/rad", 1.0, 0.0, BIG, "Viscous friction"),
+        Parameter("tau", "s", 0.0, 0.0, BIG, "Time constant of the drive's torque (0: none)"),
+    ),
+    *drive.INPUT,
+    *waves.ripple_rows("Amplitude of the ripple", "Ripple, rad of phase per unit of position", "position"),
+    *friction_laws.coulomb_rows("motor", "Dry friction"),
+    *friction_laws.stribeck_rows("motor", ""),
+    *drive.load_rows("axis"),
+    *waves.gravity_rows("position"),
+    *friction_laws.drag_rows("Drag"),
+    *friction_laws.directional_rows("motor", "Viscous friction, forward minus b"),
+    *drive.encoder_rows("motor", "encoder"),
+    *friction_laws.presliding_rows(
+        "motor", "Distance of friction to build up (0: none)", "Damping of friction building up"
+    ),
+    *waves.wave_rows("periodic_friction.motor", "N.m", "Part of dry friction that repeats with the position", 1.0),
+    *drive.REQUEST,
+    *waves.HARMONICS,
+    *stops.SPRING,
+    *stops.END_STOPS,
+    *waves.VARYING_INERTIA,
+)
+
+NAMES = tuple(parameter.name for parameter in PARAMETERS)
+COUNT = len(PARAMETERS)
+
+if TYPE_CHECKING:
+    AxisParameters = Any
+else:
+    AxisParameters = NamedTuple("AxisParameters", [(field_name(name), float) for name in NAMES])
+
+DEFAULTS = AxisParameters(*(parameter.default for parameter in PARAMETERS))
 
 State = tuple[float, float, float, float, float]
 Parameters = AxisParameters

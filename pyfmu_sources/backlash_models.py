@@ -59,6 +59,9 @@ MODELS = (
     # Further models follow here: numbers are part of what users have.
 )  # fmt: skip
 
+BACKLASH_MODELS = tuple(model.name for model in MODELS)
+NONE, DEAD_ZONE, NORDIN, HYSTERESIS, RIGID_IMPACT, ELASTIC_IMPACT = range(6)
+
 # Which models have a trait, by number: the equations test ``model in RIGID``.
 PLAIN_WHEN_CLOSED = tuple(n for n, model in enumerate(MODELS) if model.plain_when_closed)
 RIGID = tuple(n for n, model in enumerate(MODELS) if model.rigid)

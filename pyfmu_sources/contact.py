@@ -5,9 +5,8 @@ without the shaft's [N.m]; ``push``: torque on motor and load as one body, load 
 that holds a motor at rest [N.m]; ``held``: dry friction, load side, that holds motor and load as one body [N.m].
 """
 
-from .backlash_models import BOUNCING, HELD, RIGID
+from .backlash_models import BOUNCING, HELD, NONE, RIGID
 from .bristles import resting_bristles
-from .drivetrain_parameters import NONE
 from .equations import (
     Parameters,
     State,

@@ -9,10 +9,22 @@ In all functions: ``h``: length of the step [s]; ``u``: requested torque [N.m], 
 
 from math import exp
 
+from .backlash_models import NONE
 from .contact import consistent_start, initial_contact
-from .drivetrain_parameters import DEFAULTS, NONE, NONLINEAR
 from .dry_friction import shaft_torque, slips
-from .equations import Mode, Parameters, State, backlash_model, contact_of, is_rigid, rates, twist, twist_rate
+from .equations import (
+    DEFAULTS,
+    NONLINEAR,
+    Mode,
+    Parameters,
+    State,
+    backlash_model,
+    contact_of,
+    is_rigid,
+    rates,
+    twist,
+    twist_rate,
+)
 from .event_numbers import NO_EVENT, TOO_MUCH
 from .laws.drive import UNASKED, ramp_end, ramp_target, ramp_time
 from .linear_mode import law_of

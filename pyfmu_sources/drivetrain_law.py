@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from . import drivetrain
 from .drivetrain import Mode, State
-from .drivetrain_parameters import PARAMETERS
 from .drivetrain_slave import T_L, T_SHAFT, Drivetrain, Parameters
+from .equations import PARAMETERS
 from .laws.drive import UNASKED
 from .learned_law import L_DRY, LOAD_SPEED, TWIST, Motion, kind_of
 from .learned_plant import LawValues, Pushes, WithLaw

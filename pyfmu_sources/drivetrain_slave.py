@@ -19,7 +19,7 @@ from .drivetrain_modes import (
     rates_and_outputs,
     state_rates,
 )
-from .drivetrain_parameters import NAMES, PARAMETERS
+from .equations import NAMES, PARAMETERS
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .laws.drive import saturated

@@ -15,8 +15,7 @@ saturated already; ``T_l``: load torque [N.m].
 from math import sqrt
 from typing import Annotated
 
-from .backlash_models import BOUNCING, HELD
-from .drivetrain_parameters import NONE
+from .backlash_models import BOUNCING, HELD, NONE
 from .equations import Parameters, backlash_model, is_rigid, shaft_damping, shaft_stiffness, teeth_never_pull
 
 State6 = tuple[float, float, float, float, float, float]

@@ -5,9 +5,8 @@ In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where bot
 [s]; ``kappa``: rate at which a parted shaft unwinds [1/s].
 """
 
-from .backlash_models import NEVER_PULLING
+from .backlash_models import NEVER_PULLING, NONE
 from .contact import after_event
-from .drivetrain_parameters import NONE
 from .equations import Mode, Parameters, State, backlash_model, shaft_damping, shaft_stiffness
 from .event_numbers import NO_EVENT, TOO_MUCH
 from .linear_mode import Transition, evaluate, first_event, law_of, taylor

@@ -1,6 +1,6 @@
 """Rows that describe the parameters of a plant, and how its named tuple ``p`` comes of them."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 BIG = 1e12
 TINY = 1e-9
@@ -29,3 +29,11 @@ def field_name(name: str) -> str:
 def mark_linear(*rows: Parameter) -> tuple[Parameter, ...]:
     """Return rows that leave the plant linear: of the plant without effects, and of what only shapes an effect."""
     return tuple(row._replace(linear=True) for row in rows)
+
+
+def with_values(p: Any, values: dict[str, float]) -> Any:
+    """Return parameters, of any plant, with those named in ``values`` (names as in the FMU) replaced."""
+    for name in values:
+        if field_name(name) not in p._fields:
+            raise KeyError(name)
+    return p._replace(**{field_name(name): float(value) for name, value in values.items()})

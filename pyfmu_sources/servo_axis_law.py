@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import ClassVar
 
 from . import servo_axis
+from .axis_equations import PARAMETERS, AxisParameters
 from .learned_law import L_DRY, Motion
 from .learned_plant import LawValues, Pushes, WithLaw
 from .parameter_rows import Parameter
 from .servo_axis import State
 from .servo_axis_modes import UNDECIDED
-from .servo_axis_parameters import PARAMETERS, AxisParameters
 from .servo_axis_slave import FIRST_START, T_L, ServoAxis
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from . import servo_axis
+from .axis_equations import PARAMETERS, AxisParameters
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .laws.drive import saturated
@@ -13,7 +14,6 @@ from .parameter_rows import BIG
 from .plant_slave import PlantSlave
 from .servo_axis import State
 from .servo_axis_modes import UNDECIDED, Indicators, Outputs, after_events, decided, indicators, rates_and_outputs
-from .servo_axis_parameters import PARAMETERS, AxisParameters
 from .slave_base import TOO_STIFF, StepRefusedError
 
 U, T_L, THETA_M, OMEGA_M, T_M = range(5)

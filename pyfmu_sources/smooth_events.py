@@ -6,10 +6,9 @@ breakaway torque, else it slides on the other way.
 In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
-from .backlash_models import BOUNCING, HELD
+from .backlash_models import BOUNCING, HELD, NONE
 from .bristles import bent, builds_up_l, builds_up_m, capacity_l, capacity_m, reach_l, reach_m
 from .contact import after_event, join_teeth, on_flank, stop_bodies
-from .drivetrain_parameters import NONE
 from .dry_friction import (
     LOAD,
     MOTOR,

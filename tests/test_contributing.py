@@ -19,7 +19,7 @@ PROGRAMS = {
         """
 import numpy as np
 import orchestrator as oc
-from pyfmu_sources.drivetrain_parameters import parameters
+from pyfmu_sources.equations import parameters
 from pyfmu_sources.equations import shaft_stiffness
 
 pair = oc.run_pair(alpha=0.02, backlash_model="series")

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.kernel import run_filter, run_free, transition
-from pyfmu_sources.drivetrain_parameters import DEAD_ZONE, DrivetrainParameters
-from pyfmu_sources.equations import State, rates
+from pyfmu_sources.backlash_models import DEAD_ZONE
+from pyfmu_sources.equations import DrivetrainParameters, State, rates
 from pyfmu_sources.parameter_rows import BIG
 
 Array = NDArray[np.float64]

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from orchestrator.paired.experiment import Experiment
 from orchestrator.plants.compiled import compile_module
-from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters
+from pyfmu_sources.backlash_models import BACKLASH_MODELS
+from pyfmu_sources.equations import parameters
 
 Array = NDArray[np.float64]
 COLUMNS = ("theta_m", "theta_l", "theta_l_hat", "u", "contact", "T_m", "T_l_hat")

@@ -12,8 +12,8 @@ from fmpy.fmi2 import FMU2Model
 
 from orchestrator.building.compilers import find_compiler
 from pyfmu_sources import servo_axis
-from pyfmu_sources.drivetrain_parameters import with_values
-from pyfmu_sources.servo_axis_parameters import DEFAULTS, NAMES
+from pyfmu_sources.axis_equations import DEFAULTS, NAMES
+from pyfmu_sources.parameter_rows import with_values
 from tests.support.model_exchange import END, STEP, event_times, first_time, request, stepped_and_exchanged
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")

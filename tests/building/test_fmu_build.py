@@ -19,7 +19,7 @@ from orchestrator.building.launcher import Toolchain, compile_launcher, find_too
 from orchestrator.errors import FmuError
 from orchestrator.paired.experiment import Experiment
 from orchestrator.plants import design
-from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS
+from pyfmu_sources.backlash_models import BACKLASH_MODELS
 from pyfmu_sources.model_xml import ENUMERATIONS
 from tests.support.waiting import HANGS
 
@@ -114,7 +114,7 @@ def test_the_fingerprint_sees_sources_start_values_and_compiler() -> None:
     other = sources.Recipe("Drivetrain", recipe.module, recipe.class_name, {"alpha": 0.1})
     assert len({base, sources.fingerprint(recipe, "b"), sources.fingerprint(other, "a")}) == 3
     files = {path.name for path in sources.closure(recipe.module)}
-    assert {"drivetrain.py", "equations.py", "slave_base.py", "drivetrain_parameters.py"} <= files
+    assert {"drivetrain.py", "equations.py", "slave_base.py", "parameter_rows.py"} <= files
     assert "kalman.py" not in files
 
 

@@ -6,7 +6,7 @@ import scipy.linalg
 
 from orchestrator.estimation.innovations import _discrete, affine_model
 from orchestrator.estimation.kernel import BLUR, advance_blurred, propagate
-from pyfmu_sources.drivetrain_parameters import parameters
+from pyfmu_sources.equations import parameters
 
 STEP, TORQUE = 0.005, 40.0
 

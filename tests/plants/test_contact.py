@@ -4,15 +4,16 @@ import math
 
 import pytest
 
+from pyfmu_sources import backlash_models as models
 from pyfmu_sources import contact as c
-from pyfmu_sources import drivetrain_parameters as dt
+from pyfmu_sources import equations as dt
 from pyfmu_sources import equations as eq
 
 I, K, C, J_M, J_L, ALPHA = 3.984, 3300.0, 1.0, 0.4, 5.6, 0.01
 REST = (0.0, 0.0, 0.0, 0.0)  # bristles, memory of the shaft, filtered request
 
 
-def p_of(model: int = dt.DEAD_ZONE, **values: float) -> tuple[float, ...]:
+def p_of(model: int = models.DEAD_ZONE, **values: float) -> tuple[float, ...]:
     return dt.parameters(**({"backlash_model": float(model), "alpha": ALPHA} | values))
 
 
@@ -28,11 +29,11 @@ def test_the_shaft_torque_starts_at_the_half_gap_exactly() -> None:
         rate = 2.0 / I - 0.1
         assert torque == pytest.approx(flank * K * 0.003 + C * rate, abs=1e-9)
     assert eq.elastic_torque(state(0.013), 0, p_of()) == 0.0
-    assert eq.elastic_torque(state(0.013), 1, p_of(dt.NONE)) == pytest.approx(K * 0.013, abs=1e-9)
+    assert eq.elastic_torque(state(0.013), 1, p_of(models.NONE)) == pytest.approx(K * 0.013, abs=1e-9)
     assert eq.elastic_torque(state(0.013), 1, p_of(alpha=0.0)) == pytest.approx(K * 0.013, abs=1e-9)
     hard = eq.elastic_torque(state(0.013), 1, dt.with_values(p_of(), {"effects.hardening_stiffness.cubic": 1e6}))
     assert hard == pytest.approx(K * 0.003 + 1e6 * 0.003**3, abs=1e-9)
-    tooth = p_of(dt.ELASTIC_IMPACT, contact_stiffness=500.0, contact_damping=3.0)
+    tooth = p_of(models.ELASTIC_IMPACT, contact_stiffness=500.0, contact_damping=3.0)
     assert eq.elastic_torque(state(0.013, 0.0, 0.2), 1, tooth) == pytest.approx(500.0 * 0.003 - 3.0 * 0.2, abs=1e-9)
 
 
@@ -46,10 +47,10 @@ def test_rates_are_newtons_law_on_either_side_of_the_gear() -> None:
     assert rates[2] == 0.2
     assert rates[3] == pytest.approx((shaft - 1.0 * 0.2 - 0.5) / J_L, abs=1e-9)
     assert rates[4] == pytest.approx((7.0 - 5.0) / 1.0)
-    free = eq.rates(state(0.0, 1.0, 0.2, 5.0, s=0.001), 0, 0.0, 0.0, p_of(dt.NORDIN), 7.0, 0.0)
+    free = eq.rates(state(0.0, 1.0, 0.2, 5.0, s=0.001), 0, 0.0, 0.0, p_of(models.NORDIN), 7.0, 0.0)
     assert free[1] == pytest.approx((5.0 - 0.1) / J_M)
     assert free[7] == pytest.approx(-K * 0.001 / C)
-    assert eq.rates(state(0.0), 0, 0.0, 0.0, p_of(dt.NORDIN), 7.0, 0.0)[7] == 0.0
+    assert eq.rates(state(0.0), 0, 0.0, 0.0, p_of(models.NORDIN), 7.0, 0.0)[7] == 0.0
 
 
 def test_friction_and_effects_act_against_the_motion() -> None:
@@ -101,14 +102,14 @@ def test_the_flank_is_told_by_the_twist(angle: float, flank: int) -> None:
 @pytest.mark.parametrize(
     ("model", "gap", "acts", "rigid", "pulls_not"),
     [
-        (dt.NONE, 0.0, dt.NONE, False, False),
-        (dt.DEAD_ZONE, 0.01, dt.DEAD_ZONE, False, False),
-        (dt.DEAD_ZONE, 0.0, dt.NONE, False, False),
-        (dt.NORDIN, 0.01, dt.NORDIN, False, True),
-        (dt.NORDIN, 0.0, dt.NONE, False, False),
-        (dt.HYSTERESIS, 0.0, dt.HYSTERESIS, True, False),
-        (dt.RIGID_IMPACT, 0.01, dt.RIGID_IMPACT, True, False),
-        (dt.ELASTIC_IMPACT, 0.0, dt.ELASTIC_IMPACT, False, True),
+        (models.NONE, 0.0, models.NONE, False, False),
+        (models.DEAD_ZONE, 0.01, models.DEAD_ZONE, False, False),
+        (models.DEAD_ZONE, 0.0, models.NONE, False, False),
+        (models.NORDIN, 0.01, models.NORDIN, False, True),
+        (models.NORDIN, 0.0, models.NONE, False, False),
+        (models.HYSTERESIS, 0.0, models.HYSTERESIS, True, False),
+        (models.RIGID_IMPACT, 0.01, models.RIGID_IMPACT, True, False),
+        (models.ELASTIC_IMPACT, 0.0, models.ELASTIC_IMPACT, False, True),
     ],
 )
 def test_traits_of_the_models(model: int, gap: float, acts: int, rigid: bool, pulls_not: bool) -> None:
@@ -116,14 +117,14 @@ def test_traits_of_the_models(model: int, gap: float, acts: int, rigid: bool, pu
     assert eq.backlash_model(p) == acts
     assert eq.is_rigid(p) is rigid
     assert eq.teeth_never_pull(p) is pulls_not
-    assert eq.shaft_stiffness(p) == (7.0 if model == dt.ELASTIC_IMPACT else K)
-    assert eq.shaft_damping(p) == (2.0 if model == dt.ELASTIC_IMPACT else C)
+    assert eq.shaft_stiffness(p) == (7.0 if model == models.ELASTIC_IMPACT else K)
+    assert eq.shaft_damping(p) == (2.0 if model == models.ELASTIC_IMPACT else C)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 def test_impacts_keep_the_momentum_and_reverse_the_slip(restitution: float) -> None:
     before = (1.0, 3.0, 0.2, -0.4, 2.0, 0.5, 0.6, 0.7, *REST)
-    after = c.collide(before, restitution, p_of(dt.RIGID_IMPACT))
+    after = c.collide(before, restitution, p_of(models.RIGID_IMPACT))
     momentum = [J_M * I * x[1] + J_L * x[3] for x in (before, after)]
     assert momentum[1] == pytest.approx(momentum[0])
     slip = [x[1] / I - x[3] for x in (before, after)]
@@ -134,7 +135,7 @@ def test_impacts_keep_the_momentum_and_reverse_the_slip(restitution: float) -> N
 
 
 def test_rigid_rates_by_hand() -> None:
-    p = p_of(dt.HYSTERESIS)
+    p = p_of(models.HYSTERESIS)
     x = state(ALPHA, 2.0, 2.0 / I, 4.0)
     total = I * (4.0 - 0.1 * 2.0) - 1.0 * 2.0 / I - 0.5
     together = total / (J_M * I**2 + J_L)
@@ -144,7 +145,7 @@ def test_rigid_rates_by_hand() -> None:
     assert eq.rigid_rates(x, -2, 0.0, 0.0, p, 0.5) == (0.0, 0.0)
     alone = (4.0 - 0.2) / J_M
     assert eq.rigid_rates(x, 0, 0.0, 0.0, p, 0.5) == pytest.approx((alone, 0.0))
-    impact = eq.rigid_rates(x, 0, 0.0, 0.0, p_of(dt.RIGID_IMPACT), 0.5)
+    impact = eq.rigid_rates(x, 0, 0.0, 0.0, p_of(models.RIGID_IMPACT), 0.5)
     assert impact == pytest.approx((alone, (-1.0 * 2.0 / I - 0.5) / J_L))
     names = ("amplitude", "cycles_per_rev", "phase")
     q = dt.with_values(p, {f"effects.gear_eccentricity.{n}": v for n, v in zip(names, (0.02, 2.0, 0.3), strict=True)})
@@ -157,11 +158,11 @@ def test_rigid_rates_by_hand() -> None:
 
 
 def test_parting_teeth_leave_the_shaft_its_twist() -> None:
-    assert c.parted_twist(state(0.008), 1, p_of(dt.NORDIN)) == pytest.approx(-0.002)
-    assert c.parted_twist(state(-0.008), -1, p_of(dt.NORDIN)) == pytest.approx(0.002)
-    assert c.parted_twist(state(0.008), 1, p_of(dt.NORDIN, c=0.0)) == 0.0
-    assert c.parted_twist(state(0.008), 1, p_of(dt.NORDIN, c=3e-4)) == 0.0  # relaxes within 1e-7 s
-    assert c.parted_twist(state(0.008), 1, p_of(dt.NORDIN, c=4e-4)) == pytest.approx(-0.002)
+    assert c.parted_twist(state(0.008), 1, p_of(models.NORDIN)) == pytest.approx(-0.002)
+    assert c.parted_twist(state(-0.008), -1, p_of(models.NORDIN)) == pytest.approx(0.002)
+    assert c.parted_twist(state(0.008), 1, p_of(models.NORDIN, c=0.0)) == 0.0
+    assert c.parted_twist(state(0.008), 1, p_of(models.NORDIN, c=3e-4)) == 0.0  # relaxes within 1e-7 s
+    assert c.parted_twist(state(0.008), 1, p_of(models.NORDIN, c=4e-4)) == pytest.approx(-0.002)
     assert c.part_teeth((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, *REST), 0.5) == (
         1.0,
         2.0,
@@ -179,7 +180,7 @@ def test_parting_teeth_leave_the_shaft_its_twist() -> None:
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_rigid_teeth_are_put_on_their_flank_at_one_speed(side: int) -> None:
-    p = p_of(dt.RIGID_IMPACT)
+    p = p_of(models.RIGID_IMPACT)
     off = state(side * 0.013, 2.0, 0.1, s=0.5)
     on = c.join_teeth(off, side, p)
     assert eq.twist(on, p) == pytest.approx(side * ALPHA, abs=1e-15)
@@ -201,77 +202,77 @@ def after(x, contact, which, model, events=0, push_m=0.0, push=0.0, held_m=0.0, 
 def test_elastic_teeth_meet_and_part() -> None:
     x = state(ALPHA, 1.0, 0.0, s=0.5)
     for which, flank in ((0, 1), (1, -1)):
-        new, contact = after(x, 0, which, dt.DEAD_ZONE)
+        new, contact = after(x, 0, which, models.DEAD_ZONE)
         assert (contact, new[7]) == (flank, 0.0)
         assert new[:7] == x[:7]
-    new, contact = after(state(0.008), 1, 0, dt.NORDIN)
+    new, contact = after(state(0.008), 1, 0, models.NORDIN)
     assert contact == 0
     assert new[7] == pytest.approx(-0.002)
-    assert after(x, 1, 0, dt.DEAD_ZONE) == (x, 0)
+    assert after(x, 1, 0, models.DEAD_ZONE) == (x, 0)
 
 
 def test_rigid_teeth_bounce_rest_and_do_not_bounce_for_ever() -> None:
     fast = state(ALPHA, 1.0, 0.0)
-    new, contact = after(fast, 0, 0, dt.RIGID_IMPACT, restitution=0.5)
+    new, contact = after(fast, 0, 0, models.RIGID_IMPACT, restitution=0.5)
     assert contact == 0
     assert new[1] / I - new[3] == pytest.approx(-0.5 / I)
     for x, events, restitution in ((fast, 200, 0.5), (fast, 0, 0.0), (state(ALPHA, 3.9e-6, 0.0), 0, 0.5)):
-        new, contact = after(x, 0, 1, dt.RIGID_IMPACT, events=events, restitution=restitution)
+        new, contact = after(x, 0, 1, models.RIGID_IMPACT, events=events, restitution=restitution)
         assert contact == -1
         assert new[1] / I == pytest.approx(new[3])
-    assert after(state(ALPHA, 4.1e-6, 0.0), 0, 0, dt.RIGID_IMPACT, restitution=0.5)[1] == 0
-    assert after(fast, 0, 0, dt.RIGID_IMPACT, events=199, restitution=0.5)[1] == 0
+    assert after(state(ALPHA, 4.1e-6, 0.0), 0, 0, models.RIGID_IMPACT, restitution=0.5)[1] == 0
+    assert after(fast, 0, 0, models.RIGID_IMPACT, events=199, restitution=0.5)[1] == 0
 
 
 def test_the_play_model_engages_turns_and_rests() -> None:
     moving, still = state(ALPHA, 1.0, 0.0), state(ALPHA, 0.0, 0.0)
-    new, contact = after(moving, 0, 0, dt.HYSTERESIS, push_m=1.0, push=1.0)
+    new, contact = after(moving, 0, 0, models.HYSTERESIS, push_m=1.0, push=1.0)
     assert contact == 1
     assert new[1] / I == pytest.approx(new[3])
     assert new[3] == pytest.approx(J_M * I * 1.0 / (J_M * I**2 + J_L))
-    backwards = after(state(-ALPHA, 1.0, 0.0), 0, 1, dt.HYSTERESIS, push_m=-1.0, push=-1.0)
+    backwards = after(state(-ALPHA, 1.0, 0.0), 0, 1, models.HYSTERESIS, push_m=-1.0, push=-1.0)
     assert backwards[0][1] == 0.0  # moves away from the flank: it stops first
     assert backwards[1] == -1
-    assert after(still, 1, 0, dt.HYSTERESIS, push_m=-1.0, held_m=0.5) == (still, 0)
-    assert after(still, 1, 0, dt.HYSTERESIS, push_m=-0.5, held_m=0.5) == (still, 0)
-    assert after(still, 1, 0, dt.HYSTERESIS, push_m=-0.4, push=0.1, held_m=0.5, held=0.2) == (still, 2)
-    assert after(still, 1, 0, dt.HYSTERESIS, push_m=1.0, push=0.2, held=0.2) == (still, 2)
-    assert after(still, 1, 0, dt.HYSTERESIS, push_m=1.0, push=0.3, held=0.2) == (still, 1)
-    assert after(still, -1, 0, dt.HYSTERESIS, push_m=-1.0, push=-0.3, held=0.2) == (still, -1)
-    assert after(moving, 1, 0, dt.HYSTERESIS, push_m=1.0, push=1.0)[0] == c.stop_bodies(moving)
+    assert after(still, 1, 0, models.HYSTERESIS, push_m=-1.0, held_m=0.5) == (still, 0)
+    assert after(still, 1, 0, models.HYSTERESIS, push_m=-0.5, held_m=0.5) == (still, 0)
+    assert after(still, 1, 0, models.HYSTERESIS, push_m=-0.4, push=0.1, held_m=0.5, held=0.2) == (still, 2)
+    assert after(still, 1, 0, models.HYSTERESIS, push_m=1.0, push=0.2, held=0.2) == (still, 2)
+    assert after(still, 1, 0, models.HYSTERESIS, push_m=1.0, push=0.3, held=0.2) == (still, 1)
+    assert after(still, -1, 0, models.HYSTERESIS, push_m=-1.0, push=-0.3, held=0.2) == (still, -1)
+    assert after(moving, 1, 0, models.HYSTERESIS, push_m=1.0, push=1.0)[0] == c.stop_bodies(moving)
     for contact in (-2, 2):
-        assert after(still, contact, 0, dt.HYSTERESIS) == (still, 0)
-        assert after(still, contact, 1, dt.HYSTERESIS) == (still, contact // 2)
+        assert after(still, contact, 0, models.HYSTERESIS) == (still, 0)
+        assert after(still, contact, 1, models.HYSTERESIS) == (still, contact // 2)
 
 
 def test_where_a_simulation_starts() -> None:
-    assert c.initial_contact(state(0.0), p_of(dt.NONE)) == 1
+    assert c.initial_contact(state(0.0), p_of(models.NONE)) == 1
     assert c.initial_contact(state(0.0), p_of(alpha=0.0)) == 1
-    assert c.initial_contact(state(0.0), p_of(dt.HYSTERESIS, alpha=0.0)) == 1
+    assert c.initial_contact(state(0.0), p_of(models.HYSTERESIS, alpha=0.0)) == 1
     assert c.initial_contact(state(0.013), p_of()) == 1
     assert c.initial_contact(state(-0.013), p_of()) == -1
-    assert c.initial_contact(state(0.013, I * 0.5, 0.5), p_of(dt.RIGID_IMPACT)) == 1
-    assert c.initial_contact(state(0.013, I * 0.6, 0.5), p_of(dt.RIGID_IMPACT)) == 0
-    assert c.initial_contact(state(0.013, 0.0, 1.0), p_of(dt.NORDIN)) == 1  # 9.9 N.m of stiffness against 1
-    assert c.initial_contact(state(0.013, 0.0, 10.0), p_of(dt.NORDIN)) == 0
-    assert c.initial_contact(state(-0.013, 0.0, -10.0), p_of(dt.NORDIN)) == 0
-    assert c.initial_contact(state(0.013, 0.0, 10.0), p_of(dt.DEAD_ZONE)) == 1
+    assert c.initial_contact(state(0.013, I * 0.5, 0.5), p_of(models.RIGID_IMPACT)) == 1
+    assert c.initial_contact(state(0.013, I * 0.6, 0.5), p_of(models.RIGID_IMPACT)) == 0
+    assert c.initial_contact(state(0.013, 0.0, 1.0), p_of(models.NORDIN)) == 1  # 9.9 N.m of stiffness against 1
+    assert c.initial_contact(state(0.013, 0.0, 10.0), p_of(models.NORDIN)) == 0
+    assert c.initial_contact(state(-0.013, 0.0, -10.0), p_of(models.NORDIN)) == 0
+    assert c.initial_contact(state(0.013, 0.0, 10.0), p_of(models.DEAD_ZONE)) == 1
 
 
 def test_starts_are_made_consistent() -> None:
     for side in (-1, 1):
         wound = state(side * 0.015, 1.0, 0.5, s=0.3)
-        rigid = c.consistent_start(wound, p_of(dt.RIGID_IMPACT))
+        rigid = c.consistent_start(wound, p_of(models.RIGID_IMPACT))
         assert eq.twist(rigid, p_of()) == pytest.approx(side * ALPHA)
         assert (rigid[1], rigid[3], rigid[7]) == (1.0, 0.5, 0.0)
-        play = c.consistent_start(wound, p_of(dt.HYSTERESIS))
+        play = c.consistent_start(wound, p_of(models.HYSTERESIS))
         assert eq.twist(play, p_of()) == pytest.approx(side * ALPHA)
         assert (play[1], play[3]) == (1.0, 0.0)
-    inside = c.consistent_start(state(0.004, 1.0, 0.5), p_of(dt.RIGID_IMPACT))
+    inside = c.consistent_start(state(0.004, 1.0, 0.5), p_of(models.RIGID_IMPACT))
     assert inside[2] == 0.3
-    tight = c.consistent_start(state(0.004, 1.0, 0.5), p_of(dt.RIGID_IMPACT, alpha=0.0))
+    tight = c.consistent_start(state(0.004, 1.0, 0.5), p_of(models.RIGID_IMPACT, alpha=0.0))
     assert tight[1] / I == pytest.approx(tight[3])
-    parts = c.consistent_start(state(0.013, 0.0, 10.0, s=0.1), p_of(dt.NORDIN))
+    parts = c.consistent_start(state(0.013, 0.0, 10.0, s=0.1), p_of(models.NORDIN))
     assert parts[7] == pytest.approx(0.003)
-    assert c.consistent_start(state(0.013, 0.0, 0.0, s=0.1), p_of(dt.NORDIN))[7] == 0.0
+    assert c.consistent_start(state(0.013, 0.0, 0.0, s=0.1), p_of(models.NORDIN))[7] == 0.0
     assert c.consistent_start(state(0.004, 0.0, 0.0, s=0.1), p_of())[7] == 0.0

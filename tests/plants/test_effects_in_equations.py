@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+from pyfmu_sources import backlash_models as models
 from pyfmu_sources import contact as c
-from pyfmu_sources import drivetrain_parameters as dt
+from pyfmu_sources import equations as dt
 from pyfmu_sources import equations as eq
 
 I, K, C, J_M, J_L, ALPHA = 3.984, 3300.0, 1.0, 0.4, 5.6, 0.01
@@ -13,7 +14,7 @@ I, K, C, J_M, J_L, ALPHA = 3.984, 3300.0, 1.0, 0.4, 5.6, 0.01
 X = (1.7, 2.3, 0.31, -0.6, 4.1, 0.25, 0.13, 0.0, 0.0, 0.0, 0.35, 6.2)
 
 
-def p_of(model: int = dt.DEAD_ZONE, **effects: float) -> tuple[float, ...]:
+def p_of(model: int = models.DEAD_ZONE, **effects: float) -> tuple[float, ...]:
     """Parameters with effects; ``site__name`` stands for ``site.name``."""
     values = {f"effects.{name.replace('__', '.')}": value for name, value in effects.items()}
     return dt.with_values(dt.parameters(backlash_model=float(model), alpha=ALPHA), values)
@@ -127,15 +128,15 @@ def test_the_shaft_s_stiffness_damping_and_hysteresis_vary() -> None:
     rate = 2.3 / I + 0.6
     plain = K * wound + C * rate
     torque = lambda model, **effects: eq.elastic_torque(X, 1, p_of(model, **effects))  # noqa: E731
-    assert torque(dt.DEAD_ZONE) == pytest.approx(plain)
+    assert torque(models.DEAD_ZONE) == pytest.approx(plain)
     wave = {f"varying_stiffness__{n}": v for n, v in (("amplitude", 0.3), ("cycles_per_rev", 2.0), ("phase", 0.5))}
     relative = 1.0 + 0.3 * math.sin(2.0 * 1.7 + 0.5)
-    assert torque(dt.DEAD_ZONE, **wave) == pytest.approx(K * relative * wound + C * rate)
+    assert torque(models.DEAD_ZONE, **wave) == pytest.approx(K * relative * wound + C * rate)
     part = 1.0 - math.exp(-wound / 0.05)
-    assert torque(dt.DEAD_ZONE, impact_damping__depth=0.05) == pytest.approx(K * wound + C * part * rate)
-    assert torque(dt.NORDIN, impact_damping__depth=0.05) == pytest.approx(plain)
+    assert torque(models.DEAD_ZONE, impact_damping__depth=0.05) == pytest.approx(K * wound + C * part * rate)
+    assert torque(models.NORDIN, impact_damping__depth=0.05) == pytest.approx(plain)
     bent = {"shaft_hysteresis__torque": 30.0, "shaft_hysteresis__twist": 0.004}
-    assert torque(dt.DEAD_ZONE, **bent) == pytest.approx(plain + 30.0 * 0.35)
+    assert torque(models.DEAD_ZONE, **bent) == pytest.approx(plain + 30.0 * 0.35)
     p = p_of(**bent)
     turning = (rate - 0.5 * rate * 0.35 - 0.5 * rate * 0.35) / 0.004
     assert eq.rates(X, 1, 0.0, 0.0, p, 0.0, 0.0)[8:] == pytest.approx((0.0, 0.0, turning, 0.0))
@@ -168,19 +169,19 @@ def test_a_request_is_filtered_and_limited_in_rate() -> None:
 
 def test_a_parted_shaft_unwinds_with_its_hardening() -> None:
     x = (*X[:7], 0.002, *X[8:])
-    p = p_of(dt.NORDIN, hardening_stiffness__cubic=1e8)
+    p = p_of(models.NORDIN, hardening_stiffness__cubic=1e8)
     assert eq.rates(x, 0, 0.0, 0.0, p, 0.0, 0.0)[7] == pytest.approx(-(K * 0.002 + 1e8 * 0.002**3) / C)
     assert eq.rates(x, 1, 0.0, 0.0, p, 0.0, 0.0)[7] == 0.0
 
 
-@pytest.mark.parametrize("model", [dt.DEAD_ZONE, dt.ELASTIC_IMPACT])
+@pytest.mark.parametrize("model", [models.DEAD_ZONE, models.ELASTIC_IMPACT])
 def test_a_sharp_hardening_adds_the_fifth_power(model: int) -> None:
     x = at(theta_m=I * 0.02, omega_m=0.0, theta_l=0.0, omega_l=0.0)
     plain, sharp = (
         eq.elastic_torque(x, 1, p_of(model, hardening_stiffness__cubic=1e6, hardening_stiffness__sharpness=q))
         for q in (0.0, 1.2)
     )
-    k = K if model == dt.DEAD_ZONE else p_of().contact_stiffness
+    k = K if model == models.DEAD_ZONE else p_of().contact_stiffness
     wound = 0.02 - ALPHA
     assert sharp - plain == pytest.approx(1.2 * 1e12 / k * wound**5)
 
@@ -189,7 +190,7 @@ def test_a_sharp_hardening_adds_the_fifth_power(model: int) -> None:
 def test_the_lever_arm_of_an_eccentric_gear_takes_its_share(share: float) -> None:
     x = at(theta_m=0.7, omega_m=0.0, omega_l=0.0)
     wave = {"gear_eccentricity__amplitude": 0.02, "gear_eccentricity__cycles_per_rev": 3.0}
-    p = p_of(dt.NONE, gear_eccentricity__lever_arm=share, **wave)
+    p = p_of(models.NONE, gear_eccentricity__lever_arm=share, **wave)
     shaft = eq.elastic_torque(x, 1, p)
     moved = eq.rates(x, 1, 0.0, 0.0, p, 0.0, 0.0)
     arm = 1.0 / I + share * 0.06 * math.cos(2.1)
@@ -203,7 +204,7 @@ def test_a_gear_whose_ratio_is_infinite_is_cut_off() -> None:
 
 
 def test_impacts_feel_the_inertia_at_their_angle() -> None:
-    p = p_of(dt.RIGID_IMPACT, varying_inertia__amplitude=1.4, varying_inertia__phase=0.5)
+    p = p_of(models.RIGID_IMPACT, varying_inertia__amplitude=1.4, varying_inertia__phase=0.5)
     after = c.collide(X, 0.5, p)
     inertia = eq.load_inertia(X, p)
     assert inertia > J_L
@@ -232,7 +233,7 @@ def test_one_unit_of_an_effect_acts(effect: str) -> None:
 
 
 def test_an_eccentricity_of_one_radian_drives_rigid_teeth() -> None:
-    p = p_of(dt.RIGID_IMPACT, gear_eccentricity__amplitude=1.0, gear_eccentricity__phase=0.3)
+    p = p_of(models.RIGID_IMPACT, gear_eccentricity__amplitude=1.0, gear_eccentricity__phase=0.3)
     own = -math.sin(1.7 + 0.3) * 2.3**2
     i = 1.0 / (1.0 / I + math.cos(1.7 + 0.3))
     drive = i * (4.1 - 0.23) + 0.6 + J_M * i * i * own

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from pyfmu_sources import drivetrain, drivetrain_parameters, servo_axis_parameters
-from pyfmu_sources.drivetrain_parameters import NAMES, parameters, with_values
+from pyfmu_sources import axis_equations, drivetrain, equations
 from pyfmu_sources.drivetrain_slave import Drivetrain
-from pyfmu_sources.parameter_rows import BIG, Parameter
+from pyfmu_sources.equations import NAMES, parameters
+from pyfmu_sources.parameter_rows import BIG, Parameter, with_values
 from pyfmu_sources.servo_axis_slave import ServoAxis
 
 # What a row is set to, by its unit; a half of what is usual where that is not zero.
@@ -74,7 +74,7 @@ def run_of(slave: type, values: dict[str, float]) -> list[tuple[float, ...]]:
 
 @pytest.mark.parametrize(
     ("slave", "rows"),
-    [(Drivetrain, drivetrain_parameters.PARAMETERS), (ServoAxis, servo_axis_parameters.PARAMETERS)],
+    [(Drivetrain, equations.PARAMETERS), (ServoAxis, axis_equations.PARAMETERS)],
     ids=["drivetrain", "axis"],
 )
 def test_every_row_changes_a_run(slave: type, rows: tuple[Parameter, ...]) -> None:
@@ -90,11 +90,11 @@ def test_every_row_changes_a_run(slave: type, rows: tuple[Parameter, ...]) -> No
     assert idle == []
 
 
-@pytest.mark.parametrize("model", range(len(drivetrain_parameters.MODELS)))
+@pytest.mark.parametrize("model", range(len(equations.MODELS)))
 def test_the_linear_solution_is_taken_where_it_holds(model: int) -> None:
     """A row alone is solved as the integrator solves it, whether it is said to be linear or not."""
     wrong = []
-    for row in drivetrain_parameters.PARAMETERS:
+    for row in equations.PARAMETERS:
         if row.name in ("backlash_model", "alpha"):
             continue
         p = with_values(parameters(backlash_model=float(model), alpha=0.01, i=1.0), {row.name: size_of(row)})
@@ -114,4 +114,4 @@ def test_the_linear_solution_is_taken_where_it_holds(model: int) -> None:
 def test_nothing_is_linear_unless_it_is_said_so() -> None:
     assert not Parameter("effects.fan.coefficient", "N.m.s3/rad3", 0.0, 0.0, BIG, "Cubic drag of a fan").linear
     nonlinear = [name for name in NAMES if drivetrain.has_nonlinear_effect(with_values(parameters(), {name: 0.31}))]
-    assert nonlinear == [row.name for row in drivetrain_parameters.PARAMETERS if not row.linear]
+    assert nonlinear == [row.name for row in equations.PARAMETERS if not row.linear]

@@ -16,10 +16,10 @@ from scipy.integrate import solve_ivp
 from orchestrator.paired.experiment import BACKLASH_MODELS, Experiment
 from orchestrator.records.model_file import default_model
 from orchestrator.diagnosis.data.records import check_model
-from pyfmu_sources import contact, drivetrain, drivetrain_parameters as dt
+from pyfmu_sources import backlash_models as models, contact, drivetrain, equations as dt
 from pyfmu_sources.model_xml import ENUMERATIONS
 
-number = dt.BACKLASH_MODELS.index("soft_teeth")
+number = models.BACKLASH_MODELS.index("soft_teeth")
 print(number, ENUMERATIONS["BacklashModel"][-1][0], BACKLASH_MODELS[-1])
 print(Experiment(backlash_model="soft_teeth").backlash_model)
 model = default_model()

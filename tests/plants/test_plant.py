@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.reference import ReferencePlant
 from pyfmu_sources import drivetrain, linear_mode
-from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, NAMES, parameters, with_values
+from pyfmu_sources.backlash_models import BACKLASH_MODELS
+from pyfmu_sources.equations import NAMES, parameters
+from pyfmu_sources.parameter_rows import with_values
 from tests.support.reference_runs import linear_solution, reference_solution
 
 H = 1e-3

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from orchestrator.plants.compiled import compile_module
-from pyfmu_sources import servo_axis_parameters
-from pyfmu_sources.drivetrain_parameters import NAMES, parameters, with_values
+from pyfmu_sources import axis_equations
+from pyfmu_sources.equations import NAMES, parameters
+from pyfmu_sources.parameter_rows import with_values
 from tests.support import independent_plant as truth
 
 RATE = 200.0
@@ -218,7 +219,7 @@ def textbook(v: dict[str, float], u: np.ndarray, h: float) -> np.ndarray:
 def test_axis_agrees_with_its_equations_written_out(law: str) -> None:
     values, tolerance = AXIS[law]
     source, h = compile_module("servo_axis"), 0.01
-    p = servo_axis_parameters.DEFAULTS._replace(**values)
+    p = axis_equations.DEFAULTS._replace(**values)
     u = 4.0 * np.cos(2.0 * np.pi * 0.7 * h * np.arange(300)) + 0.5
     x = source.start(0.0, 0.0, 0.0, p)
     mode, angles = source.initial_mode(x, p, float(u[0])), []

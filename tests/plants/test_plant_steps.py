@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from orchestrator.plants.compiled import compile_module
-from pyfmu_sources import drivetrain, servo_axis_parameters, smooth_mode
-from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters, with_values
+from pyfmu_sources import axis_equations, drivetrain, smooth_mode
+from pyfmu_sources.backlash_models import BACKLASH_MODELS
+from pyfmu_sources.equations import parameters
+from pyfmu_sources.parameter_rows import with_values
 
 RIGID = ("hysteresis", "rigid_impact")
 RIPPLE = {"effects.torque_ripple.amplitude": 2.0, "effects.torque_ripple.cycles_per_rev": 7.0}
@@ -152,6 +154,6 @@ def test_a_stiff_shaft_without_effects_has_a_result():
 
 
 def test_a_single_axis_that_no_step_resolves_is_refused():
-    p = servo_axis_parameters.DEFAULTS._replace(J=1e-9, b=1e12)
+    p = axis_equations.DEFAULTS._replace(J=1e-9, b=1e12)
     x, _ = compile_module("servo_axis").advance((0.0, 1.0, 0.0, 0.0, 0.0), 1, p, 1.0, 0.0, 1e-3)
     assert np.isnan(x).all()

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyfmu_sources import drivetrain, servo_axis, servo_axis_parameters, smooth_mode
-from pyfmu_sources.drivetrain_parameters import NAMES, parameters, with_values
+from pyfmu_sources import axis_equations, drivetrain, servo_axis, smooth_mode
+from pyfmu_sources.equations import NAMES, parameters
+from pyfmu_sources.parameter_rows import with_values
 
 
 def axis(values: dict[str, float]) -> tuple[float, ...]:
-    return with_values(servo_axis_parameters.DEFAULTS, values)
+    return with_values(axis_equations.DEFAULTS, values)
 
 
 @pytest.mark.parametrize("tau", [1e-6, 1e-3, 0.5])

@@ -6,7 +6,7 @@ import numpy as np
 
 from orchestrator.records.record import Record, record_from_columns
 from pyfmu_sources import servo_axis as axis
-from pyfmu_sources.servo_axis_parameters import AxisParameters
+from pyfmu_sources.axis_equations import AxisParameters
 
 MODEL = """
 fmu = "ServoAxis"

@@ -11,7 +11,7 @@ from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_dista
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant, Resonance, Shaft
 from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD, LEAD, SAMPLED, SAMPLED_TORQUE, SHIFT
 from orchestrator.shared.cores import cache_once
-from pyfmu_sources import drivetrain_parameters as dt
+from pyfmu_sources import equations as dt
 from pyfmu_sources.backlash_models import GRADUAL, MODELS
 from pyfmu_sources.bristles import unloaded_l, unloaded_m
 from pyfmu_sources.parameter_rows import BIG

@@ -9,7 +9,7 @@ from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_dista
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant
 from orchestrator.plants.measurement import EARLY_TORQUE, LEAD, SAMPLED, SAMPLED_TORQUE
 from orchestrator.shared.cores import cache_once
-from pyfmu_sources import servo_axis_parameters as ap
+from pyfmu_sources import axis_equations as ap
 from pyfmu_sources.axis_equations import breakaway_torque
 from pyfmu_sources.parameter_rows import BIG
 
