@@ -9,6 +9,7 @@ from pathlib import Path
 
 from orchestrator.commands._outcome import exit_code
 from orchestrator.commands._parser import Parser, flags_of
+from orchestrator.commands._progress_lines import add_progress_argument, choose_progress
 from orchestrator.shared.version import __version__
 
 PROGRAM = "backlash-cosim"
@@ -41,6 +42,7 @@ def build_parser(command: str | None) -> argparse.ArgumentParser:
             continue
         module = importlib.import_module(f"orchestrator.commands.{name}")
         module.add_arguments(sub)
+        add_progress_argument(sub)
         if name != "report":  # it writes into the directory that it is given
             sub.add_argument(
                 "--out",
@@ -64,4 +66,5 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = next((w for w in words if not w.startswith("-")), None)
     arguments = build_parser(command).parse_args(words)
     flags = vars(arguments).pop("flags")
+    choose_progress(vars(arguments).pop("progress"))
     return exit_code(lambda: arguments.run(arguments), flags)

@@ -22,6 +22,7 @@ from orchestrator.checking.mending.members import UnmendableError
 from orchestrator.checking.mending.mend import Repair, mend_fmu
 from orchestrator.checking.policy import FILE_NAME, Policy
 from orchestrator.checking.verdict import Verdict, baseline_of
+from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
 from orchestrator.commands._trust import add_trust, positive
 from orchestrator.errors import FmuError, InputError, OutputError
 from orchestrator.plain_text import plain_text
@@ -122,10 +123,12 @@ def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
 @contextmanager
 def verdicts_shown(count: int) -> Iterator[Callable[[Verdict], None]]:
     """Yield what prints a verdict; on a terminal the number of FMUs that are done stands below."""
-    shows = sys.stderr.isatty()
+    shows = sys.stderr.isatty() and not is_for_programs()
+    lines = ProgressLines()
     done = 0
 
     def progress() -> None:
+        lines.tell(f"checked {done} of {count} FMUs", done / count if count else 1.0, None)
         if shows and done < count:
             sys.stderr.write(f"\r{done} of {count} FMUs checked ...")
             sys.stderr.flush()

@@ -10,6 +10,7 @@ from rich.table import Table
 
 from orchestrator.api.shown import Block, plain_block
 from orchestrator.commands._lines import PIPE_WIDTH, fold
+from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
 
 
 def print_blocks(blocks: Sequence[Block]) -> None:
@@ -69,6 +70,8 @@ def _as_list(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], 
 
 
 def say(text: str) -> None:
-    """Tell a person at a terminal what takes time; say nothing in a pipe."""
-    if sys.stderr.isatty():
+    """Tell a person at a terminal, or a program that asked for it, what takes time; say nothing in a pipe."""
+    if is_for_programs():
+        ProgressLines().tell(text, None, None)
+    elif sys.stderr.isatty():
         sys.stderr.write(f"{text} ...\n")

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
+from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
 from orchestrator.engine import CaseLimits, Progress
 
 SECONDS_BETWEEN_LINES = 60.0
@@ -42,7 +43,7 @@ def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 class CaseProgress:
-    """Shows the engine's progress: a bar on a terminal, one line per minute elsewhere.
+    """Shows the engine's progress: a bar on a terminal, one line per minute elsewhere, JSON with ``--progress json``.
 
     Use as a context manager and hand ``update`` to ``run_cases`` as ``on_progress``.
     """
@@ -52,7 +53,8 @@ class CaseProgress:
         self._stream = stream or sys.stderr
         self._start = time.monotonic()
         self._last_line = self._start
-        self._bar = _bar(self._stream) if self._stream.isatty() else None
+        self._bar = _bar(self._stream) if self._stream.isatty() and not is_for_programs() else None
+        self._lines = ProgressLines()
         self._task = self._bar.add_task(what, total=None, rate="", failures="") if self._bar else None
 
     def __enter__(self) -> "CaseProgress":
@@ -76,6 +78,9 @@ class CaseProgress:
             self._bar.update(
                 self._task, completed=progress.done, total=progress.total, rate=f"{rate:.1f}/s", failures=failures
             )
+        elif is_for_programs():
+            left = (progress.total - progress.done) / rate if rate > 0.0 else None
+            self._lines.tell(self._what, progress.done / max(progress.total, 1), left)
         elif now - self._last_line >= SECONDS_BETWEEN_LINES:
             self._last_line = now
             self._stream.write(f"{self._what}: {line(progress, rate)}\n")

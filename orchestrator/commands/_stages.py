@@ -10,6 +10,8 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
+
 BAR, LEFT = 20, "about {}:{:02d} left"
 DIAGNOSIS_START, DIAGNOSIS_PER_ROW, DIAGNOSED_ROWS = 15.0, 0.002, 9000  # s, s for each row, of so many at most
 
@@ -22,6 +24,8 @@ def diagnosis_seconds(rows: int) -> float:
 class Stages:
     """A line on standard error with the stage, a bar and the time left; nothing where that is no terminal.
 
+    With ``--progress json`` lines for programs instead, wherever standard error goes.
+
     Use as a context manager. The time left starts as what ``begin`` expects, follows the shares that ``at`` reports,
     and is drawn anew several times a second between them.
     """
@@ -30,7 +34,8 @@ class Stages:
         chosen = stream or sys.stderr
         self._stage, self._expected, self._begun, self._done = "", 0.0, time.monotonic(), 0.0
         live = Live(get_renderable=self._line, console=Console(file=chosen), transient=True, refresh_per_second=4)
-        self._live = live if chosen.isatty() else None
+        self._live = live if chosen.isatty() and not is_for_programs() else None
+        self._lines = ProgressLines()
 
     def __enter__(self) -> "Stages":
         if self._live is not None:
@@ -46,12 +51,14 @@ class Stages:
     def begin(self, stage: str, seconds: float) -> None:
         """Start a piece of work that is expected to take so many seconds."""
         self._stage, self._expected, self._begun, self._done = stage, seconds, time.monotonic(), 0.0
+        self._lines.tell(stage, 0.0, seconds or None)
 
     def at(self, stage: str, share: float) -> None:
         """Say what is done now, and which share (0 to 1) of the piece of work is behind."""
         self._stage = stage
         if share > 0.0:
             self._expected = (time.monotonic() - self._begun) / min(share, 1.0)
+        self._lines.tell(stage, share, self.time_left() or None)
 
     def time_left(self) -> float:
         """Return the time that is left of the piece of work."""

@@ -28,6 +28,7 @@ from orchestrator.api.records import read_model
 from orchestrator.api.shown import Block
 from orchestrator.commands._budget import Budget
 from orchestrator.commands._console import print_blocks
+from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.errors import ScenarioError
@@ -98,6 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-diagnose", action="store_true", help="stop where the model does not explain the record; name nothing"
     )
+    parser.add_argument("--cost", action="store_true", help="say what the fit would take, and stop")
     group = parser.add_argument_group("design of an experiment")
     group.add_argument("--design", action="store_true", help="propose a torque record that shows the gap best")
     group.add_argument(
@@ -116,6 +118,9 @@ def run(args: argparse.Namespace) -> int:
     settings = choose_settings(args.settings, EstimationSettings)
     reading = reading_of(args)
     records = [plausible_record(path, model, args.motor_only, **reading) for path in args.records]
+    if args.cost:
+        _tell_cost(records, model, args, settings)
+        return 0
     if args.design:
         check_design(model, args.size, **options)
     with stage_output(args.out) as folder:
@@ -146,9 +151,7 @@ def run(args: argparse.Namespace) -> int:
         if args.design and not interrupted:
             size = args.size if args.size is not None else _design_size(found)
             with _progress() as advance:
-                plan = design(
-                    model, size, **options, motor_only=args.motor_only, progress=lambda done, total: advance()
-                )
+                plan = design(model, size, **options, motor_only=args.motor_only, progress=advance)
             blocks += plan.blocks()
             if not plan.shows:
                 blocks.append(
@@ -237,10 +240,16 @@ def _show_stages(records: list[Record], seconds: float, budget: Budget) -> Itera
 
 
 @contextmanager
-def _progress() -> Iterator[Any]:
-    """Show a bar on a terminal; yield what is to be called after each piece of work."""
-    console = Console(file=sys.stderr)
+def _progress() -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on a terminal; yield what is to be called with the pieces of work done, and all."""
+    console, lines = Console(file=sys.stderr), ProgressLines()
     columns = (TextColumn("designing"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+    hidden = is_for_programs() or not console.is_terminal
+    with Progress(*columns, console=console, disable=hidden, transient=True) as bar:
         task = bar.add_task("", total=None)
-        yield lambda: bar.advance(task)
+
+        def advance(done: int, total: int) -> None:
+            bar.advance(task)
+            lines.tell("designing", done / total if total else None, None)
+
+        yield advance

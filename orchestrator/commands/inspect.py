@@ -4,11 +4,13 @@ import argparse
 import sys
 from pathlib import Path
 
-from orchestrator.api.inspect import STARTER, inspect
+import msgspec
+
 from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of
 from orchestrator.commands._stages import Stages
+from orchestrator.records.preview import preview_log
 from orchestrator.shared.output import stage_output
 
 USUAL = 10.0  # s
@@ -18,12 +20,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument("record", type=Path, metavar="DATA", help=f"measured record ({FORMATS})")
     parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the machine, as far as it is known")
+    parser.add_argument(
+        "--columns", action="store_true", help="print what each column would be taken from, as JSON, and stop"
+    )
     add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Look at the record, print what it holds, write JSON, picture, report and a model file to start from."""
     model = None if args.model is None else read_model(args.model)
+    if args.columns:
+        header = args.header if args.header is not None or model is None else model.header
+        seen = preview_log(args.record, {} if model is None else model.columns, header)
+        sys.stdout.write(msgspec.json.encode(seen).decode() + "\n")
+        return 0
+    from orchestrator.api.inspect import STARTER, inspect  # the libraries of the judgement: a second to import
+
     with Stages() as stages:
         stages.begin("looking at the record", USUAL)
         found = inspect(args.record, model, **reading_of(args))

@@ -30,6 +30,7 @@ PARTS = (
     "orchestrator/commands/_lines.py",
     "orchestrator/commands/_outcome.py",
     "orchestrator/commands/_parser.py",
+    "orchestrator/commands/_progress_lines.py",
     "orchestrator/commands/_trust.py",
     "orchestrator/shared/*.py",
     "orchestrator/shared/isolation/*.py",
