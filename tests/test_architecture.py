@@ -49,6 +49,7 @@ LAYERS = (
     {"diagnosis.fmu"},
     {"reporting"},
     {"api"},
+    {"workbench"},
     {"commands"},
     {"cli"},
     {"__main__"},

@@ -1,6 +1,7 @@
 """What a log holds and what each column of a record would be taken from, before anything is read in earnest."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -150,22 +151,30 @@ def _convert(
 ) -> tuple[list[ColumnTaken], tuple[str, ...], str]:
     """Return the columns with their range in SI, what was assumed, and what keeps the log from being read."""
     rastered = len({head.raster for head in source.heads}) > 1
+    part = source if rastered else source.within(slice(0, RANGED_ROWS), source.heads[0].raster)
+    problem = ""
     try:
-        part = source if rastered else source.within(slice(0, RANGED_ROWS), source.heads[0].raster)
         loaded = load(part, path, columns, (), Reading(torque_needed=False))
     except RecordError as error:
-        return list(taken), (), str(error)
+        problem = str(error)
+        filled = dict(columns)
+        for one in taken:  # the others can be shown already
+            filled[one.column] = replace(columns.get(one.column, Column()), **dict.fromkeys(one.needs, 1.0))
+        try:
+            loaded = load(part, path, filled, (), Reading(torque_needed=False))
+        except RecordError:
+            return list(taken), (), problem
     ranged = []
     for one in taken:
         values = loaded.table.get(one.column)
-        if values is None or not np.isfinite(values).any():
+        if one.needs or values is None or not np.isfinite(values).any():
             ranged.append(one)
             continue
         kind = KINDS[one.column][0]
         kind = "force" if one.kind == "force" else "length" if one.kind in ("length", "velocity") else kind
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
         ranged.append(msgspec.structs.replace(one, si=SI[kind], least=low, most=high))
-    return ranged, loaded.notes, ""
+    return ranged, () if problem else loaded.notes, problem
 
 
 def _channels(source: RecordSource, used: Mapping[int, str]) -> list[ChannelShown]:
@@ -190,7 +199,9 @@ def _first_rows(source: RecordSource, place: int) -> tuple[str, ...]:
         values: NDArray[Any] = part.load([place])[0]
     except RecordError:
         return ()
-    return tuple(str(value) if values.dtype.kind == "M" else f"{value:.10g}" for value in values[:SHOWN_ROWS].tolist())
+    return tuple(
+        str(value) if values.dtype.kind == "M" else f"{value + 0.0:.10g}" for value in values[:SHOWN_ROWS].tolist()
+    )
 
 
 __all__ = ["ChannelShown", "ColumnTaken", "LogPreview", "preview_log"]

@@ -35,6 +35,7 @@ def test_what_is_recognised_what_is_not_and_what_is_missing(log: Path) -> None:
     assert columns["theta_l"].how == "absent"
     assert columns["u"].needs == ("torque_constant",)
     assert "torque_constant" in seen.problem
+    assert (columns["u"].most, columns["theta_m"].most) == (None, pytest.approx(np.deg2rad(40.0), rel=1e-3))
     assert seen.channels[3].rows[0] == "0"
 
 

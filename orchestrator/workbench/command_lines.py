@@ -1,0 +1,113 @@
+"""Which command lines a page may ask for: commands, their files, and the options that the workbench offers."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from orchestrator.errors import InputError
+from orchestrator.estimation.protocol import METHODS
+from orchestrator.workbench.session import Session
+
+MOST_INPUTS = 20
+Reader = Callable[[Any, str, Session], str | None]
+
+
+def _file(value: Any, name: str, session: Session) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"`{name}` must be a file of this session, but is {str(value)[:60]!r}")
+    return session.reference_of(session.path_of(value))
+
+
+def _number(value: Any, name: str, session: Session) -> str:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InputError(f"`{name}` must be a finite number, but is {str(value)[:60]!r}")
+    return repr(value)
+
+
+def _flag(value: Any, name: str, session: Session) -> str | None:
+    if not isinstance(value, bool):
+        raise InputError(f"`{name}` must be true or false, but is {str(value)[:60]!r}")
+    return "" if value else None
+
+
+def _one_of(*known: str) -> Reader:
+    def read(value: Any, name: str, session: Session) -> str:
+        if value not in known:
+            raise InputError(f"`{name}` must be one of {', '.join(known)}, but is {str(value)[:60]!r}")
+        return str(value)
+
+    return read
+
+
+def _part(value: Any, name: str, session: Session) -> str:
+    if not isinstance(value, str) or len(value) > 40 or not set(value) <= set("0123456789.:e+"):
+        raise InputError(f"`{name}` must be START:END in seconds, such as 2:30, but is {str(value)[:60]!r}")
+    return value
+
+
+@dataclass(frozen=True)
+class CommandForm:
+    """A command as pages may ask for it.
+
+    Attributes:
+        inputs: least and most number of files.
+        options: how the value of each option becomes text; an empty text is an option without a value.
+        words: that stand behind the command's name.
+    """
+
+    inputs: tuple[int, int]
+    options: Mapping[str, Reader] = field(default_factory=dict)
+    words: tuple[str, ...] = ()
+
+
+_READING: dict[str, Reader] = {
+    "part": _part, "resample": _one_of("uniform", "linear", "cubic"), "rate": _number, "header": _number,
+}  # fmt: skip
+FORMS: dict[str, CommandForm] = {
+    "inspect": CommandForm((1, 1), {"model": _file, **_READING}),
+    "estimate": CommandForm(
+        (1, MOST_INPUTS),
+        {
+            "model": _file, "motor_only": _flag, "time_limit": _number, "no_diagnose": _flag,
+            "method": _one_of(*METHODS, "all"), **_READING,
+        },
+    ),
+    "diagnose": CommandForm(
+        (1, MOST_INPUTS),
+        {
+            "model": _file, "settings": _file, "fmu": _file, "map": _file, "draft_map": _flag, "validate": _file,
+            "test": _file, "no_search": _flag, "time_limit": _number, "with_law": _flag, **_READING,
+        },
+    ),
+    "calibrate": CommandForm((1, 1), {"fmu": _file, "map": _file}),
+    "check": CommandForm((1, MOST_INPUTS), {"static": _flag}),
+    "simulate": CommandForm((0, 0), {"scenario": _file}),
+    "ssp": CommandForm((1, 1), {}, ("run",)),
+}  # fmt: skip
+
+
+def command_line(session: Session, command: Any, inputs: Any, options: Any) -> list[str]:
+    """Return the words behind the program's name, without ``--out``; paths are relative to the session's directory.
+
+    Raises:
+        InputError: the workbench does not offer this, or a file is none of this session's.
+    """
+    form = FORMS.get(command) if isinstance(command, str) else None
+    if form is None:
+        raise InputError(f"`command` must be one of {', '.join(FORMS)}, but is {str(command)[:60]!r}")
+    least, most = form.inputs
+    if not isinstance(inputs, Sequence) or isinstance(inputs, str) or not least <= len(inputs) <= most:
+        raise InputError(f"`inputs` must be {least} to {most} files of this session")
+    if not isinstance(options, Mapping):
+        raise InputError("`options` must be a table")
+    words = [str(command), *form.words]
+    for name, value in options.items():
+        reader = form.options.get(name)
+        if reader is None:
+            known = ", ".join(form.options) or "none"
+            raise InputError(f"`{str(name)[:60]}` must be an option of the workbench ({known}), but is not")
+        text = reader(value, name, session)
+        if text is not None:  # `--rate=100`: no value can be taken for an option
+            words.append(f"--{name.replace('_', '-')}" + (f"={text}" if text else ""))
+    return [*words, *(_file(one, "inputs", session) for one in inputs)]

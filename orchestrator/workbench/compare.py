@@ -1,0 +1,210 @@
+"""Two results of one command side by side: what differs beyond the intervals, and the curves on one axis."""
+
+import csv
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import InputError
+from orchestrator.reporting import Facts, Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.workbench.session import is_name
+
+MOST_CURVES = 8  # of one file: with more nobody reads them
+MOST_BYTES = 50_000_000  # of a result file that is compared
+SAME = 1e-9  # relative difference of numbers without an interval that is rounding
+# What says how a result was made, and nothing of the machine.
+_BESIDE = ("settings", "schema_version", "seconds", "block_values", "candidates", "live", "arcmin")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a result, with the 95 % interval where there is one."""
+
+    value: float
+    interval: tuple[float, float] | None = None
+    unit: str = ""
+
+    def differs_beyond(self, other: "Quantity") -> bool:
+        """Return whether two values differ by more than their intervals allow."""
+        if self.interval is None or other.interval is None:
+            return not math.isclose(self.value, other.value, rel_tol=SAME, abs_tol=1e-300)
+        return self.interval[0] > other.interval[1] or other.interval[0] > self.interval[1]
+
+    def words(self) -> str:
+        """Return value and interval in words."""
+        between = "" if self.interval is None else f" ({self.interval[0]:.5g} to {self.interval[1]:.5g})"
+        return f"{self.value:.5g}{between} {self.unit}".strip()
+
+
+def compare_results(first: Path, second: Path) -> Report:
+    """Return a page on two result directories of one command.
+
+    Raises:
+        InputError: one of them holds no result, or they are of two commands.
+    """
+    names = (first.name, second.name)
+    documents = [_document(folder) for folder in (first, second)]
+    commands = [str(document.get("command")) for document in documents]
+    if commands[0] != commands[1]:
+        raise InputError(f"results to compare must be of one command, but are of {commands[0]} and {commands[1]}")
+    left, right = (dict(quantities(document.get("results"))) for document in documents)
+    both = [name for name in left if name in right]
+    beyond = [name for name in both if left[name].differs_beyond(right[name])]
+    sure = [name for name in beyond if left[name].interval is not None and right[name].interval is not None]
+    tables = [
+        _table("Differ by more than their intervals", names, sure, left, right),
+        _table("Agree within their intervals", names, [
+            name for name in both if name not in beyond and left[name].interval and right[name].interval
+        ], left, right),
+        _table("Numbers without an interval that differ", names, [n for n in beyond if n not in sure], left, right),
+        _table("In one of the two alone", names, sorted(left.keys() ^ right.keys()), left, right),
+        _texts(names, documents),
+    ]  # fmt: skip
+    plots = tuple(_curves(first, second))
+    summary = (
+        f"{len(sure)} of {len([n for n in both if left[n].interval])} numbers with an interval differ by more than "
+        f"their intervals; {len(beyond) - len(sure)} others differ."
+    )
+    badge = ("warn", "they differ") if sure else ("good", "no difference beyond the intervals")
+    how = tuple((name, _how(document)) for name, document in zip(names, documents, strict=True))
+    facts = Facts("What is compared", how)
+    return Report(
+        f"{names[0]} and {names[1]}",
+        summary,
+        (*(t for t in tables if t.rows), *plots, facts),
+        badge,  # type: ignore[arg-type]
+    )
+
+
+def quantities(found: Any, path: str = "") -> Iterator[tuple[str, Quantity]]:
+    """Yield every number of a result with its place, such as ``parameters J_m``; entries of lists go by their name."""
+    if isinstance(found, Mapping):
+        value = next((found[key] for key in ("value", "alpha") if _is_number(found.get(key))), None)
+        if value is not None:
+            yield path.strip(), Quantity(float(value), _interval(found.get("interval")), str(found.get("unit") or ""))
+        for name, entry in found.items():
+            if name in _BESIDE or (value is not None and name in ("value", "alpha", "interval", "standard_error")):
+                continue
+            yield from quantities(entry, f"{path} {name}")
+    elif isinstance(found, list):
+        for place, entry in enumerate(found):
+            named = entry.get("name") or entry.get("source") if isinstance(entry, Mapping) else None
+            if named is not None:
+                yield from quantities(entry, f"{path} {named}")
+            elif isinstance(entry, Mapping):
+                yield from quantities(entry, f"{path} {place + 1}")
+    elif _is_number(found):
+        yield path.strip(), Quantity(float(found))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _interval(value: Any) -> tuple[float, float] | None:
+    if isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)):
+        return float(value[0]), float(value[1])
+    return None
+
+
+def _document(folder: Path) -> dict[str, Any]:
+    """Return the result file of a directory; its name is the command's."""
+    command = folder.name.rpartition("-")[0]
+    path = folder / f"{command}.json"
+    if not is_name(folder.name) or not path.is_file() or path.stat().st_size > MOST_BYTES:
+        raise InputError(f"results to compare must be whole, but {folder.name} has no {command}.json")
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        document = None
+    if not isinstance(document, dict):
+        raise InputError(f"results to compare must be JSON objects, but that of {folder.name} is not")
+    return document
+
+
+def _table(
+    title: str, names: tuple[str, str], rows: list[str], left: Mapping[str, Quantity], right: Mapping[str, Quantity]
+) -> ReportTable:
+    def cell(values: Mapping[str, Quantity], name: str) -> str:
+        return values[name].words() if name in values else "none"
+
+    columns = (TableColumn("quantity"), *(TableColumn(name) for name in names), TableColumn("second over first"))
+    return ReportTable(title, columns, tuple(
+        (name.replace("_", " "), cell(left, name), cell(right, name), _ratio(left.get(name), right.get(name)))
+        for name in rows
+    ))  # fmt: skip
+
+
+def _ratio(first: Quantity | None, second: Quantity | None) -> float | None:
+    return second.value / first.value if first is not None and second is not None and first.value else None
+
+
+def _texts(names: tuple[str, str], documents: list[dict[str, Any]]) -> ReportTable:
+    """Return the words that differ: verdicts, grades, arguments."""
+    left, right = (dict(_words({k: d.get(k) for k in ("arguments", "results")})) for d in documents)
+    rows = [
+        (name.replace("_", " "), left.get(name, "none"), right.get(name, "none"))
+        for name in dict.fromkeys([*left, *right])
+        if left.get(name) != right.get(name)
+    ]
+    return ReportTable("Words that differ", (TableColumn("what"), *(TableColumn(n) for n in names)), tuple(rows))
+
+
+def _words(found: Any, path: str = "") -> Iterator[tuple[str, str]]:
+    if isinstance(found, Mapping):
+        for name, entry in found.items():
+            if name not in (*_BESIDE, "summary", "notes"):
+                yield from _words(entry, f"{path} {name}")
+    elif isinstance(found, list):
+        for place, entry in enumerate(found):
+            named = entry.get("name") if isinstance(entry, Mapping) else None
+            yield from _words(entry, f"{path} {named or place + 1}")
+    elif isinstance(found, (str, bool)):
+        yield path.removeprefix(" results").removeprefix(" arguments").strip(), str(found)[:200]
+
+
+def _how(document: Mapping[str, Any]) -> str:
+    arguments = document.get("arguments") or {}
+    given = ", ".join(f"{name} = {value}" for name, value in arguments.items() if value) if arguments else ""
+    return f"{document.get('command')} {document.get('version')}; {given}"
+
+
+def _curves(first: Path, second: Path) -> Iterator[Plot]:
+    """Yield a plot for each column that two files of the same name have in common, over their first column."""
+    for path in sorted(first.glob("*.csv")):
+        tables = [_columns(folder / path.name) for folder in (first, second)]
+        if not all(tables):
+            continue
+        left, right = tables
+        across = next(iter(left))
+        shared = [name for name in left if name in right and name != across]
+        for name in shared[:MOST_CURVES] if across in right else ():
+            series = tuple(
+                Series(folder.name, table[across], table[name]) for folder, table in ((first, left), (second, right))
+            )
+            yield Plot(f"{path.stem}: {name}", across, name, series)
+
+
+def _columns(path: Path) -> dict[str, list[float | None]]:
+    """Return the columns of numbers of a result's table; none where it has others, or is very large."""
+    if not path.is_file() or path.stat().st_size > MOST_BYTES:
+        return {}
+    with path.open(encoding="utf-8", newline="") as stream:
+        names, *rows = list(csv.reader(stream)) or [[]]
+    if not rows or any(len(row) != len(names) for row in rows):
+        return {}
+    columns: dict[str, list[float | None]] = {}
+    for place, name in enumerate(names):
+        try:
+            columns[name] = [_cell(row[place]) for row in rows]
+        except ValueError:
+            continue
+    return columns
+
+
+def _cell(text: str) -> float | None:
+    value = float(text) if text else math.nan
+    return value if math.isfinite(value) else None

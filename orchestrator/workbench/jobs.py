@@ -1,0 +1,253 @@
+"""Jobs: each is the command itself in a process of its own, in the session's directory; Stop is Ctrl-C."""
+
+import asyncio
+import contextlib
+import ctypes
+import json
+import os
+import shlex
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import orchestrator
+from orchestrator.errors import InputError
+from orchestrator.plain_text import plain_text
+from orchestrator.shared.output import write_whole
+from orchestrator.workbench.session import Session
+from orchestrator.workbench.settings import WorkbenchSettings
+
+PROGRAM = "backlash-cosim"  # as it is called on a command line
+JOB_FILE, OUTPUT_FILE = "job.json", "output.txt"
+_SHOWN = (
+    "name", "command", "state", "stage", "share", "left", "exit_code", "messages", "begun", "ended", "stops",
+)  # fmt: skip
+STOPPED = (130, 143, 129)  # exit codes after Ctrl-C, SIGTERM and SIGHUP
+_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
+
+
+@dataclass
+class Job:
+    """A command that was started.
+
+    Attributes:
+        name: of its folder of results, such as ``estimate-3``.
+        words: the command line behind the program's name.
+        state: "waiting", "running", "done", "failed" or "stopped"; "ended" where the server went first.
+        stage, share, left: as ``--progress json`` tells them.
+        messages: what it wrote to standard error besides.
+        begun, ended: seconds since 1970, ``ended`` 0.0 while it runs.
+        stops: how often it was asked to stop.
+    """
+
+    name: str
+    command: str
+    words: tuple[str, ...]
+    folder: Path
+    state: str = "waiting"
+    stage: str = ""
+    share: float | None = None
+    left: float | None = None
+    exit_code: int | None = None
+    messages: list[str] = field(default_factory=list)
+    begun: float = 0.0
+    ended: float = 0.0
+    stops: int = 0
+    process: "asyncio.subprocess.Process | None" = None
+
+    def is_over(self) -> bool:
+        """Return whether it has ended."""
+        return self.state not in ("waiting", "running")
+
+    def as_plain(self) -> dict[str, Any]:
+        """Return what a page and ``job.json`` say of it."""
+        plain = {name: getattr(self, name) for name in _SHOWN}
+        files = () if not self.is_over() else sorted(p.name for p in self.folder.iterdir() if _is_result(p))
+        return {**plain, "line": shlex.join([PROGRAM, *self.words]), "files": list(files)}
+
+
+def _is_result(path: Path) -> bool:
+    return path.is_file() and not path.is_symlink() and not path.name.startswith(".") and path.name != JOB_FILE
+
+
+class Jobs:
+    """The jobs of a session; for one thread, that of the event loop."""
+
+    def __init__(self, session: Session, settings: WorkbenchSettings) -> None:
+        self._session, self._settings = session, settings
+        self._room = asyncio.Semaphore(settings.jobs_at_once)
+        self._tasks: set[asyncio.Task[None]] = set()
+        self.all: dict[str, Job] = {job.name: job for job in _of_earlier_servers(session)}
+
+    def start(self, command: str, words: Sequence[str]) -> Job:
+        """Start a command; its results go into a folder of its own."""
+        folder = self._session.reserve_result(command)
+        line = (*words, "--progress", "json", "--out", self._session.reference_of(folder))
+        job = Job(folder.name, command, line, folder, begun=time.time())
+        self.all[job.name] = job
+        self._write(job)
+        task = asyncio.get_running_loop().create_task(self._run(job))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return job
+
+    def stop(self, name: str) -> Job:
+        """Ask a job to stop as Ctrl-C does; at the third time it is killed.
+
+        Raises:
+            InputError: there is no such job.
+        """
+        job = self.all.get(name)
+        if job is None:
+            raise InputError(f"`job` must be one of this session, but is {name[:60]!r}")
+        if not job.is_over():
+            job.stops += 1
+            if job.process is not None:
+                _signal(job.process, signal.SIGINT if job.stops < 3 else signal.SIGKILL)
+        return job
+
+    async def close(self) -> None:
+        """Stop all jobs, and wait until they have cleaned up."""
+        for job in self.all.values():
+            if not job.is_over():
+                self.stop(job.name)
+        if self._tasks:
+            _, late = await asyncio.wait(self._tasks, timeout=self._settings.stop_seconds)
+            for job in self.all.values():
+                if not job.is_over() and job.process is not None:
+                    _signal(job.process, signal.SIGKILL)
+            if late:
+                await asyncio.wait(late, timeout=self._settings.stop_seconds)
+
+    async def answer(self, words: Sequence[str]) -> tuple[int, str, str]:
+        """Run a command that looks at a file and stops.
+
+        Returns:
+            Exit code, standard output and standard error.
+        """
+        process = await _spawn(words, self._session.folder, asyncio.subprocess.PIPE)
+        try:
+            out, said = await asyncio.wait_for(process.communicate(), self._settings.answer_seconds)
+        except (TimeoutError, asyncio.CancelledError):
+            _signal(process, signal.SIGKILL)
+            await process.wait()
+            raise InputError(f"the answer must come within {self._settings.answer_seconds:g} s, but did not") from None
+        return process.returncode or 0, out.decode("utf-8", "replace"), said.decode("utf-8", "replace").strip()
+
+    async def _run(self, job: Job) -> None:
+        async with self._room:
+            if job.stops:
+                job.state, job.exit_code = "stopped", STOPPED[0]
+            else:
+                await self._watch(job)
+        job.ended, job.process = time.time(), None
+        self._write(job)
+
+    async def _watch(self, job: Job) -> None:
+        """Run the process of a job to its end."""
+        with (job.folder / OUTPUT_FILE).open("wb") as output:
+            try:
+                job.process = await _spawn(job.words, self._session.folder, output.fileno())
+            except OSError as error:
+                job.state, job.messages = "failed", [f"error: the command cannot be started: {error.strerror}"]
+                return
+        job.state = "running"
+        if job.stops:  # asked while it was being started
+            _signal(job.process, signal.SIGINT)
+        assert job.process.stderr is not None
+        rest = b""
+        while chunk := await job.process.stderr.read(65536):
+            *lines, rest = (rest + chunk).split(b"\n")
+            rest = rest[: self._settings.longest_message]
+            for line in lines:
+                self._hear(job, line)
+        self._hear(job, rest)
+        code = await job.process.wait()
+        _signal(job.process, signal.SIGKILL)  # whatever of its group is left
+        job.exit_code = code if code >= 0 else 128 - code
+        stopped = job.exit_code in STOPPED or (job.stops > 0 and code != 0)
+        job.state = "stopped" if stopped else "done" if _is_complete(job) else "failed"
+
+    def _hear(self, job: Job, line: bytes) -> None:
+        """Take a line of standard error: progress, or words."""
+        text = line.decode("utf-8", "replace").strip()
+        if text.startswith("{"):
+            with contextlib.suppress(ValueError, TypeError, AttributeError):
+                told = json.loads(text)
+                job.stage, job.share, job.left = str(told["stage"])[:200], _share(told["share"]), _share(told["left"])
+                return
+        if text:
+            job.messages.append(plain_text(text[: self._settings.longest_message]))
+            del job.messages[: -self._settings.messages]
+
+    def _write(self, job: Job) -> None:
+        with contextlib.suppress(OSError):  # a full disk: the job itself says so
+            content = {**job.as_plain(), "words": job.words}
+            write_whole(job.folder / JOB_FILE, json.dumps(content, indent=1) + "\n")
+
+
+def _share(value: Any) -> float | None:
+    return None if value is None else float(value)
+
+
+def _is_complete(job: Job) -> bool:
+    """Return whether a command has done its work; 1 is what a check says that found problems."""
+    return job.exit_code == 0 or (job.exit_code == 1 and (job.folder / f"{job.command}.json").is_file())
+
+
+def _of_earlier_servers(session: Session) -> list[Job]:
+    """Return the jobs that are noted in the session's directory, the oldest first."""
+    found = []
+    for note in session.results.glob(f"*/{JOB_FILE}"):
+        try:
+            said = json.loads(note.read_text(encoding="utf-8"))
+            job = Job(
+                note.parent.name, str(said["command"]), tuple(map(str, said["words"])), note.parent, str(said["state"]),
+                exit_code=said["exit_code"], messages=[str(text) for text in said["messages"]],
+                begun=float(said["begun"]), ended=float(said["ended"]),
+            )  # fmt: skip
+        except (OSError, ValueError, TypeError, KeyError):
+            continue
+        if not job.is_over():
+            whole = (job.folder / f"{job.command}.json").is_file()
+            job.state = "done" if whole else "ended"
+            if not whole:
+                job.messages.append("the workbench ended before this job did, which left no results")
+        found.append(job)
+    return sorted(found, key=lambda job: job.begun)
+
+
+async def _spawn(words: Sequence[str], folder: Path, output: int) -> "asyncio.subprocess.Process":
+    """Start a command in a process group of its own, which gets Ctrl-C when the server dies."""
+    home = str(Path(orchestrator.__file__).parents[1])
+    paths = [home, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+    return await asyncio.create_subprocess_exec(
+        sys.executable, "-P", "-m", "orchestrator", *words,
+        cwd=folder, stdin=asyncio.subprocess.DEVNULL, stdout=output, stderr=asyncio.subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))},
+        start_new_session=True, preexec_fn=_end_with_parent(),
+    )  # fmt: skip
+
+
+@cache
+def _end_with_parent() -> Callable[[], object]:
+    """Return what a child calls first: it hears Ctrl-C, and on Linux is interrupted when the server dies."""
+    control = ctypes.CDLL(None, use_errno=True).prctl if sys.platform.startswith("linux") else None
+
+    def prepare() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell's background has it ignored
+        if control is not None:
+            control(_PARENT_DEATH_SIGNAL, int(signal.SIGINT), 0, 0, 0)
+
+    return prepare
+
+
+def _signal(process: "asyncio.subprocess.Process", number: signal.Signals) -> None:
+    """Send a signal to a command and what it has started."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, number)

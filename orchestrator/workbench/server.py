@@ -1,0 +1,275 @@
+"""The server: files in, jobs, results out. Every path stands behind the guard's token."""
+
+import asyncio
+import json
+import re
+import secrets
+import socket
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Route
+
+from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.reporting import render
+from orchestrator.shared.output import write_whole
+from orchestrator.shared.version import __version__
+from orchestrator.workbench.command_lines import command_line
+from orchestrator.workbench.compare import compare_results
+from orchestrator.workbench.guard import PAGE_POLICY, Guard
+from orchestrator.workbench.jobs import Jobs
+from orchestrator.workbench.model_fields import model_fields, model_text
+from orchestrator.workbench.session import Session
+from orchestrator.workbench.settings import WorkbenchSettings
+from orchestrator.workbench.uploads import UploadTooLargeError, save_upload
+
+# What a browser shows; all else is handed out as a download.
+_SHOWN = {".html": "text/html; charset=utf-8", ".png": "image/png", ".json": "application/json",
+          ".txt": "text/plain; charset=utf-8", ".toml": "text/plain; charset=utf-8"}  # fmt: skip
+_RESULT_POLICY = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 'self'"
+_KINDS = {".css": "text/css", ".js": "text/javascript", ".html": "text/html", ".svg": "image/svg+xml"}
+_OPTION_IN_ADVICE = re.compile(r"\s*\(`model`\)")
+Answer = Callable[[Request], Awaitable[Response]]
+
+
+@dataclass
+class Workbench:
+    """What the routes share: the session, its jobs, and limits."""
+
+    session: Session
+    settings: WorkbenchSettings
+    jobs: Jobs
+
+    async def state(self, request: Request) -> Response:
+        """Return files and jobs of the session."""
+        uploads = [
+            {"file": self.session.reference_of(path), "name": path.name, "bytes": path.stat().st_size}
+            for path in sorted(self.session.files.iterdir(), key=lambda path: path.stat().st_mtime)
+            if path.is_file() and not path.name.startswith(".")
+        ]
+        jobs = [job.as_plain() for job in self.jobs.all.values()]
+        return JSONResponse(
+            {
+                "folder": str(self.session.folder), "version": __version__, "files": uploads, "jobs": jobs,
+                "largest_file": self.settings.largest_file,
+            }
+        )  # fmt: skip
+
+    async def upload(self, request: Request) -> Response:
+        """Take a file."""
+        stated = request.headers.get("content-length", "")
+        path = await save_upload(
+            self.session, request.path_params["name"], request.stream(), int(stated) if stated.isdigit() else None,
+            self.settings,
+        )  # fmt: skip
+        return JSONResponse({"file": self.session.reference_of(path), "name": path.name}, 201)
+
+    async def columns(self, request: Request) -> Response:
+        """Return what a log holds and what its columns would be taken from, with the choices of the page."""
+        asked = await self._asked(request)
+        words = ["inspect", "--columns"]
+        log = command_line(self.session, "inspect", [asked.get("file")], {})[-1]
+        chosen = self._scratch(model_text(None, {key: asked[key] for key in ("columns", "header") if key in asked}))
+        try:
+            code, out, said = await self.jobs.answer([*words, "--model", str(chosen), log])
+        finally:
+            chosen.unlink(missing_ok=True)
+        if code:
+            return _problem(said.removeprefix("error: "), 422)
+        return Response(out, media_type="application/json")
+
+    async def cost(self, request: Request) -> Response:
+        """Return what an estimate would take, in words."""
+        asked = await self._asked(request)
+        words = command_line(self.session, "estimate", asked.get("inputs"), asked.get("options", {}))
+        code, _, said = await self.jobs.answer([words[0], "--cost", *words[1:]])
+        return _problem(said.removeprefix("error: "), 422) if code else JSONResponse({"cost": said})
+
+    async def read_fields(self, request: Request) -> Response:
+        """Return a model file as fields; of no file the default model."""
+        reference = request.query_params.get("file", "")
+        path = self.session.path_of(reference) if reference else None
+        return JSONResponse(await run_in_threadpool(model_fields, path))
+
+    async def write_model(self, request: Request) -> Response:
+        """Write a model file of changed fields, once the command's own reader takes it."""
+        asked = await self._asked(request)
+        base = self.session.path_of(asked["base"]) if asked.get("base") else None
+        text = await run_in_threadpool(model_text, base, asked)
+        draft = self._scratch(text)
+        try:
+            await run_in_threadpool(model_fields, draft)
+        except OrchestratorError as error:
+            raise InputError(str(error).replace(str(draft), "the model")) from None
+        finally:
+            draft.unlink(missing_ok=True)
+        path = self.session.reserve_file(str(asked.get("name") or "machine.toml"))
+        write_whole(path, text)
+        return JSONResponse({"file": self.session.reference_of(path), "name": path.name}, 201)
+
+    async def start(self, request: Request) -> Response:
+        """Start a command."""
+        asked = await self._asked(request)
+        words = command_line(self.session, asked.get("command"), asked.get("inputs"), asked.get("options", {}))
+        return JSONResponse(self.jobs.start(words[0], words).as_plain(), 201)
+
+    async def stop(self, request: Request) -> Response:
+        """Stop a job."""
+        return JSONResponse(self.jobs.stop(request.path_params["name"]).as_plain())
+
+    async def file(self, request: Request) -> Response:
+        """Hand out a file of the session: pages and pictures of results to look at, all else to save."""
+        path = self.session.path_of(request.path_params["reference"])
+        kind = _SHOWN.get(path.suffix) if path.is_relative_to(self.session.results) else None
+        headers = {"content-security-policy": _RESULT_POLICY if kind else "sandbox"}
+        if kind is None:
+            return FileResponse(path, filename=path.name, media_type="application/octet-stream", headers=headers)
+        return FileResponse(path, media_type=kind, headers=headers)
+
+    async def compare(self, request: Request) -> Response:
+        """Return the page on two results of one command."""
+        folders = [self._result(request.query_params.get(name, "")) for name in ("first", "second")]
+        page = await run_in_threadpool(lambda: render(compare_results(*folders)))
+        return Response(page, media_type="text/html", headers={"content-security-policy": _RESULT_POLICY})
+
+    def _result(self, name: str) -> Path:
+        job = self.jobs.all.get(name)
+        if job is None:
+            raise InputError(f"`job` must be one of this session, but is {name[:60]!r}")
+        return job.folder
+
+    async def _asked(self, request: Request) -> dict[str, Any]:
+        """Return what a page asks for: a JSON object of a sensible size."""
+        if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
+            raise InputError("the request must be JSON (content type application/json), but is not")
+        body = b""
+        async for chunk in request.stream():
+            body += chunk
+            if len(body) > self.settings.largest_request:
+                raise UploadTooLargeError(f"a request must have at most {self.settings.largest_request} bytes")
+        try:
+            asked = json.loads(body)
+        except (ValueError, RecursionError):
+            raise InputError("the request must be JSON, but is not") from None
+        if not isinstance(asked, dict):
+            raise InputError("the request must be a JSON object, but is not")
+        return asked
+
+    def _scratch(self, text: str) -> Path:
+        """Write a model file for one look."""
+        path = self.session.folder / f".look-{secrets.token_hex(8)}.toml"
+        write_whole(path, text)
+        return path
+
+
+def _problem(text: str, status: int) -> JSONResponse:
+    return JSONResponse({"error": _OPTION_IN_ADVICE.sub("", text) or "the command gave no answer"}, status)
+
+
+def _told(answer: Answer) -> Answer:
+    """Return a route whose errors are a line that the page shows."""
+
+    async def route(request: Request) -> Response:
+        try:
+            return await answer(request)
+        except UploadTooLargeError as error:
+            return _problem(str(error), 413)
+        except InputError as error:
+            return _problem(str(error), 400)
+        except OrchestratorError as error:
+            return _problem(str(error), 500)
+        except ClientDisconnect:
+            return Response(status_code=400)
+        except OSError as error:
+            return _problem(f"the session's directory cannot be used: {error.strerror}", 507)
+
+    return route
+
+
+async def _page(request: Request) -> Response:
+    """Hand out the workbench's own page, styles and modules."""
+    name = request.path_params.get("name", "index.html")
+    assets = _assets()
+    if name not in assets:
+        return Response("not found\n", 404, media_type="text/plain")
+    package, folder = assets[name]
+    body = files(package).joinpath(folder, name).read_bytes()
+    kind = _KINDS[Path(name).suffix]
+    headers = {"content-security-policy": PAGE_POLICY} if kind == "text/html" else {}
+    return Response(body, media_type=kind, headers=headers)
+
+
+def _assets() -> Mapping[str, tuple[str, str]]:
+    """Return package and folder of each file that belongs to the page; styles are the reports' own."""
+    own = {entry.name for entry in files("orchestrator.workbench").joinpath("static").iterdir()}
+    shared = dict.fromkeys(("page.css",), ("orchestrator.reporting", "templates"))
+    return {name: ("orchestrator.workbench", "static") for name in own if Path(name).suffix in _KINDS} | shared
+
+
+def application(session: Session, settings: WorkbenchSettings) -> Starlette:
+    """Return the application behind the guard; jobs end with it."""
+    jobs = Jobs(session, settings)
+    workbench = Workbench(session, settings, jobs)
+
+    @asynccontextmanager
+    async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        yield
+        await jobs.close()
+
+    routes = [
+        Route("/", _page),
+        Route("/static/{name}", _page),
+        Route("/state", _told(workbench.state)),
+        Route("/upload/{name:path}", _told(workbench.upload), methods=["PUT"]),
+        Route("/columns", _told(workbench.columns), methods=["POST"]),
+        Route("/cost", _told(workbench.cost), methods=["POST"]),
+        Route("/model", _told(workbench.read_fields)),
+        Route("/models", _told(workbench.write_model), methods=["POST"]),
+        Route("/jobs", _told(workbench.start), methods=["POST"]),
+        Route("/jobs/{name}/stop", _told(workbench.stop), methods=["POST"]),
+        Route("/compare", _told(workbench.compare)),
+        Route("/file/{reference:path}", _told(workbench.file)),
+    ]
+    return Starlette(routes=routes, lifespan=lifespan)
+
+
+def serve(session: Session, port: int, tell: Callable[[str], None], settings: WorkbenchSettings | None = None) -> None:
+    """Serve a session on this machine alone until Ctrl-C; all jobs are stopped then.
+
+    Args:
+        port: of 127.0.0.1; 0: a free one.
+        tell: called with the address, token included, once connections are taken.
+
+    Raises:
+        InputError: the port is taken.
+    """
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(("127.0.0.1", port))
+    except OSError as error:
+        listener.close()
+        raise InputError(f"`port` must be free, but {port} is not: {error.strerror}", "port") from None
+    token, bound = secrets.token_urlsafe(24), listener.getsockname()[1]
+    app = Guard(application(session, settings or WorkbenchSettings()), token, bound)
+    config = uvicorn.Config(
+        app, log_config=None, access_log=False, server_header=False, proxy_headers=False, date_header=False,
+        lifespan="on", ws="none", limit_concurrency=200, timeout_graceful_shutdown=2,
+    )  # fmt: skip
+    server = uvicorn.Server(config)
+    listener.listen()
+    tell(f"http://127.0.0.1:{bound}/{token}/")
+    with listener:
+        asyncio.run(server.serve(sockets=[listener]))
+
+
+__all__ = ["Workbench", "application", "serve"]

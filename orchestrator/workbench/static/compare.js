@@ -1,0 +1,44 @@
+import { field, fill, make } from "./dom.js";
+import { message, duration } from "./parts.js";
+import { isOver, session, watch } from "./state.js";
+
+// Two results of one command side by side, and the history of the session.
+export function build(panel) {
+  const said = message(), page = make("div", {}), table = make("div", {});
+  const first = make("select", {}), second = make("select", {});
+  let shown = "";
+  const whole = () => session.jobs.filter((job) => isOver(job) && job.files.includes(`${job.command}.json`));
+  const alike = () => {
+    const one = whole().find((job) => job.name === first.value);
+    const names = whole().filter((job) => job.command === one?.command && job !== one).map((job) => job.name);
+    const before = second.value;
+    second.replaceChildren(...names.map((name) => make("option", { value: name, selected: name === before }, name)));
+  };
+  first.addEventListener("change", alike);
+  watch(() => {
+    const jobs = session.jobs.filter(isOver), now = JSON.stringify(jobs.map((job) => [job.name, job.state]));
+    if (now === shown) return;
+    shown = now;
+    const before = first.value;
+    first.replaceChildren(...whole().map((job) => make("option", { value: job.name, selected: job.name === before }, job.name)));
+    alike();
+    fill(table, jobs.length ? make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "History" }, make("table", {},
+      make("thead", {}, make("tr", {}, ["job", "ended", "state", "took", "command line"].map((text) => make("th", { scope: "col" }, text)))),
+      make("tbody", {}, jobs.toReversed().map((job) => make("tr", {},
+        make("td", {}, job.files.includes("report.html") ? make("a", { href: `file/results/${job.name}/report.html`, target: "_blank", rel: "noopener" }, job.name) : job.name),
+        make("td", {}, job.ended ? new Date(1000 * job.ended).toLocaleString() : ""), make("td", {}, job.state),
+        make("td", {}, job.ended > job.begun ? duration(job.ended - job.begun) : ""), make("td", { class: "long" }, make("code", {}, job.line)))))))
+      : make("p", {}, "No job has ended yet."));
+  });
+  const show = () => {
+    said.say("");
+    if (!first.value || !second.value) { said.say("two results of one command are needed"); return; }
+    const address = `compare?first=${encodeURIComponent(first.value)}&second=${encodeURIComponent(second.value)}`;
+    fill(page, make("p", {}, make("a", { href: address, target: "_blank", rel: "noopener" }, "Open this page in a tab of its own")),
+      make("iframe", { src: address, title: `${first.value} and ${second.value}`, sandbox: "allow-scripts allow-downloads allow-popups" }));
+  };
+  panel.append(
+    make("div", { class: "row" }, field("One result", first, "grows"), field("Another of the same command", second, "grows"),
+      make("button", { type: "button", class: "main", onclick: show }, "Compare")),
+    said.element, page, make("h2", {}, "History of this session"), table);
+}

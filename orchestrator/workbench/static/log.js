@@ -1,0 +1,192 @@
+import { post } from "./api.js";
+import { choice, digits, field, fill, make, plain } from "./dom.js";
+import { action, dropZone, fileChoice, isLog, jobView, message } from "./parts.js";
+import { choices, choose, jobOf, start, watch } from "./state.js";
+
+const TITLES = { time: "Time", u: "Torque asked for", theta_m: "Motor angle", theta_l: "Load angle" };
+const UNITS = {
+  time: ["s", "ms", "us", "min"],
+  u: ["N.m", "mN.m", "N.mm", "lbf.in", "N", "A", "%", "p.u.", "V"],
+  theta_m: ["rad", "deg", "arcmin", "rev", "counts", "m", "mm", "rpm", "rad/s"],
+  theta_l: ["rad", "deg", "arcmin", "rev", "counts", "m", "mm", "rpm", "rad/s"],
+};
+// Numbers that a unit may ask for, with what they mean.
+const NUMBERS = {
+  torque_constant: "torque constant [N.m/A]", rated_value: "what 100 % is [N.m]", counts_per_rev: "counts per revolution",
+  resistance: "resistance of the winding [ohm]", back_emf_constant: "back-EMF constant [V.s/rad]", inductance: "inductance [H]",
+  rate: "samples per second", factor: "factor (-1 turns the sign)", modulo: "the counter starts again at",
+};
+const OF_COLUMN = {
+  time: ["rate"], u: ["torque_constant", "rated_value", "resistance", "back_emf_constant", "factor"],
+  theta_m: ["counts_per_rev", "modulo", "factor"], theta_l: ["counts_per_rev", "modulo", "factor"],
+};
+
+export function build(panel, go) {
+  const said = message(), changes = make("p", { class: "message calm", role: "status" });
+  const body = make("div", {});
+  let seen = null, turn = 0;
+  const view = jobView(() => [make("p", {}, action("Go on to the machine", said, () => go("machine")))]);
+  watch(() => {
+    const job = jobOf(view.name());
+    const made = job && `results/${job.name}/model.toml`;
+    if (job?.state === "done" && job.files.includes("model.toml") && view.given !== job.name) {
+      view.given = job.name;
+      choose({ model: made });
+    }
+  });
+
+  async function look() {
+    const mine = ++turn;
+    if (!choices.log) { fill(body); return; }
+    said.say("");
+    try {
+      const found = await post("columns", { file: choices.log, columns: choices.columns, ...(choices.header === null ? {} : { header: choices.header }) });
+      if (mine !== turn) return;
+      changes.textContent = seen ? differences(seen, found) : "";
+      seen = found;
+      draw();
+    } catch (error) {
+      if (mine === turn) { said.say(error.message); if (!seen) fill(body); }
+    }
+  }
+
+  function pick(log) {
+    if (log === choices.log) return;
+    seen = null;
+    choose({ log, columns: {}, header: null, model: "" });
+    look();
+  }
+
+  function state(column, changed) {
+    const entry = { ...choices.columns[column], ...changed };
+    for (const key of Object.keys(entry)) if (entry[key] === "" || entry[key] === null || Number.isNaN(entry[key])) delete entry[key];
+    const columns = { ...choices.columns, [column]: entry };
+    if (!Object.keys(entry).length) delete columns[column];
+    choose({ columns });
+    look();
+  }
+
+  // Give a channel to a column; whoever had it before is asked for another one.
+  function assign(column, place) {
+    const columns = structuredClone(choices.columns);
+    const label = place === "" ? "" : nameOf(seen.channels[Number(place)]);
+    for (const [other, entry] of Object.entries(columns)) if (label && other !== column && entry.name === label) delete entry.name;
+    const entry = label ? { name: label } : {};
+    if (columns[column]?.rate) entry.rate = columns[column].rate;
+    columns[column] = entry;
+    if (!Object.keys(entry).length) delete columns[column];
+    choose({ columns });
+    look();
+  }
+
+  // A channel whose name appears twice is called by its number.
+  function nameOf(channel) {
+    const alike = seen.channels.filter((one) => one.label.toLowerCase() === channel.label.toLowerCase());
+    return alike.length > 1 ? `#${channel.place + 1}` : channel.label;
+  }
+
+  function card(one) {
+    const stated = choices.columns[one.column] ?? {};
+    const options = [["", one.how === "named" && !stated.name ? "by its own name" : "as recognised"],
+      ...seen.channels.map((channel) => [String(channel.place), channel.label])];
+    const pickChannel = choice(options, stated.name && one.place !== null ? String(one.place) : "", (place) => assign(one.column, place));
+    pickChannel.dataset.key = `channel-${one.column}`;
+    const list = `units-${one.column}`;
+    const unit = make("input", { value: stated.unit ?? "", placeholder: one.unit || "SI", list, "data-key": `unit-${one.column}`,
+      onchange: () => state(one.column, { unit: unit.value.trim() }) });
+    const needed = new Set(one.needs);
+    const numbers = OF_COLUMN[one.column].map((key) => numberField(one.column, key, stated[key], needed.has(key)));
+    const asked = numbers.filter(({ open }) => open).map(({ element }) => element);
+    const rest = numbers.filter(({ open }) => !open).map(({ element }) => element);
+    const tag = one.how === "absent" ? ["not found", one.column === "theta_l" ? "warn" : "bad"]
+      : one.needs.length ? ["needs a number", "bad"] : one.how === "named" ? ["named", "good"] : ["recognised", "good"];
+    const range = one.least === null ? "" : `${digits(one.least)} to ${digits(one.most)} ${one.si}`;
+    return make("div", { class: "card" },
+      make("h3", {}, TITLES[one.column], " ", make("span", { class: `tag ${tag[1]}` }, tag[0])),
+      make("p", { class: "note" }, one.place === null ? one.meaning : `${seen.channels[one.place].label}${range ? `: ${range}` : ""}`),
+      field("Channel", pickChannel), field("Unit in the file", unit),
+      make("datalist", { id: list }, UNITS[one.column].map((text) => make("option", { value: text }))),
+      asked, make("details", {}, make("summary", {}, "More"), rest));
+  }
+
+  function numberField(column, key, value, needed) {
+    const input = make("input", { class: "number", inputmode: "decimal", value: value ?? "", "data-key": `${key}-${column}`,
+      onchange: () => {
+        const number = Number(input.value.trim().replace(",", "."));
+        const wrong = input.value.trim() !== "" && !Number.isFinite(number);
+        input.setAttribute("aria-invalid", String(wrong));
+        if (!wrong) state(column, { [key]: input.value.trim() === "" ? null : number });
+      } });
+    return { open: needed || value !== undefined, element: field(NUMBERS[key], input) };
+  }
+
+  function draw() {
+    const rows = Math.max(0, ...seen.channels.map((channel) => channel.rows.length));
+    const unused = seen.channels.filter((channel) => !channel.taken_as).map((channel) => channel.label);
+    fill(body,
+      make("p", { class: "note" }, plain(seen.dialect)),
+      seen.problem ? make("p", { class: "message", role: "alert" }, problemOf(seen)) : make("p", {}, make("span", { class: "tag good" }, "can be read")),
+      make("div", { class: "cards" }, seen.columns.map(card)),
+      changes,
+      make("p", {}, action("Look at this log", said, inspect, "main")),
+      make("p", { class: "note" }, unused.length ? `Not used: ${unused.join(", ")}` : "Every channel is used."),
+      make("h3", {}, "First rows"),
+      make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "First rows" }, make("table", {},
+        make("thead", {}, make("tr", {}, seen.channels.map((channel) => make("th", { class: channel.taken_as ? "" : "unused", scope: "col" }, channel.label, make("br"), useOf(channel))))),
+        make("tbody", {}, Array.from({ length: rows }, (_, n) =>
+          make("tr", {}, seen.channels.map((channel) => make("td", { class: channel.taken_as ? "number" : "number unused" }, channel.rows[n] ?? ""))))))),
+      seen.lines.length ? lines() : null);
+  }
+
+  function useOf(channel) {
+    const made = choice([["", "not used"], ...Object.entries(TITLES)], channel.taken_as,
+      (column) => (column ? assign(column, String(channel.place)) : assign(channel.taken_as, "")));
+    made.setAttribute("aria-label", `Use ${channel.label} as`);
+    made.dataset.key = `use-${channel.place}`;
+    return made;
+  }
+
+  function lines() {
+    const set = (line) => { seen = null; choose({ header: line, columns: {} }); look(); };
+    return make("details", { open: seen.names_line === null || choices.header !== null },
+      make("summary", {}, seen.names_line ? `The names are in line ${seen.names_line}; choose another line` : "Which line holds the names?"),
+      make("fieldset", { class: "raw" }, make("legend", { class: "visually-hidden" }, "Line of the names"),
+        make("label", {}, make("input", { type: "radio", name: "header", checked: choices.header === 0, onchange: () => set(0) }), "none of them"),
+        seen.lines.map((text, n) => make("label", { class: seen.names_line === n + 1 ? "names" : "" },
+          make("input", { type: "radio", name: "header", checked: seen.names_line === n + 1, onchange: () => set(n + 1) }),
+          make("span", { class: "at" }, String(n + 1)), text))));
+  }
+
+  async function inspect() {
+    const options = {};
+    if (Object.keys(choices.columns).length || choices.header !== null) {
+      const stem = choices.log.split("/").at(-1).replace(/\.[^.]*$/, "");
+      const model = await post("models", { name: `${stem}-columns.toml`, columns: choices.columns, ...(choices.header === null ? {} : { header: choices.header }) });
+      options.model = model.file;
+    }
+    view.show(await start("inspect", [choices.log], options));
+  }
+
+  panel.append(
+    dropZone("Drop a log here", pick),
+    make("div", { class: "row" }, fileChoice("Log of this session", isLog, () => choices.log, pick)),
+    said.element, body, view.element);
+  if (choices.log) look();
+}
+
+function problemOf(seen) {
+  const needs = seen.columns.flatMap((one) => one.needs.map((key) => `${TITLES[one.column]}: ${NUMBERS[key] ?? key}`));
+  return needs.length ? `Still needed. ${needs.join("; ")}` : plain(seen.problem);
+}
+
+// What a choice has changed, column by column.
+function differences(before, after) {
+  const said = after.columns.flatMap((now, n) => {
+    const was = before.columns[n];
+    const label = (seen, one) => (one.place === null ? "nothing" : seen.channels[one.place].label);
+    const range = (one) => (one.least === null ? "" : ` (${digits(one.least)} to ${digits(one.most)} ${one.si})`);
+    const [old, fresh] = [label(before, was) + range(was), label(after, now) + range(now)];
+    return old === fresh ? [] : [`${TITLES[now.column]}: ${old} → ${fresh}`];
+  });
+  return said.length ? `Changed. ${said.join("; ")}` : "";
+}

@@ -1,0 +1,61 @@
+import { fill, make } from "./dom.js";
+import { isOver, refresh, session, watch } from "./state.js";
+import { jobLine } from "./parts.js";
+import * as log from "./log.js";
+import * as machine from "./machine.js";
+import * as gap from "./gap.js";
+import * as diagnosis from "./diagnosis.js";
+import * as model from "./model.js";
+import * as compare from "./compare.js";
+
+const TABS = [
+  ["log", "Log", log], ["machine", "Machine", machine], ["gap", "Gap", gap], ["diagnosis", "Diagnosis", diagnosis], ["model", "Model", model], ["compare", "Compare", compare],
+];
+const tabs = document.getElementById("tabs"), panels = document.getElementById("panels");
+
+function go(key, focus = true) {
+  for (const [name] of TABS) {
+    const tab = document.getElementById(`tab-${name}`), on = name === key;
+    tab.setAttribute("aria-selected", String(on));
+    tab.tabIndex = on ? 0 : -1;
+    document.getElementById(`panel-${name}`).hidden = !on;
+    if (on && focus) tab.focus();
+  }
+  history.replaceState(null, "", `#${key}`);
+}
+
+for (const [name, title, part] of TABS) {
+  tabs.append(make("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, onclick: () => go(name) }, title));
+  const panel = make("section", { role: "tabpanel", id: `panel-${name}`, "aria-labelledby": `tab-${name}` });
+  panels.append(panel);
+  part.build(panel, go);
+}
+
+tabs.addEventListener("keydown", (event) => {
+  const names = TABS.map(([name]) => name), at = names.indexOf(document.activeElement.id.slice(4));
+  const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: names.length - 1 }[event.key];
+  if (to === undefined || at < 0) return;
+  event.preventDefault();
+  go(names[(to + names.length) % names.length]);
+});
+
+// Jobs that run, whoever of the open tabs has started them.
+const running = document.getElementById("running");
+let shown = "";
+watch(() => {
+  document.getElementById("folder").textContent = session.folder;
+  const jobs = session.jobs.filter((job) => !isOver(job));
+  const now = JSON.stringify([session.gone, jobs]);
+  if (now === shown) return;
+  shown = now;
+  fill(running, session.gone ? make("p", { class: "message", role: "alert" }, "The workbench has ended: start it again; files and results are in its directory.") : null, jobs.map(jobLine));
+});
+
+const theme = document.getElementById("theme");
+const dark = () => (document.documentElement.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
+const label = () => { theme.textContent = dark() ? "Light" : "Dark"; theme.setAttribute("aria-label", `Use ${dark() ? "light" : "dark"} colours`); };
+theme.addEventListener("click", () => { document.documentElement.dataset.theme = dark() ? "light" : "dark"; label(); });
+label();
+
+go(TABS.some(([name]) => name === location.hash.slice(1)) ? location.hash.slice(1) : "log", false);
+refresh();

@@ -1,0 +1,142 @@
+import { fileAddress, upload } from "./api.js";
+import { choice, fill, field, make, plain } from "./dom.js";
+import { isOver, jobOf, refresh, session, stop, watch } from "./state.js";
+
+const LOGS = /\.(csv|txt|tsv|dat|lvm|log|asc|npz|npy|mat|h5|hdf5|hdf|nc|parquet|pq|mf4|mdf)$/i;
+export const isLog = (name) => LOGS.test(name);
+export const isModel = (name) => /\.toml$/i.test(name);
+export const isFmu = (name) => /\.(fmu|ssp)$/i.test(name);
+
+// All files of the session of one kind, those of results too.
+export function filesOf(test) {
+  const uploads = session.files.filter((file) => test(file.name)).map((file) => [file.file, file.name]);
+  const results = session.jobs.flatMap((job) => job.files.filter(test).map((name) => [`results/${job.name}/${name}`, `${job.name}: ${name}`]));
+  return [...uploads, ...results];
+}
+
+// A place to drop a file on, with a button for those who do not drag.
+export function dropZone(text, taken, multiple = false) {
+  const said = make("span", { "aria-live": "polite" });
+  const input = make("input", { type: "file", multiple, "aria-label": text });
+  const zone = make("div", { class: "drop" }, make("strong", {}, text), input, said);
+  const take = async (files) => {
+    for (const file of files) {
+      try {
+        const found = await upload(file, (share) => { said.textContent = `${file.name}: ${Math.round(100 * share)} %`; });
+        said.textContent = `${found.name} is here`;
+        await refresh();
+        await taken(found.file);
+      } catch (error) {
+        said.replaceChildren(make("span", { class: "tag bad" }, "not taken"), ` ${error.message}`);
+      }
+    }
+    input.value = "";
+  };
+  input.addEventListener("change", () => take([...input.files]));
+  zone.addEventListener("dragover", (event) => { event.preventDefault(); zone.classList.add("over"); });
+  zone.addEventListener("dragleave", () => zone.classList.remove("over"));
+  zone.addEventListener("drop", (event) => {
+    event.preventDefault();
+    zone.classList.remove("over");
+    take([...event.dataTransfer.files].slice(0, multiple ? 50 : 1));
+  });
+  return zone;
+}
+
+// A choice among files of the session that follows what comes and goes.
+export function fileChoice(text, test, value, picked, none = "none") {
+  const place = make("div", { class: "field grows" });
+  let shown = "";
+  const draw = () => {
+    const options = [["", none], ...filesOf(test)];
+    const now = JSON.stringify([options, value()]);
+    if (now === shown) return;
+    shown = now;
+    const made = choice(options, options.some(([key]) => key === value()) ? value() : "", picked);
+    made.dataset.key = text;
+    fill(place, ...field(text, made).children);
+  };
+  watch(draw);
+  draw();
+  return place;
+}
+
+const STATES = { waiting: "", running: "", done: "good", stopped: "warn", ended: "warn", failed: "bad" };
+
+// One job: its stage, the time left, Stop; then what it said, and its page.
+export function jobView(result = () => []) {
+  const place = make("div", {});
+  let name = "", shown = "";
+  const draw = () => {
+    const job = jobOf(name);
+    if (!job) return;
+    const now = JSON.stringify([name, job.state]);
+    if (now === shown) return;
+    shown = now;
+    fill(place, isOver(job) ? finished(job) : make("p", { class: "note", role: "status" }, `${job.name} is ${job.state}; its stage and Stop stand at the top.`));
+    if (isOver(job)) for (const part of [result(job)].flat()) place.append(part);
+    if (isOver(job) && job.files.includes("report.html")) place.append(reportOf(job));
+  };
+  watch(draw);
+  return { element: place, show(job) { name = job; shown = ""; draw(); }, name: () => name };
+}
+
+export function jobLine(job) {
+  const bar = make("progress", { max: 1, "aria-label": `${job.name}: share that is done` });
+  if (job.share !== null) bar.value = job.share;
+  const left = job.left === null ? "" : `about ${duration(job.left)} left`;
+  const words = job.stops > 0 ? (job.stops > 1 ? "Kill" : "Stop at once") : "Stop";
+  return make("div", { class: "job" },
+    make("div", { class: "row" },
+      make("strong", {}, job.name), make("span", {}, job.stops ? "stopping" : job.stage || job.state), bar, make("span", {}, left),
+      make("button", { type: "button", "data-key": `stop-${job.name}`, "aria-label": `${words}: ${job.name}`, onclick: () => stop(job.name) }, words)),
+    make("code", {}, job.line));
+}
+
+function finished(job) {
+  const seconds = job.ended - job.begun;
+  const words = job.state === "failed" || job.state === "ended" || job.state === "stopped" ? job.messages : job.messages.filter((m) => !m.startsWith("The fit"));
+  return make("div", { class: "job" },
+    make("div", { class: "row" },
+      make("strong", {}, job.name), make("span", { class: `tag ${STATES[job.state]}` }, job.state),
+      make("span", { class: "note" }, seconds > 0 ? duration(seconds) : ""),
+      make("span", { class: "note" }, job.files.length > 1 ? "" : job.state === "stopped" ? "no results were left" : "")),
+    words.map((text) => make("p", { class: job.state === "failed" ? "message" : "message calm" }, plain(text.replace(/^error: /, "")))),
+    make("code", {}, job.line),
+    make("ul", { class: "files" }, job.files.map((name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name }, name)))));
+}
+
+function reportOf(job) {
+  const address = fileAddress(`results/${job.name}/report.html`);
+  return make("div", {},
+    make("p", {}, make("a", { href: address, target: "_blank", rel: "noopener" }, "Open this page in a tab of its own")),
+    make("iframe", { src: address, title: `Page of ${job.name}`, sandbox: "allow-scripts allow-downloads allow-popups" }));
+}
+
+export function duration(seconds) {
+  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  const whole = Math.round(seconds);
+  return whole < 60 ? `${whole} s` : `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")} min`;
+}
+
+export function message() {
+  const place = make("p", { class: "message", role: "alert" });
+  return { element: place, say(text) { place.textContent = plain(text ?? ""); } };
+}
+
+// Run an action of a button: disabled meanwhile, an error becomes a line.
+export function action(text, said, act, kind = "") {
+  const made = make("button", { type: "button", class: kind, async onclick() {
+    made.disabled = true;
+    said.say("");
+    try { await act(); } catch (error) { said.say(error.message); }
+    made.disabled = false;
+    if (document.activeElement === document.body) made.focus();
+  } }, text);
+  return made;
+}
+
+export async function resultOf(job) {
+  const response = await fetch(fileAddress(`results/${job.name}/${job.command}.json`));
+  return response.ok ? (await response.json()).results : null;
+}

@@ -1,0 +1,167 @@
+"""The workbench in Chromium: from a dropped log to a verdict, with the mouse or with the keyboard alone."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.browser import browser, missing, set_screen
+from tests.support.workbench import HANGS, Served, drive_log, workbench
+
+pytest.importorskip("starlette")
+pytest.importorskip("uvicorn")
+pytestmark = [pytest.mark.slow(shares="page"), pytest.mark.skipif(bool(missing()), reason=missing())]
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory):
+    folder = tmp_path_factory.mktemp("browser")
+    with workbench(folder / "session") as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return drive_log(tmp_path_factory.mktemp("log") / "drive.csv")
+
+
+@pytest.fixture(scope="module")
+def page(served: Served):
+    with browser() as driver:
+        yield driver
+
+
+def wait(driver: Any, condition: Any) -> Any:
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    return WebDriverWait(driver, HANGS, 0.1).until(condition)
+
+
+def open_workbench(driver: Any, served: Served, width: int = 1280, scheme: str = "light") -> None:
+    set_screen(driver, width, 900, scheme)
+    driver.get("about:blank")
+    driver.get(served.address)
+    wait(driver, lambda d: d.execute_script("return document.getElementById('folder')?.textContent"))
+
+
+def find(driver: Any, css: str) -> Any:
+    return wait(driver, lambda d: next(iter(d.find_elements("css selector", css)), None))
+
+
+def press(driver: Any, text: str) -> None:
+    """Bring the focus to a button as Tab does, and press Enter."""
+    found = wait(driver, lambda d: next(
+        (b for b in d.find_elements("xpath", f"//button[normalize-space()='{text}']") if b.is_displayed()), None
+    ))  # fmt: skip
+    driver.execute_script("arguments[0].focus()", found)
+    found.send_keys("\n")
+
+
+def pick(driver: Any, css: str, text: str) -> None:
+    from selenium.webdriver.support.select import Select
+
+    Select(find(driver, css)).select_by_visible_text(text)
+
+
+def choose_tab(driver: Any, name: str) -> None:
+    driver.execute_script("scrollTo(0, 0)")
+    driver.find_element("id", f"tab-{name}").click()
+
+
+def severe(driver: Any) -> list[str]:
+    return [entry["message"] for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+@pytest.fixture(scope="module")
+def inspected(page: Any, served: Served, log: Path) -> Any:
+    """The page after a log was dropped, its columns named by clicks, and looked at."""
+    open_workbench(page, served)
+    find(page, "#panel-log input[type=file]").send_keys(str(log))
+    find(page, "#panel-log .card")
+    assert "Not used: Achse B [deg]" in page.find_element("id", "panel-log").text
+    assert "torque constant" in page.find_element("css selector", "#panel-log [role=alert].message:not(:empty)").text
+    pick(page, "select[aria-label='Use Achse B [deg] as']", "Load angle")
+    wait(page, lambda d: "Load angle: nothing → Achse B [deg]" in d.find_element("id", "panel-log").text)
+    find(page, "[data-key=torque_constant-u]").send_keys("0.5\t")
+    wait(page, lambda d: "can be read" in d.find_element("id", "panel-log").text)
+    press(page, "Look at this log")
+    find(page, "#panel-log iframe")
+    return page
+
+
+def test_a_log_goes_in_and_its_columns_are_named_by_clicks(inspected: Any, served: Served) -> None:
+    found = json.loads((served.folder / "results" / "inspect-1" / "inspect.json").read_text())["results"]
+    assert [channel["name"] for channel in found["channels"]] == ["u", "theta_m", "theta_l"]
+    torque = next(channel for channel in found["channels"] if channel["name"] == "u")
+    assert torque["unit"] == "N.m"
+    assert torque["most"] < 2.0
+    assert severe(inspected) == []
+
+
+def test_the_page_of_a_result_is_shown_in_a_sandbox(inspected: Any) -> None:
+    inspected.switch_to.frame(find(inspected, "#panel-log iframe"))
+    try:
+        wait(inspected, lambda d: "record" in d.find_element("css selector", "h1").text.lower())
+        assert inspected.execute_script("return window.origin") == "null"
+    finally:
+        inspected.switch_to.default_content()
+
+
+def test_a_value_of_the_machine_becomes_the_users(inspected: Any, served: Served) -> None:
+    press(inspected, "Go on to the machine")
+    value = find(inspected, "input[aria-label='J_m, value in kg.m2']")
+    value.clear()
+    value.send_keys("0.003\t")
+    wait(inspected, lambda d: "Changed and not saved: J_m" in d.find_element("id", "panel-machine").text)
+    press(inspected, "Save as a new model file")
+    wait(inspected, lambda d: (served.folder / "files" / "model-yours.toml").exists())
+    wait(inspected, lambda d: "yours" in d.find_element("id", "panel-machine").text)
+    assert "value = 0.003   # kg.m2: yours" in (served.folder / "files" / "model-yours.toml").read_text()
+
+
+def test_a_diagnosis_is_stopped_from_the_page(inspected: Any, served: Served) -> None:
+    choose_tab(inspected, "diagnosis")
+    press(inspected, "Diagnose")
+    wait(inspected, lambda d: "fitted" in d.find_element("id", "running").text)
+    press(inspected, "Stop")
+    wait(inspected, lambda d: "stopped" in d.find_element("id", "panel-diagnosis").text)
+    job = served.job("diagnose-1")
+    assert (job["state"], job["exit_code"]) == ("stopped", 130)
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (390, "light"), (1280, "dark")])
+def test_nothing_is_wider_than_the_screen(inspected: Any, served: Served, width: int, scheme: str) -> None:
+    set_screen(inspected, width, 900, scheme)
+    for tab in inspected.find_elements("css selector", "[role=tab]"):
+        inspected.execute_script("arguments[0].click()", tab)
+        assert inspected.execute_script("return document.documentElement.scrollWidth") <= width, tab.text
+    set_screen(inspected, 1280, 900, "light")
+
+
+def test_tabs_follow_the_arrow_keys_and_every_control_has_a_name(inspected: Any) -> None:
+    from selenium.webdriver.common.keys import Keys
+
+    choose_tab(inspected, "log")
+    for name in ("machine", "gap"):
+        inspected.switch_to.active_element.send_keys(Keys.ARROW_RIGHT)
+        assert inspected.switch_to.active_element.get_attribute("id") == f"tab-{name}"
+        assert inspected.find_element("id", f"panel-{name}").is_displayed()
+    inspected.switch_to.active_element.send_keys(Keys.HOME)
+    assert inspected.switch_to.active_element.get_attribute("id") == "tab-log"
+    nameless = """return [...document.querySelectorAll('input, select, button')].filter(
+        (e) => !(e.getAttribute('aria-label') || e.labels?.length || e.textContent.trim())).map((e) => e.outerHTML)"""
+    assert inspected.execute_script(nameless) == []
+
+
+def test_two_tabs_of_the_browser_work_side_by_side(inspected: Any, served: Served) -> None:
+    first = inspected.current_window_handle
+    inspected.switch_to.new_window("tab")
+    try:
+        open_workbench(inspected, served)
+        assert inspected.find_element("css selector", "#panel-log select").get_attribute("value") == ""
+        text = wait(inspected, lambda d: d.find_element("id", "panel-compare").get_attribute("textContent"))
+        assert "inspect-1" in text
+    finally:
+        inspected.close()
+        inspected.switch_to.window(first)

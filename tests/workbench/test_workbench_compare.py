@@ -1,0 +1,77 @@
+"""Two results of one command: what differs beyond the intervals, and what does not."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.reporting import Plot, ReportTable, render
+from orchestrator.workbench.compare import Quantity, compare_results, quantities
+
+
+def result(folder: Path, alpha: float, half: float, rate: float = 500.0, verdict: str = "effects") -> Path:
+    """Write a result directory with a half-gap and its interval."""
+    folder.mkdir()
+    found = {
+        "verdict": verdict,
+        "effects": [{"name": "backlash", "parameters": {
+            "alpha": {"value": alpha, "interval": [alpha - half, alpha + half], "unit": "rad"}}}],
+        "parameters": {"J_m": {"value": 0.4, "interval": [0.39, 0.41], "unit": "kg.m2"}},
+        "analysis": [{"source": "a.csv", "rate": rate}],
+        "settings": {"band": {"most_rows": 1}},
+    }  # fmt: skip
+    document = {"command": "diagnose", "version": "1", "arguments": {"record": folder.name}, "results": found}
+    (folder / "diagnose.json").write_text(json.dumps(document))
+    (folder / "diagnose.csv").write_text("time,theta_m\n" + "\n".join(f"{n},{alpha * n}" for n in range(5)))
+    return folder
+
+
+def tables(report) -> dict[str, ReportTable]:
+    return {section.title: section for section in report.sections if isinstance(section, ReportTable)}
+
+
+def test_what_differs_beyond_the_intervals(tmp_path: Path) -> None:
+    first, second = result(tmp_path / "diagnose-1", 0.01, 0.001), result(tmp_path / "diagnose-2", 0.02, 0.001)
+    report = compare_results(first, second)
+    found = tables(report)
+    assert [row[0] for row in found["Differ by more than their intervals"].rows] == [
+        "effects backlash parameters alpha"
+    ]
+    assert found["Differ by more than their intervals"].rows[0][3] == pytest.approx(2.0)
+    assert [row[0] for row in found["Agree within their intervals"].rows] == ["parameters J m"]
+    assert report.badge == ("warn", "they differ")
+    (plot,) = [section for section in report.sections if isinstance(section, Plot)]
+    assert [series.name for series in plot.series] == ["diagnose-1", "diagnose-2"]
+    assert "diagnose-2" in render(report)
+
+
+def test_values_within_their_intervals_do_not_differ(tmp_path: Path) -> None:
+    report = compare_results(
+        result(tmp_path / "diagnose-1", 0.01, 0.001), result(tmp_path / "diagnose-2", 0.0115, 0.001, 250.0, "none")
+    )
+    found = tables(report)
+    assert "Differ by more than their intervals" not in found
+    assert [row[0] for row in found["Numbers without an interval that differ"].rows] == ["analysis a.csv rate"]
+    assert ("verdict", "effects", "none") in found["Words that differ"].rows
+    assert report.badge == ("good", "no difference beyond the intervals")
+
+
+def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
+    one = result(tmp_path / "diagnose-1", 0.01, 0.001)
+    (tmp_path / "check-1").mkdir()
+    with pytest.raises(InputError, match="whole"):
+        compare_results(one, tmp_path / "check-1")
+    (tmp_path / "check-1" / "check.json").write_text('{"command": "check", "results": {}}')
+    with pytest.raises(InputError, match="one command"):
+        compare_results(one, tmp_path / "check-1")
+    (tmp_path / "check-1" / "check.json").write_text("[")
+    with pytest.raises(InputError, match="JSON"):
+        compare_results(one, tmp_path / "check-1")
+
+
+def test_quantities_take_intervals_and_leave_flags() -> None:
+    found = dict(
+        quantities({"alpha": 1.0, "interval": [0.5, 2.0], "visible": True, "more": [1.0, {"x": None, "y": 3}]})
+    )
+    assert found == {"": Quantity(1.0, (0.5, 2.0)), "more 2 y": Quantity(3.0)}
