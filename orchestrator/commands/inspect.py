@@ -10,6 +10,7 @@ from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of
 from orchestrator.commands._stages import Stages
+from orchestrator.fmi.preview import preview_fmu
 from orchestrator.records.preview import preview_log
 from orchestrator.shared.output import stage_output
 
@@ -20,14 +21,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument("record", type=Path, metavar="DATA", help=f"measured record ({FORMATS})")
     parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the machine, as far as it is known")
-    parser.add_argument(
-        "--columns", action="store_true", help="print what each column would be taken from, as JSON, and stop"
-    )
+    text = "print what each column would be taken from, or an FMU's variables, as JSON, and stop"
+    parser.add_argument("--columns", action="store_true", help=text)
     add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Look at the record, print what it holds, write JSON, picture, report and a model file to start from."""
+    if args.columns and args.record.suffix.lower() == ".fmu":
+        sys.stdout.write(msgspec.json.encode(preview_fmu(args.record)).decode() + "\n")
+        return 0
     model = None if args.model is None else read_model(args.model)
     if args.columns:
         header = args.header if args.header is not None or model is None else model.header

@@ -159,7 +159,8 @@ def _convert(
         problem = str(error)
         filled = dict(columns)
         for one in taken:  # the others can be shown already
-            filled[one.column] = replace(columns.get(one.column, Column()), **dict.fromkeys(one.needs, 1.0))
+            needed: dict[str, Any] = dict.fromkeys(one.needs, 1.0)
+            filled[one.column] = replace(columns.get(one.column, Column()), **needed)
         try:
             loaded = load(part, path, filled, (), Reading(torque_needed=False))
         except RecordError:

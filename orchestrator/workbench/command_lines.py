@@ -7,32 +7,32 @@ from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.estimation.protocol import METHODS
-from orchestrator.workbench.session import Session
+from orchestrator.workbench.session import SessionFolder
 
 MOST_INPUTS = 20
-Reader = Callable[[Any, str, Session], str | None]
+Reader = Callable[[Any, str, SessionFolder], str | None]
 
 
-def _file(value: Any, name: str, session: Session) -> str:
+def _file(value: Any, name: str, session: SessionFolder) -> str:
     if not isinstance(value, str):
         raise InputError(f"`{name}` must be a file of this session, but is {str(value)[:60]!r}")
     return session.reference_of(session.path_of(value))
 
 
-def _number(value: Any, name: str, session: Session) -> str:
+def _number(value: Any, name: str, session: SessionFolder) -> str:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise InputError(f"`{name}` must be a finite number, but is {str(value)[:60]!r}")
     return repr(value)
 
 
-def _flag(value: Any, name: str, session: Session) -> str | None:
+def _flag(value: Any, name: str, session: SessionFolder) -> str | None:
     if not isinstance(value, bool):
         raise InputError(f"`{name}` must be true or false, but is {str(value)[:60]!r}")
     return "" if value else None
 
 
 def _one_of(*known: str) -> Reader:
-    def read(value: Any, name: str, session: Session) -> str:
+    def read(value: Any, name: str, session: SessionFolder) -> str:
         if value not in known:
             raise InputError(f"`{name}` must be one of {', '.join(known)}, but is {str(value)[:60]!r}")
         return str(value)
@@ -40,7 +40,7 @@ def _one_of(*known: str) -> Reader:
     return read
 
 
-def _part(value: Any, name: str, session: Session) -> str:
+def _part(value: Any, name: str, session: SessionFolder) -> str:
     if not isinstance(value, str) or len(value) > 40 or not set(value) <= set("0123456789.:e+"):
         raise InputError(f"`{name}` must be START:END in seconds, such as 2:30, but is {str(value)[:60]!r}")
     return value
@@ -87,7 +87,7 @@ FORMS: dict[str, CommandForm] = {
 }  # fmt: skip
 
 
-def command_line(session: Session, command: Any, inputs: Any, options: Any) -> list[str]:
+def command_line(session: SessionFolder, command: Any, inputs: Any, options: Any) -> list[str]:
     """Return the words behind the program's name, without ``--out``; paths are relative to the session's directory.
 
     Raises:

@@ -20,14 +20,14 @@ _BESIDE = ("settings", "schema_version", "seconds", "block_values", "candidates"
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ResultNumber:
     """A number of a result, with the 95 % interval where there is one."""
 
     value: float
     interval: tuple[float, float] | None = None
     unit: str = ""
 
-    def differs_beyond(self, other: "Quantity") -> bool:
+    def differs_beyond(self, other: "ResultNumber") -> bool:
         """Return whether two values differ by more than their intervals allow."""
         if self.interval is None or other.interval is None:
             return not math.isclose(self.value, other.value, rel_tol=SAME, abs_tol=1e-300)
@@ -79,25 +79,26 @@ def compare_results(first: Path, second: Path) -> Report:
     )
 
 
-def quantities(found: Any, path: str = "") -> Iterator[tuple[str, Quantity]]:
+def quantities(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber]]:
     """Yield every number of a result with its place, such as ``parameters J_m``; entries of lists go by their name."""
-    if isinstance(found, Mapping):
-        value = next((found[key] for key in ("value", "alpha") if _is_number(found.get(key))), None)
+    if isinstance(results, Mapping):
+        value = next((results[key] for key in ("value", "alpha") if _is_number(results.get(key))), None)
         if value is not None:
-            yield path.strip(), Quantity(float(value), _interval(found.get("interval")), str(found.get("unit") or ""))
-        for name, entry in found.items():
+            interval, unit = _interval(results.get("interval")), str(results.get("unit") or "")
+            yield path.strip() or "the half-gap", ResultNumber(float(value), interval, unit)
+        for name, entry in results.items():
             if name in _BESIDE or (value is not None and name in ("value", "alpha", "interval", "standard_error")):
                 continue
             yield from quantities(entry, f"{path} {name}")
-    elif isinstance(found, list):
-        for place, entry in enumerate(found):
+    elif isinstance(results, list):
+        for place, entry in enumerate(results):
             named = entry.get("name") or entry.get("source") if isinstance(entry, Mapping) else None
             if named is not None:
                 yield from quantities(entry, f"{path} {named}")
             elif isinstance(entry, Mapping):
                 yield from quantities(entry, f"{path} {place + 1}")
-    elif _is_number(found):
-        yield path.strip(), Quantity(float(found))
+    elif _is_number(results):
+        yield path.strip(), ResultNumber(float(results))
 
 
 def _is_number(value: Any) -> bool:
@@ -126,9 +127,13 @@ def _document(folder: Path) -> dict[str, Any]:
 
 
 def _table(
-    title: str, names: tuple[str, str], rows: list[str], left: Mapping[str, Quantity], right: Mapping[str, Quantity]
+    title: str,
+    names: tuple[str, str],
+    rows: list[str],
+    left: Mapping[str, ResultNumber],
+    right: Mapping[str, ResultNumber],
 ) -> ReportTable:
-    def cell(values: Mapping[str, Quantity], name: str) -> str:
+    def cell(values: Mapping[str, ResultNumber], name: str) -> str:
         return values[name].words() if name in values else "none"
 
     columns = (TableColumn("quantity"), *(TableColumn(name) for name in names), TableColumn("second over first"))
@@ -138,7 +143,7 @@ def _table(
     ))  # fmt: skip
 
 
-def _ratio(first: Quantity | None, second: Quantity | None) -> float | None:
+def _ratio(first: ResultNumber | None, second: ResultNumber | None) -> float | None:
     return second.value / first.value if first is not None and second is not None and first.value else None
 
 
@@ -153,17 +158,17 @@ def _texts(names: tuple[str, str], documents: list[dict[str, Any]]) -> ReportTab
     return ReportTable("Words that differ", (TableColumn("what"), *(TableColumn(n) for n in names)), tuple(rows))
 
 
-def _words(found: Any, path: str = "") -> Iterator[tuple[str, str]]:
-    if isinstance(found, Mapping):
-        for name, entry in found.items():
+def _words(results: Any, path: str = "") -> Iterator[tuple[str, str]]:
+    if isinstance(results, Mapping):
+        for name, entry in results.items():
             if name not in (*_BESIDE, "summary", "notes"):
                 yield from _words(entry, f"{path} {name}")
-    elif isinstance(found, list):
-        for place, entry in enumerate(found):
+    elif isinstance(results, list):
+        for place, entry in enumerate(results):
             named = entry.get("name") if isinstance(entry, Mapping) else None
             yield from _words(entry, f"{path} {named or place + 1}")
-    elif isinstance(found, (str, bool)):
-        yield path.removeprefix(" results").removeprefix(" arguments").strip(), str(found)[:200]
+    elif isinstance(results, (str, bool)):
+        yield path.removeprefix(" results").removeprefix(" arguments").strip(), str(results)[:200]
 
 
 def _how(document: Mapping[str, Any]) -> str:

@@ -35,7 +35,7 @@ class Guard:
     Args:
         app: the application; it sees paths without the token.
         token: what the first part of a path must be.
-        port: of the server.
+        port: that requests must name as the one they came to.
     """
 
     def __init__(self, app: App, token: str, port: int) -> None:

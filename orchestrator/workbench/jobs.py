@@ -19,7 +19,7 @@ import orchestrator
 from orchestrator.errors import InputError
 from orchestrator.plain_text import plain_text
 from orchestrator.shared.output import write_whole
-from orchestrator.workbench.session import Session
+from orchestrator.workbench.session import SessionFolder
 from orchestrator.workbench.settings import WorkbenchSettings
 
 PROGRAM = "backlash-cosim"  # as it is called on a command line
@@ -78,7 +78,7 @@ def _is_result(path: Path) -> bool:
 class Jobs:
     """The jobs of a session; for one thread, that of the event loop."""
 
-    def __init__(self, session: Session, settings: WorkbenchSettings) -> None:
+    def __init__(self, session: SessionFolder, settings: WorkbenchSettings) -> None:
         self._session, self._settings = session, settings
         self._room = asyncio.Semaphore(settings.jobs_at_once)
         self._tasks: set[asyncio.Task[None]] = set()
@@ -200,7 +200,7 @@ def _is_complete(job: Job) -> bool:
     return job.exit_code == 0 or (job.exit_code == 1 and (job.folder / f"{job.command}.json").is_file())
 
 
-def _of_earlier_servers(session: Session) -> list[Job]:
+def _of_earlier_servers(session: SessionFolder) -> list[Job]:
     """Return the jobs that are noted in the session's directory, the oldest first."""
     found = []
     for note in session.results.glob(f"*/{JOB_FILE}"):

@@ -88,15 +88,15 @@ def model_text(base: Path | None, changes: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _parameter_lines(one: ModelParameter, change: Mapping[str, Any] | None, said: str) -> list[str]:
-    value, uncertainty = one.value, one.uncertainty
+def _parameter_lines(parameter: ModelParameter, change: Mapping[str, Any] | None, said: str) -> list[str]:
+    value, uncertainty = parameter.value, parameter.uncertainty
     if change is not None:
-        value = _number(change.get("value", value), f"parameters.{one.name}.value")
-        uncertainty = _number(change.get("uncertainty", uncertainty), f"parameters.{one.name}.uncertainty")
-    changed = (value, uncertainty) != (one.value, one.uncertainty)
-    remark = f"{one.unit or '1'}: {YOURS}" if changed else said
+        value = _number(change.get("value", value), f"parameters.{parameter.name}.value")
+        uncertainty = _number(change.get("uncertainty", uncertainty), f"parameters.{parameter.name}.uncertainty")
+    changed = (value, uncertainty) != (parameter.value, parameter.uncertainty)
+    remark = f"{parameter.unit or '1'}: {YOURS}" if changed else said
     note = f"   # {plain_text(remark)}" if remark else ""
-    return [f"[parameters.{toml_text(one.name)}]", f"value = {value!r}{note}", f"uncertainty = {uncertainty!r}"]
+    return [f"[parameters.{toml_text(parameter.name)}]", f"value = {value!r}{note}", f"uncertainty = {uncertainty!r}"]
 
 
 def _effect_parameters(model: Model, labels: Any) -> set[str]:

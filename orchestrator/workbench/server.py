@@ -28,7 +28,8 @@ from orchestrator.workbench.compare import compare_results
 from orchestrator.workbench.guard import PAGE_POLICY, Guard
 from orchestrator.workbench.jobs import Jobs
 from orchestrator.workbench.model_fields import model_fields, model_text
-from orchestrator.workbench.session import Session
+from orchestrator.workbench.scenario_text import scenario_text
+from orchestrator.workbench.session import SessionFolder
 from orchestrator.workbench.settings import WorkbenchSettings
 from orchestrator.workbench.uploads import UploadTooLargeError, save_upload
 
@@ -45,7 +46,7 @@ Answer = Callable[[Request], Awaitable[Response]]
 class Workbench:
     """What the routes share: the session, its jobs, and limits."""
 
-    session: Session
+    session: SessionFolder
     settings: WorkbenchSettings
     jobs: Jobs
 
@@ -135,6 +136,22 @@ class Workbench:
             return FileResponse(path, filename=path.name, media_type="application/octet-stream", headers=headers)
         return FileResponse(path, media_type=kind, headers=headers)
 
+    async def variables(self, request: Request) -> Response:
+        """Return the interface of an FMU."""
+        words = command_line(self.session, "inspect", [request.query_params.get("file", "")], {})
+        code, out, said = await self.jobs.answer([words[0], "--columns", *words[1:]])
+        if code:
+            return _problem(said.removeprefix("error: "), 422)
+        return Response(out, media_type="application/json")
+
+    async def write_scenario(self, request: Request) -> Response:
+        """Write a scenario that was drawn; whether it fits, its run says."""
+        asked = await self._asked(request)
+        text = scenario_text(self.session, asked)
+        path = self.session.reserve_file(str(asked.get("name") or "scenario.toml"))
+        write_whole(path, text)
+        return JSONResponse({"file": self.session.reference_of(path), "name": path.name, "text": text}, 201)
+
     async def compare(self, request: Request) -> Response:
         """Return the page on two results of one command."""
         folders = [self._result(request.query_params.get(name, "")) for name in ("first", "second")]
@@ -175,7 +192,7 @@ def _problem(text: str, status: int) -> JSONResponse:
     return JSONResponse({"error": _OPTION_IN_ADVICE.sub("", text) or "the command gave no answer"}, status)
 
 
-def _told(answer: Answer) -> Answer:
+def _answer_in_words(answer: Answer) -> Answer:
     """Return a route whose errors are a line that the page shows."""
 
     async def route(request: Request) -> Response:
@@ -215,7 +232,7 @@ def _assets() -> Mapping[str, tuple[str, str]]:
     return {name: ("orchestrator.workbench", "static") for name in own if Path(name).suffix in _KINDS} | shared
 
 
-def application(session: Session, settings: WorkbenchSettings) -> Starlette:
+def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlette:
     """Return the application behind the guard; jobs end with it."""
     jobs = Jobs(session, settings)
     workbench = Workbench(session, settings, jobs)
@@ -228,21 +245,25 @@ def application(session: Session, settings: WorkbenchSettings) -> Starlette:
     routes = [
         Route("/", _page),
         Route("/static/{name}", _page),
-        Route("/state", _told(workbench.state)),
-        Route("/upload/{name:path}", _told(workbench.upload), methods=["PUT"]),
-        Route("/columns", _told(workbench.columns), methods=["POST"]),
-        Route("/cost", _told(workbench.cost), methods=["POST"]),
-        Route("/model", _told(workbench.read_fields)),
-        Route("/models", _told(workbench.write_model), methods=["POST"]),
-        Route("/jobs", _told(workbench.start), methods=["POST"]),
-        Route("/jobs/{name}/stop", _told(workbench.stop), methods=["POST"]),
-        Route("/compare", _told(workbench.compare)),
-        Route("/file/{reference:path}", _told(workbench.file)),
+        Route("/state", _answer_in_words(workbench.state)),
+        Route("/upload/{name:path}", _answer_in_words(workbench.upload), methods=["PUT"]),
+        Route("/columns", _answer_in_words(workbench.columns), methods=["POST"]),
+        Route("/cost", _answer_in_words(workbench.cost), methods=["POST"]),
+        Route("/model", _answer_in_words(workbench.read_fields)),
+        Route("/models", _answer_in_words(workbench.write_model), methods=["POST"]),
+        Route("/jobs", _answer_in_words(workbench.start), methods=["POST"]),
+        Route("/jobs/{name}/stop", _answer_in_words(workbench.stop), methods=["POST"]),
+        Route("/variables", _answer_in_words(workbench.variables)),
+        Route("/scenarios", _answer_in_words(workbench.write_scenario), methods=["POST"]),
+        Route("/compare", _answer_in_words(workbench.compare)),
+        Route("/file/{reference:path}", _answer_in_words(workbench.file)),
     ]
     return Starlette(routes=routes, lifespan=lifespan)
 
 
-def serve(session: Session, port: int, tell: Callable[[str], None], settings: WorkbenchSettings | None = None) -> None:
+def serve(
+    session: SessionFolder, port: int, tell: Callable[[str], None], settings: WorkbenchSettings | None = None
+) -> None:
     """Serve a session on this machine alone until Ctrl-C; all jobs are stopped then.
 
     Args:

@@ -21,7 +21,7 @@ _NAME = re.compile(r"[^\x00-\x1f\x7f/\\:]+")
 
 
 @dataclass(frozen=True)
-class Session:
+class SessionFolder:
     """A session's directory; see ``open_session``."""
 
     folder: Path
@@ -97,13 +97,13 @@ def is_name(text: str) -> bool:
     return plain and not text.startswith((".", "-")) and text == text.strip()
 
 
-def open_session(folder: Path) -> Session:
+def open_session(folder: Path) -> SessionFolder:
     """Return the session of a directory, which is made where there is none; what lies there stays."""
-    session = Session(folder.absolute())
+    session = SessionFolder(folder.absolute())
     try:
         session.files.mkdir(parents=True, exist_ok=True)
         session.results.mkdir(exist_ok=True)
         os.chmod(session.folder, 0o700)  # data of machines: of this user alone
     except OSError as error:
         raise OutputError(f"`out` must be a writable directory, but {folder} is not: {error.strerror}", "out") from None
-    return Session(session.folder.resolve())
+    return SessionFolder(session.folder.resolve())

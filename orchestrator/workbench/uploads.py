@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from orchestrator.errors import InputError
-from orchestrator.workbench.session import Session
+from orchestrator.workbench.session import SessionFolder
 from orchestrator.workbench.settings import MEBIBYTE, WorkbenchSettings
 
 
@@ -13,7 +13,7 @@ class UploadTooLargeError(InputError):
 
 
 async def save_upload(
-    session: Session, name: str, chunks: AsyncIterator[bytes], stated: int | None, settings: WorkbenchSettings
+    session: SessionFolder, name: str, chunks: AsyncIterator[bytes], stated: int | None, settings: WorkbenchSettings
 ) -> Path:
     """Write an upload and return its path.
 
@@ -44,7 +44,7 @@ async def save_upload(
     return path
 
 
-def _too_large(settings: WorkbenchSettings, session: Session) -> UploadTooLargeError:
+def _too_large(settings: WorkbenchSettings, session: SessionFolder) -> UploadTooLargeError:
     file, whole = settings.largest_file // 10**6, settings.largest_session // 10**6
     return UploadTooLargeError(
         f"a file must have at most {file} MB, and all files of the session {whole} MB (now "

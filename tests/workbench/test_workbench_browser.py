@@ -65,7 +65,7 @@ def pick(driver: Any, css: str, text: str) -> None:
 
 
 def choose_tab(driver: Any, name: str) -> None:
-    driver.execute_script("scrollTo(0, 0)")
+    driver.execute_script("scrollTo({ top: 0, behavior: 'instant' })")
     driver.find_element("id", f"tab-{name}").click()
 
 

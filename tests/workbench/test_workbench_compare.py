@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.reporting import Plot, ReportTable, render
-from orchestrator.workbench.compare import Quantity, compare_results, quantities
+from orchestrator.workbench.compare import ResultNumber, compare_results, quantities
 
 
 def result(folder: Path, alpha: float, half: float, rate: float = 500.0, verdict: str = "effects") -> Path:
@@ -74,4 +74,4 @@ def test_quantities_take_intervals_and_leave_flags() -> None:
     found = dict(
         quantities({"alpha": 1.0, "interval": [0.5, 2.0], "visible": True, "more": [1.0, {"x": None, "y": 3}]})
     )
-    assert found == {"": Quantity(1.0, (0.5, 2.0)), "more 2 y": Quantity(3.0)}
+    assert found == {"the half-gap": ResultNumber(1.0, (0.5, 2.0)), "more 2 y": ResultNumber(3.0)}

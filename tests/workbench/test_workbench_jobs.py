@@ -44,6 +44,7 @@ def is_fitting(job) -> bool:
     return job["stage"].startswith("fitted")
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_command_line(served, log: Path, tmp_path: Path) -> None:
     """Columns by clicks, then `inspect`: the JSON is the one that the same files give on the command line."""
     reference = served.upload(log)
@@ -99,6 +100,7 @@ def test_damaged_archives_are_told_and_contained(served, tmp_path: Path) -> None
     assert not Path("/tmp/outside.txt").exists()
 
 
+@pytest.mark.slow
 def test_stop_is_ctrl_c_and_leaves_nothing_running(served, log: Path) -> None:
     reference = served.upload(log)
     model = served.ask("POST", "models", MACHINE)[1]["file"]
@@ -116,6 +118,7 @@ def test_stop_is_ctrl_c_and_leaves_nothing_running(served, log: Path) -> None:
     wait_until_gone(running)
 
 
+@pytest.mark.slow
 def test_results_of_a_server_that_is_killed_are_whole_or_absent(tmp_path: Path, log: Path) -> None:
     with workbench(tmp_path / "session") as first:
         reference = first.upload(log)
@@ -137,6 +140,7 @@ def test_results_of_a_server_that_is_killed_are_whole_or_absent(tmp_path: Path, 
         assert again.start("inspect", [reference], model=model) == "inspect-2"
 
 
+@pytest.mark.slow
 def test_the_end_of_the_server_stops_its_jobs(tmp_path: Path, log: Path) -> None:
     folder = tmp_path / "session"
     with workbench(folder) as first:

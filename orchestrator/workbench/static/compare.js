@@ -39,6 +39,6 @@ export function build(panel) {
   };
   panel.append(
     make("div", { class: "row" }, field("One result", first, "grows"), field("Another of the same command", second, "grows"),
-      make("button", { type: "button", class: "main", onclick: show }, "Compare")),
+      make("button", { type: "button", class: "main", onclick: show }, "Compare them")),
     said.element, page, make("h2", {}, "History of this session"), table);
 }

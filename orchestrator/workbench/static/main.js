@@ -6,10 +6,11 @@ import * as machine from "./machine.js";
 import * as gap from "./gap.js";
 import * as diagnosis from "./diagnosis.js";
 import * as model from "./model.js";
+import * as fmus from "./fmus.js";
 import * as compare from "./compare.js";
 
 const TABS = [
-  ["log", "Log", log], ["machine", "Machine", machine], ["gap", "Gap", gap], ["diagnosis", "Diagnosis", diagnosis], ["model", "Model", model], ["compare", "Compare", compare],
+  ["log", "Log", log], ["machine", "Machine", machine], ["gap", "Gap", gap], ["diagnosis", "Diagnosis", diagnosis], ["model", "Model", model], ["fmus", "FMUs", fmus], ["compare", "Compare", compare],
 ];
 const tabs = document.getElementById("tabs"), panels = document.getElementById("panels");
 
