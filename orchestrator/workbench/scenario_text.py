@@ -33,7 +33,7 @@ def scenario_text(session: SessionFolder, drawn: Mapping[str, Any]) -> str:
     lines += ["", "[master]", *_pairs(drawn.get("master", {}), MASTER_KEYS, "master")]
     for name, entry in _table(drawn.get("instances"), "instances").items():
         table = _table(entry, f"instances.{name}")
-        lines += ["", f"[instances.{_quoted(name)}]", f"fmu = {toml_text(_beside(session, table.get('fmu')))}"]
+        lines += ["", f"[instances.{_quoted(name)}]", f"fmu = {toml_text(_relative_path(session, table.get('fmu')))}"]
         parameters = _table(table.get("parameters", {}), f"instances.{name}.parameters")
         if parameters:
             given = ", ".join(f"{_quoted(key)} = {_value(value, key)}" for key, value in parameters.items())
@@ -45,12 +45,12 @@ def scenario_text(session: SessionFolder, drawn: Mapping[str, Any]) -> str:
         table = dict(_table(source, "sources"))
         to = table.pop("to", None)
         if "file" in table:
-            table["file"] = _beside(session, table["file"])
+            table["file"] = _relative_path(session, table["file"])
         lines += ["", "[[sources]]", f"to = {_quoted(to)}", *_pairs(table, SOURCE_KEYS, "sources")]
     return "\n".join(lines) + "\n"
 
 
-def _beside(session: SessionFolder, reference: Any) -> str:
+def _relative_path(session: SessionFolder, reference: Any) -> str:
     """Return a file of the session as a scenario among the uploads calls it."""
     if not isinstance(reference, str):
         raise InputError(f"`fmu` must be a file of this session, but is {str(reference)[:60]!r}")
