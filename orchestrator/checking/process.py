@@ -33,6 +33,10 @@ class Process:
         """Resident memory of the child in bytes; 0 where the system does not tell."""
         return self.jail.resident()
 
+    def processor_time(self) -> float:
+        """How long the child has had a processor [s]; 0 where the system does not tell."""
+        return self.jail.processor_time()
+
     def renew(self) -> None:
         """End the child and start another one."""
         self.left |= self.jail.finish()

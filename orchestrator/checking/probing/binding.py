@@ -61,6 +61,9 @@ class FmiProcess(Protocol):
     def resident(self) -> int:
         """Resident memory of the child in bytes; 0 where the system does not tell."""
 
+    def processor_time(self) -> float:
+        """How long the child has had a processor [s]; 0 where the system does not tell."""
+
     def renew(self) -> None:
         """End the child and start another one."""
 
@@ -208,6 +211,10 @@ class Library:
     def resident(self) -> int:
         """Resident memory of the child in bytes, as the system tells; 0 where it does not."""
         return self._host.resident()
+
+    def processor_time(self) -> float:
+        """How long the child has had a processor [s], as the system tells; 0 where it does not."""
+        return self._host.processor_time()
 
     def _texts(self, messages: Any) -> list[str]:
         """Messages with the names of the variables that they refer to."""

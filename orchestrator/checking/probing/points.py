@@ -69,7 +69,7 @@ def points(bench: Bench, driver: Driver) -> Iterator[RestPoint]:
     for number, share in enumerate(_SHARES):
         goal = max(int(share * job.steps), min(number, job.steps - 1))
         try:
-            bench.run(driver, done, goal)
+            bench.run(driver, done, goal, read=False)
         except TerminatedError:
             return
         done = max(done, goal)

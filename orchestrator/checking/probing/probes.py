@@ -13,6 +13,7 @@ from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.statuses import DISCARD, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.trajectory import Bench, Difference, compare
 from orchestrator.checking.probing.variables import ProbedVariable, finite, shown
+from orchestrator.checking.probing.watched import WatchedRun, watch
 from orchestrator.shared.stopwatch import Stopwatch
 
 _LEAK_PER_INSTANCE = 256 * 1024
@@ -32,11 +33,12 @@ class Context:
         report: called with rule, message, path and the time of the first one in words (``when``).
         trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
             cannot be repeated, so that nothing can be compared with it.
-    plain: the same with parameters and start values as in the file, likewise.
+        plain: the same with parameters and start values as in the file, likewise.
         single: whether a second instance is known not to work.
         quiet: what was watched after each step of the life cycle, [step][value].
-    resets: whether a reset has worked so far.
-    remarked: rules of warnings that have been reported.
+        resets: whether a reset has worked so far.
+        remarked: rules of warnings that have been reported.
+        notes: messages of a run after logging was switched off, and the first; None where that was refused.
     """
 
     bench: Bench
@@ -47,6 +49,15 @@ class Context:
     quiet: list[list[Any]] = field(default_factory=list)
     resets: bool = True
     remarked: set[str] = field(default_factory=set)
+    notes: tuple[int, str] | None = None
+    _watched: WatchedRun | None = None
+
+    @property
+    def watched(self) -> WatchedRun:
+        """A driven run that was looked at closely; done when it is first asked for."""
+        if self._watched is None:
+            self._watched = watch(self.bench)
+        return self._watched
 
     @property
     def names(self) -> list[str]:
@@ -249,9 +260,9 @@ def memory(context: Context) -> None:
         )
     with bench.instance(moved=False) as driver:
         quarter = max(job.steps // 4, 1)
-        bench.run(driver, 0, quarter, excited=False)
+        bench.run(driver, 0, quarter, excited=False, read=False)
         before = resident()
-        bench.run(driver, quarter, excited=False)
+        bench.run(driver, quarter, excited=False, read=False)
         growth = resident() - before
     if growth > _LEAK_AT_LEAST and growth / max(job.steps - quarter, 1) > _LEAK_PER_STEP:
         per_step = growth / max(job.steps - quarter, 1) / 1024

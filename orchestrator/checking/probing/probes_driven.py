@@ -1,6 +1,7 @@
 """The driven run: what it changes is found here, and it is what the later probes compare with."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.movement import Movement, distinct, moved, settable
@@ -12,8 +13,12 @@ from orchestrator.errors import ChildError
 from orchestrator.shared.stopwatch import Stopwatch
 
 _MOST_TRIALS = 24
+_TRIAL_STEPS = 5  # most that an FMU does not take is refused when it is set, or soon
 _MOST_CRASHES = 3
 _PATIENCE = 4.0  # budgets of a run for finding what an FMU takes
+_DEAR = 3.0  # times what a run from the values of the file costs: a driven one that costs more has fewer steps
+_CHEAP = 0.05  # s: what costs less is never dear
+_FEWEST_STEPS = 25
 
 
 def inputs(context: Context) -> None:
@@ -30,6 +35,7 @@ def inputs(context: Context) -> None:
     if refused is not None:
         context.report("run.input-refused", refused)
         bench.excited = False
+    began = bench.library.processor_time()
     try:
         with bench.instance() as driver:
             context.plain = bench.run(driver)
@@ -40,8 +46,29 @@ def inputs(context: Context) -> None:
         bench.excited = False  # the life cycle was possible with the start values
         with bench.instance() as driver:
             context.plain = bench.run(driver)
+    seconds = bench.library.processor_time() - began
     context.trace = context.plain
-    _Search(context).find()
+    search = _Search(context)
+    search.find()
+    _shorten(context, seconds, search.seconds)
+
+
+def _shorten(context: Context, plain: float, driven: float) -> None:
+    """Let runs have fewer steps where those away from the values of the file cost the FMU far more time.
+
+    Args:
+        plain, driven: what a run from the values of the file and the driven run took [s].
+    """
+    bench, job = context.bench, context.bench.job
+    allowed = max(_DEAR * plain, _CHEAP)
+    steps = job.steps if driven <= allowed else max(int(job.steps * allowed / driven), _FEWEST_STEPS)
+    if steps >= job.steps:
+        return
+    bench.job = replace(job, steps=steps)
+    with bench.instance(moved=False) as driver:
+        context.plain = bench.run(driver)
+    with bench.instance() as driver:
+        context.trace = bench.run(driver)
 
 
 class _Search:
@@ -51,6 +78,9 @@ class _Search:
         self.context = context
         self.bench = context.bench
         self.trials = self.crashes = 0
+        self.steps = context.bench.job.steps
+        self.seconds = 0.0
+        """What the run with the movement took the FMU."""
         self.budget = Stopwatch(_PATIENCE * context.bench.job.budget)
 
     def find(self) -> None:
@@ -59,34 +89,38 @@ class _Search:
         everything = [v for group in groups for v in group]
         if not everything or self._works(everything):
             return
-        accepted: list[ProbedVariable] = []
-        for group in groups:
-            accepted = self._add(accepted, group)
-        if not self._works(accepted):
-            self.bench.movement = Movement()
-            self.context.trace = self.context.plain
+        for steps in (min(_TRIAL_STEPS, self.bench.job.steps), self.bench.job.steps):
+            self.trials, self.steps = 0, steps
+            accepted: list[ProbedVariable] = []
+            for group in groups:
+                accepted = self._add(accepted, group)
+            if self._works(accepted):
+                return
+        self.bench.movement = Movement()
+        self.context.trace, self.seconds = self.context.plain, 0.0
 
     def _add(self, accepted: list[ProbedVariable], group: Sequence[ProbedVariable]) -> list[ProbedVariable]:
         """What of a group can be moved with the others: all of it, or of its halves."""
         if not group or self.trials >= _MOST_TRIALS or self.crashes >= _MOST_CRASHES or self.budget.over:
             return accepted
-        if self._works([*accepted, *group]):
+        if self._works([*accepted, *group], self.steps):
             return [*accepted, *group]
         if len(group) == 1:
             return accepted
         half = len(group) // 2
         return self._add(self._add(accepted, group[:half]), group[half:])
 
-    def _works(self, variables: Sequence[ProbedVariable]) -> bool:
-        """Whether a whole run can be done while these variables are moved."""
+    def _works(self, variables: Sequence[ProbedVariable], steps: int | None = None) -> bool:
+        """Whether a run can be done while these variables are moved: a whole one, or its first ``steps``."""
         self.trials += 1
         bench = self.bench
         values = {v: x for v in variables if (x := moved(v, v.start or ())) is not None}
         switched = tuple(v for v in values if v.causality == "input" and not (v.real and v in bench.job.inputs()))
         bench.movement = Movement(values, switched if bench.excited else ())
+        began = bench.library.processor_time()
         try:
             with bench.instance() as driver:
-                trace = bench.run(driver)
+                trace = bench.run(driver, 0, steps)
         except (StatusError, DiscardedError, TerminatedError):
             return False
         except ChildError as error:
@@ -98,6 +132,7 @@ class _Search:
             bench.library.renew()
             return False
         self.context.trace = trace
+        self.seconds = bench.library.processor_time() - began
         return True
 
 

@@ -1,7 +1,6 @@
 """Probes of what a life has beside steps: its end, another start time, and silence where logging is off."""
 
 from dataclasses import replace
-from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context
@@ -45,23 +44,9 @@ def _steps(context: Context, driver: Driver) -> None:
 
 def silence(context: Context) -> None:
     """Without logging, at instantiation or switched off later, nothing is logged that is neither warning nor error."""
-    bench, job = context.bench, context.bench.job
-    for how in ("loggingOn = false", "SetDebugLogging(false)"):
-        with bench.instance(initialised=False, logging=how != "loggingOn = false") as driver:
-            if how != "loggingOn = false":
-                kind = "bool" if job.version == "3.0" else "int"
-                arguments: list[Any] = [(kind, 0), ("size", 0), ("in", "text", [])]
-                try:
-                    driver.call("SetDebugLogging", *arguments)
-                except StatusError:
-                    return  # the probe of promises says so
-            bench.library.notes()
-            bench.begin(driver)
-            bench.run(driver, 0, job.steps)
-            driver.terminate()
-            count, first = bench.library.notes()
-        if count:
-            text = f"nothing must be logged with {how}, but {count} messages are, the first: {first}"
+    for how, notes in (("loggingOn = false", context.watched.notes), ("SetDebugLogging(false)", context.notes)):
+        if notes is not None and notes[0]:
+            text = f"nothing must be logged with {how}, but {notes[0]} messages are, the first: {notes[1]}"
             context.report("log.off", text)
             return
 

@@ -44,8 +44,9 @@ def reset(context: Context) -> None:
         raise SkippedError(NOT_COMPARABLE)
     watch = readable(job)
     fresh = _fresh_values(context, watch)
+    half = max(job.steps // 2, 1)
     with bench.instance() as driver:
-        bench.run(driver, 0, max(job.steps // 2, 1))
+        bench.run(driver, 0, half, read=False)
         try:
             for moment in ("in mid-run", "at the end"):
                 driver.reset()
@@ -53,7 +54,8 @@ def reset(context: Context) -> None:
                 wanted = f"an instance that is reset {moment} must be as a fresh one"
                 if _differs(context, "run.reset", wanted, fresh, driver.read(fresh[0])):
                     break
-                difference = context.compare(context.plain, bench.run(driver))
+                last = half if moment == "in mid-run" else job.steps
+                difference = context.compare(context.plain[:last], bench.run(driver, 0, last))
                 if difference is not None:
                     wanted = f"an instance that is reset {moment} must run as a fresh one"
                     context.report_difference("run.reset", wanted, difference)
@@ -138,7 +140,7 @@ def state(context: Context) -> None:
     with bench.instance() as driver:
         try:
             first = _Restoring(context, driver, 0)
-            bench.run(driver, 0, half)
+            bench.run(driver, 0, half, read=False)
             later = _Restoring(context, driver, half)
             try:
                 if later.restore():
@@ -182,13 +184,14 @@ class _Restoring:
         """
         bench = self.context.bench
         for number in range(3):
-            bench.run(self.driver, self.half)
+            last = bench.job.steps if number == 0 else self.half + max((bench.job.steps - self.half) // 4, 1)
+            bench.run(self.driver, self.half, last, read=False)
             if number == 0:
                 self._change()
             self.driver.set_state(self.saved)
             if not self._is_back(self.driver, "state.restore", "a restored state"):
                 return False
-            if not self._continues(self.driver, "state.restore", "a restored state must continue as before"):
+            if not self._continues(self.driver, "state.restore", "a restored state must continue as before", last):
                 return False
             self.driver.set_state(self.saved)
         if not bench.job.serialises:
@@ -253,14 +256,16 @@ class _Restoring:
             driver.set_state(copy)
             driver.driven = True
             if self._is_back(driver, "state.serialise", "a serialised state"):
-                self._continues(driver, "state.serialise", "a serialised state must continue as before")
+                wanted = "a serialised state must continue as before"
+                self._continues(driver, "state.serialise", wanted, self.context.bench.job.steps)
         finally:
             driver.free_state(copy)
 
-    def _continues(self, driver: Driver, rule: str, wanted: str) -> bool:
-        """Whether the rest of the run is as it was; a difference is reported."""
+    def _continues(self, driver: Driver, rule: str, wanted: str, last: int) -> bool:
+        """Whether the run is as it was up to its step ``last``; a difference is reported."""
         context = self.context
-        difference = context.compare((context.trace or [])[self.half :], context.bench.run(driver, self.half))
+        expected = (context.trace or [])[self.half : last]
+        difference = context.compare(expected, context.bench.run(driver, self.half, last))
         if difference is not None:
             context.report_difference(rule, wanted, difference, self._allowed())
         return difference is None

@@ -9,6 +9,7 @@ from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context, SkippedError
 from orchestrator.checking.probing.slopes import is_far
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.probing.watched import slopes
 
 _EQUAL = 1e-9
 _NEAR = 1e-3
@@ -92,23 +93,11 @@ def _nominals(context: Context, driver: ModelExchange, variables: tuple[ProbedVa
 
 def _slopes(context: Context) -> None:
     """In co-simulation the derivative of a state lies near the slopes of the steps around it."""
-    bench, job = context.bench, context.bench.job
-    pairs = [
-        (x, r)
-        for x, r in zip(job.state_variables or (), job.rate_variables, strict=True)
-        if x.size == r.size == 1 and not x.clocks and x.variability == r.variability == "continuous"
-    ][:_MOST]
-    if not pairs or context.trace is None:
+    if context.trace is None:
         return
-    rows = []
-    variables = [v for pair in pairs for v in pair]
-    with bench.instance() as driver:
-        for n in range(job.steps):
-            bench.run(driver, n, n + 1)
-            rows.append(driver.read(variables))
-    for i, (x, r) in enumerate(pairs):
-        path, rates = [row[2 * i] for row in rows], [row[2 * i + 1] for row in rows]
-        slopes = [(b - a) / job.step for a, b in pairwise(path)]
-        if all(map(math.isfinite, (*path, *rates))) and is_far(rates, slopes):
+    for x, r in slopes(context.bench.job):
+        path, rates = context.watched.values_of(x), context.watched.values_of(r)
+        steps = [(b - a) / context.bench.job.step for a, b in pairwise(path)]
+        if all(map(math.isfinite, (*path, *rates))) and is_far(rates, steps):
             text = f"`{r.name}` must be the derivative of `{x.name}`, but is far from its slopes at most points"
             context.report("states.slope", text, r.name)

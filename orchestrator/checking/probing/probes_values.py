@@ -5,8 +5,9 @@ from typing import Any
 
 from orchestrator.checking.probing.movement import Values, distinct, moved
 from orchestrator.checking.probing.probes import Context, SkippedError, look
-from orchestrator.checking.probing.statuses import StatusError, TerminatedError
+from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.variables import ProbedVariable, shown
+from orchestrator.checking.probing.watched import narrow
 
 _FEW_STEPS = 2
 _EQUAL = 1e-9
@@ -37,26 +38,17 @@ def values(context: Context) -> None:
 
 def _judge_types(context: Context) -> None:
     """Look at the values of types that can be wrong, in initialisation mode and during a driven run."""
-    bench, job = context.bench, context.bench.job
-    narrow = [v for v in distinct(job.variables) if v.items or v.base in ("Boolean", "String", "Binary")]
-    narrow = [v for v in narrow if not v.clocks and v.causality != "structuralParameter"][:_MOST]
-    if not narrow or job.interface == "ScheduledExecution":
+    job = context.bench.job
+    if not narrow(job):
         return
+    run = context.watched
+    seen = {v.key for v in run.variables}
+    chosen = [v for v in narrow(job) if v.key in seen]
     complaints: set[str] = set()
-    try:
-        with bench.instance(initialised=False) as driver:
-            driver.driven = True
-            bench.place(driver, inputs=False)
-            driver.enter_initialisation(job.start, job.stop)
-            bench.place(driver, inputs=True)
-            look(context, narrow, driver.read(narrow), "in initialisation mode", complaints)
-            driver.exit_initialisation()
-            for n in range(job.steps):
-                bench.run(driver, n, n + 1)
-                when = f"at t = {job.start + (n + 1) * job.step:g}"
-                look(context, narrow, driver.read(narrow), when, complaints)
-    except (StatusError, TerminatedError):
-        return  # what is no output may be refused here
+    if run.initial:
+        look(context, chosen, run.select(chosen, run.initial), "in initialisation mode", complaints)
+    for n, row in enumerate(run.rows):
+        look(context, chosen, run.select(chosen, row), f"at t = {job.start + (n + 1) * job.step:g}", complaints)
 
 
 def _kept_before(context: Context, movement: Mapping[ProbedVariable, Values]) -> bool:
@@ -94,7 +86,7 @@ def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -
     steps = min(_FEW_STEPS, job.steps - 1)
     t = job.start + steps * job.step
     with bench.instance() as driver:
-        bench.run(driver, 0, steps)
+        bench.run(driver, 0, steps, read=False)
         now = _by_variable(chosen, driver.read(chosen))
         wanted = {v: x for v, value in now.items() if (x := moved(v, value, 1)) is not None}
         driver.set_discrete(wanted, t)

@@ -130,11 +130,14 @@ class Bench:
         """Seconds of simulated time of a test run."""
         return self.job.step * self.job.steps
 
-    def run(self, driver: Driver, first: int = 0, last: int | None = None, excited: bool = True) -> list[list[Any]]:
+    def run(
+        self, driver: Driver, first: int = 0, last: int | None = None, excited: bool = True, read: bool = True
+    ) -> list[list[Any]]:
         """Do the steps ``first`` to ``last`` and return the outputs after each one, [step][value].
 
         Args:
             first: first step, from 0.
+            read: whether the outputs are read; otherwise nothing is returned.
         """
         outputs = self.job.outputs()
         rows = []
@@ -143,7 +146,8 @@ class Bench:
             if excited:
                 self.excite(driver, t)
             driver.advance(t, self.job.step, f"at t = {t:g} (step {n + 1})")
-            rows.append(driver.read(outputs, f"at t = {t + self.job.step:g}"))
+            if read:
+                rows.append(driver.read(outputs, f"at t = {t + self.job.step:g}"))
         return rows
 
 

@@ -47,7 +47,7 @@ from orchestrator.shared.isolation.strays import Strays
 from orchestrator.shared.isolation.surroundings import code_folders, environment, launch, system_folders
 from orchestrator.shared.isolation.walls import Walls, support
 from orchestrator.shared.machine_code import machine_code_folder
-from orchestrator.shared.operating_system import collect, kill_group, processor_wait, resident_memory
+from orchestrator.shared.operating_system import collect, kill_group, processor_time, processor_wait, resident_memory
 
 START_LIMIT = 120.0
 MOST_BYTES = 256 << 20
@@ -159,6 +159,10 @@ class Jail:
     def resident(self) -> int:
         """Return the child's resident memory in bytes; 0 where the system does not tell."""
         return resident_memory(self.pid)[0]
+
+    def processor_time(self) -> float:
+        """Return how long the child has had a processor [s]; 0 where the system does not tell."""
+        return processor_time(self.pid)
 
     def describe_printed(self) -> str:
         """Return the last line that the child has printed, as an addition to a message; empty for none."""
