@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from orchestrator.api.shown import Block, Result
 from orchestrator.checking.batch import check_fmus, find_fmus, policy_of
-from orchestrator.checking.check import CheckOptions
+from orchestrator.checking.check import TOTAL, CheckOptions
 from orchestrator.checking.findings import Finding, FmuFindings
 from orchestrator.checking.formats.code_quality import as_code_quality
 from orchestrator.checking.formats.junit import as_junit
@@ -88,6 +88,7 @@ def check(
     trust: bool = False,
     policy: Policy | Path | str | None = None,
     time_limit: float = Limits().time,
+    total_limit: float = TOTAL,
     memory_limit: float = Limits().memory / MEBIBYTE,
     size_limit: float = ArchiveLimits().total / MEBIBYTE,
     progress: Callable[[Verdict], None] = lambda verdict: None,
@@ -100,6 +101,7 @@ def check(
         trust: run FMUs without the kernel's walls around them; limits remain.
         policy: which rules count, and how much: a file such as ``fmu-check.toml`` (default: all rules, as they are).
         time_limit: wall time that one call may take [s].
+        total_limit: time that all calls of an FMU may take [s]; what that leaves out is named.
         memory_limit: memory that the running FMU may take [MiB].
         size_limit: size that the unpacked FMU may have [MiB].
         progress: called with the verdict on each FMU as it is ready.
@@ -119,7 +121,7 @@ def check(
         static=static,
         trust=trust,
         archive=ArchiveLimits(total=int(size_limit * MEBIBYTE)),
-        limits=Limits(time=time_limit, memory=int(memory_limit * MEBIBYTE)),
+        limits=Limits(time=time_limit, memory=int(memory_limit * MEBIBYTE), total=total_limit),
     )
     given = {
         "fmus": [str(p) for p in paths],
@@ -127,6 +129,7 @@ def check(
         "trust": trust,
         "policy": policy if policy is None or isinstance(policy, Policy) else str(policy),
         "time_limit": time_limit,
+        "total_limit": total_limit,
         "memory_limit": memory_limit,
         "size_limit": size_limit,
     }

@@ -93,8 +93,8 @@ def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[F
         return FolderFiles(path), list(_folder_findings(path, limits))
     try:
         archive = zipfile.ZipFile(path)
-    except Exception as error:  # zipfile raises all sorts on bytes that it did not foresee
-        return None, [Finding("archive.not-a-zip", path.name, f"an FMU must be a ZIP archive, but: {error}")]
+    except Exception:  # zipfile raises all sorts on bytes that it did not foresee
+        return None, [Finding("archive.not-a-zip", path.name, "an FMU must be a whole ZIP archive, but this is none")]
     files: FmuFiles | None = None
     try:
         findings = list(_entry_findings(archive, limits))
@@ -104,8 +104,8 @@ def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[F
             findings += _clash_findings(archive)
         if not _is_unfit(findings):
             files = ZipFiles(path, archive)
-    except Exception as error:
-        findings = [Finding("archive.corrupt", path.name, f"the archive cannot be read: {error!r}")]
+    except Exception:
+        findings = [Finding("archive.corrupt", path.name, "the archive must be readable, but its directory is damaged")]
     if files is not None and "modelDescription.xml" not in files.names():
         findings.append(_no_description(path.name, files.names()))
     if _is_unfit(findings):
@@ -247,7 +247,16 @@ def _content_findings(archive: zipfile.ZipFile) -> Iterator[Finding]:
                 while stream.read(_CHUNK):
                     pass
         except Exception as error:  # zlib.error, BadZipFile, EOFError, struct.error, UnicodeDecodeError …
-            yield Finding("archive.corrupt", entry.filename, f"the entry cannot be unpacked: {error}")
+            yield Finding("archive.corrupt", entry.filename, f"an entry must be unpackable, but {_damage(error)}")
+
+
+def _damage(error: Exception) -> str:
+    """What is wrong with an entry, in words of our own."""
+    if isinstance(error, NotImplementedError):
+        return "this one is compressed in a way that few programs know"
+    if isinstance(error, zipfile.BadZipFile) and "CRC" in str(error):
+        return "the checksum of this one is not that of its bytes"
+    return "this one is damaged"
 
 
 def _folder_findings(path: Path, limits: ArchiveLimits) -> Iterator[Finding]:

@@ -6,9 +6,14 @@ from pathlib import Path
 from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.dynamic import check_dynamic, obstacle
 from orchestrator.checking.findings import Execution, Finding, FmuFindings, has_errors, order_findings
+from orchestrator.checking.places import locate_findings
 from orchestrator.checking.static import StaticResult, check_static
+from orchestrator.checking.xml_reading import MAXIMUM_BYTES
 from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.isolation.walls import support
+
+TOTAL = 120.0
+"""Seconds that all that is executed of an FMU may take: ten times what most take."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +27,7 @@ class CheckOptions:
 
     static: bool = False
     archive: ArchiveLimits = field(default_factory=ArchiveLimits)
-    limits: Limits = field(default_factory=Limits)
+    limits: Limits = field(default_factory=lambda: Limits(total=TOTAL))
     trust: bool = False
 
 
@@ -47,12 +52,16 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
             findings += probed
         elif not options.static and not has_errors(findings):
             findings.append(Finding("run.not-executed", "", f"the FMU must be executed to pass, but is not: {reason}"))
+        shown = order_findings(findings)
+        if result.files is not None and result.description is not None:
+            data = result.files.read("modelDescription.xml", MAXIMUM_BYTES)
+            shown = locate_findings(shown, data, result.description)
     finally:
         if result.files is not None:
             result.files.close()
     facts = result.facts | ({"walls": _walls(options.trust)} if executions else {})
     version = "" if result.description is None else result.description.dialect.version
-    return FmuFindings(str(path), order_findings(findings), version, result.stages, executions, reason, facts)
+    return FmuFindings(str(path), shown, version, result.stages, executions, reason, facts)
 
 
 def _obstacle(result: StaticResult) -> str:

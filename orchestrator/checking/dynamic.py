@@ -3,6 +3,7 @@
 import contextlib
 import os
 import re
+import time
 from pathlib import Path
 
 from orchestrator.checking.archive import FmuFiles
@@ -39,6 +40,7 @@ from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.isolation.scratch import Scratch
+from orchestrator.shared.stopwatch import Stopwatch
 
 _PROBES: dict[str, probes.Probe] = {
     "life cycle": probes.life_cycle,
@@ -106,6 +108,7 @@ def check_dynamic(
     executions: list[Execution] = []
     runs: list[InterfaceRun] = []
     several = len(d.interfaces) > 1
+    clock = Stopwatch(limits.total)
     with Scratch("check") as scratch:
         fmu = scratch.path / "fmu"
         name_folder(fmu, "the FMU")
@@ -121,13 +124,14 @@ def check_dynamic(
                 continue
             library = loadable(d, interface, set(files.names()))
             rest = [] if executions or interface.kind == "ScheduledExecution" else references
-            first = _Watcher(fmu, limits, walls, interface.kind if several else "")
+            first = _Watcher(fmu, limits, clock, walls, interface.kind if several else "")
             found = first.run(make_job(d, interface, fmu, library, rest[0] if rest else None, limits), names)
             for reference in rest[1:]:
                 if any(f.severity == "error" for f in found):
                     break
                 job = make_job(d, interface, fmu, library, reference, limits)
-                found += _Watcher(fmu, limits, walls, interface.kind if several else "").run(job, ("reference",))
+                again = _Watcher(fmu, limits, clock, walls, interface.kind if several else "")
+                found += again.run(job, ("reference",))
             runs += [] if first.run_seen is None else [first.run_seen]
             if len(runs) == _TWO and interface.kind != "ScheduledExecution":
                 first.probe = "interfaces"
@@ -140,12 +144,13 @@ def check_dynamic(
 class _Watcher:
     """Asks one child and collects the findings."""
 
-    def __init__(self, fmu: Path, limits: Limits, walls: bool, interface: str = "") -> None:
-        self.fmu, self.limits, self.walls = fmu, limits, walls
+    def __init__(self, fmu: Path, limits: Limits, clock: Stopwatch, walls: bool, interface: str = "") -> None:
+        self.fmu, self.limits, self.clock, self.walls = fmu, limits, clock, walls
         self.interface = f"{interface}, " if interface else ""
         self.findings: list[Finding] = []
         self._said: set[tuple[str, str]] = set()
         self.probe = "load"
+        self.begun = 0.0
         self.stages: dict[str, str] = {}
         self.run_seen: InterfaceRun | None = None
         """The run of the interface, once there is one."""
@@ -153,12 +158,13 @@ class _Watcher:
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
         before = _snapshot(self.fmu)
+        self.begun = time.monotonic()
         with Process(self._start) as process:
             library = Library(process, job.version, job.variables, self.add)
             try:
                 self._probes(library, job, names)
             except ChildError as error:
-                self._report_end(error, library.current)
+                self._report_end(error, library.current, names)
             left = process.jail.finish() or process.left
             self._report_skipped(names)
             self._report_remains(before, process.jail, left)
@@ -179,6 +185,9 @@ class _Watcher:
         single = "canBeInstantiatedOnlyOncePerProcess" in job.flags
         context = probes.Context(trajectory.Bench(job, library, self.add), self.add, single=single)
         for self.probe in names:
+            if self.clock.over:
+                self._report_late(names)
+                return
             try:
                 probes.carry_out(_PROBES[self.probe], context)
             except (probes.SkippedError, DiscardedError) as reason:
@@ -192,6 +201,14 @@ class _Watcher:
             self.stages[self.probe] = ""
             self.run_seen = InterfaceRun(job, job.outputs(), context.quiet)
 
+    def _report_late(self, names: tuple[str, ...]) -> None:
+        """Say what the total time did not suffice for."""
+        missing = [name for name in names if name not in self.stages]
+        reason = f"the time of {self.limits.total:g} s for the FMU was over"
+        self.stages |= dict.fromkeys(missing, reason)
+        text = f"all probes must be done within {self.limits.total:g} s, but these are left out: {', '.join(missing)}"
+        self.add("limits.total", text)
+
     def add(self, rule: str, message: str, path: str = "", when: str = "") -> None:
         """Take a finding, unless the same was found before; ``when`` is the first time that it was.
 
@@ -204,10 +221,12 @@ class _Watcher:
                 Finding(rule, path or f"({self.interface}{self.probe})", plain_text(f"{message} {when}".rstrip()))
             )
 
-    def _report_end(self, error: ChildError, function: str) -> None:
+    def _report_end(self, error: ChildError, function: str, names: tuple[str, ...]) -> None:
         where = f"during {function}" if function else f"in the probe `{self.probe}`"
         if self.probe == "misuse" and function and error.reason not in ("memory", "disk"):
             self.add("misuse.crash", f"a call that is to be refused must return, but {error} {where}")
+        elif error.reason == "time" and time.monotonic() - self.begun >= self.limits.total:
+            self._report_late(names)
         elif error.reason == "time":
             self.add("limits.time", f"a call must take at most {self.limits.time:g} s, but took longer {where}")
         elif error.reason == "memory":

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from orchestrator.checking.rules import RULES, Severity
@@ -21,11 +21,14 @@ class Finding:
     Attributes:
         path: file inside the FMU, and an XPath after a colon where there is one.
         message: what was expected and what was found, one sentence.
+        line, column: of that element in modelDescription.xml, from 1; 0 where there is none.
     """
 
     rule: str
     path: str
     message: str
+    line: int = 0
+    column: int = 0
 
     def __post_init__(self) -> None:
         if self.rule not in RULES:
@@ -160,13 +163,13 @@ def order_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 def _group(findings: Iterable[Finding]) -> Iterator[Finding]:
     """Findings of one rule with the same message as one, at the first place in a file; those of a probe stay apart."""
-    places: dict[tuple[str, str, str], dict[str, None]] = {}
+    places: dict[tuple[str, str, str], dict[str, Finding]] = {}
     for finding in findings:
         probe = finding.path if finding.path.startswith("(") else ""
-        places.setdefault((finding.rule, finding.message, probe), {})[finding.path] = None
-    for (rule, message, _), paths in places.items():
-        first, *rest = paths
-        yield Finding(rule, first, f"{message} (at {len(paths)} places)" if rest else message)
+        places.setdefault((finding.rule, finding.message, probe), {}).setdefault(finding.path, finding)
+    for paths in places.values():
+        first, *rest = paths.values()
+        yield replace(first, message=f"{first.message} (at {len(paths)} places)") if rest else first
 
 
 def has_errors(findings: Iterable[Finding]) -> bool:

@@ -117,7 +117,11 @@ def _references(
         elif role == "result" and related.get("type") == "text/csv":
             try:
                 results.append(_read_csv(path, files.read(path, _MAXIMUM_CSV), {v.name: v for v in d.variables}, d))
-            except (ValueError, csv.Error) as error:
+            except UnicodeDecodeError:
+                findings.append(Finding("layered.result", path, "a reference result must be UTF-8, but is not"))
+            except csv.Error:
+                findings.append(Finding("layered.result", path, "a reference result must be a CSV table, but is none"))
+            except ValueError as error:
                 findings.append(Finding("layered.result", path, str(error)))
     return results, findings
 
@@ -131,7 +135,7 @@ def _read_csv(path: str, data: bytes, known: Mapping[str, DescribedVariable], d:
     header = [h.strip() for h in rows[0]]
     unknown = [h for h in header[1:] if h not in known]
     if unknown:
-        raise ValueError(f"the columns must be variables of the FMU, but {unknown[0]!r} is none")
+        raise ValueError(f"the columns must be variables of the FMU, but `{unknown[0]}` is none")
     if header[0] != "time" or len(set(header)) < len(header):
         raise ValueError("the first column must be `time` and no name may come twice, but it is not so")
     sizes = {h: d.size(known[h]) or 1 for h in header[1:] if known[h].kind not in ("String", "Binary")}

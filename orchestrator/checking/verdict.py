@@ -16,6 +16,7 @@ from orchestrator.errors import InputError
 
 _QUOTED = re.compile(r"(`[^`]*`)")
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?([eE][-+]?\d+)?")
+_TEXT = re.compile(r'"[^"]*"')
 _MOST_BYTES = 64 << 20
 
 
@@ -96,12 +97,22 @@ def _content(fmu: str, finding: Finding) -> str:
     return "\n".join((artifact(fmu), finding.rule, path, message))
 
 
+def without_particulars(message: str) -> str:
+    """A message without names and numbers: what findings of the same fault at several places share."""
+    return _NUMBER.sub("#", _QUOTED.sub("`...`", _TEXT.sub('"..."', message)))
+
+
 def artifact(fmu: str) -> str:
     """Return the path of an FMU as platforms want it: relative to the working directory where it is below that."""
     path = Path(fmu)
     if path.is_absolute() and path.is_relative_to(Path.cwd()):
         path = path.relative_to(Path.cwd())
     return path.as_posix()
+
+
+def describe_file(fmu: str, line: int) -> str:
+    """Return the file that a platform shows: of an unpacked FMU the description, where a line of it is meant."""
+    return f"{artifact(fmu)}/modelDescription.xml" if line and Path(fmu).is_dir() else artifact(fmu)
 
 
 class _Known(msgspec.Struct, frozen=True):

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from orchestrator.checking.batch import policy_of
-from orchestrator.checking.check import CheckOptions
+from orchestrator.checking.check import TOTAL, CheckOptions
 from orchestrator.checking.findings import SEVERITIES
 from orchestrator.checking.formats.code_quality import as_code_quality
 from orchestrator.checking.formats.github import as_annotations, as_summary
@@ -60,6 +60,7 @@ def add_check_arguments(parser: argparse.ArgumentParser) -> None:
     limits, archive = Limits(), ArchiveLimits()
     for name, default, metavar, what in (
         ("time", limits.time, "S", "wall time that one call may take"),
+        ("total", TOTAL, "S", "time that all calls of an FMU may take; what that leaves out is named"),
         ("memory", limits.memory / MEBIBYTE, "MIB", "memory that the running FMU may take"),
         ("size", archive.total / MEBIBYTE, "MIB", "size that the unpacked FMU may have"),
     ):
@@ -74,7 +75,7 @@ def check_options(args: argparse.Namespace) -> CheckOptions:
         static=args.static,
         trust=args.trust,
         archive=ArchiveLimits(total=int(args.size_limit * MEBIBYTE)),
-        limits=Limits(time=args.time_limit, memory=int(args.memory_limit * MEBIBYTE)),
+        limits=Limits(time=args.time_limit, memory=int(args.memory_limit * MEBIBYTE), total=args.total_limit),
     )
 
 

@@ -33,6 +33,7 @@ def run(args: argparse.Namespace) -> int:
                 trust=args.trust,
                 policy=policy,
                 time_limit=args.time_limit,
+                total_limit=args.total_limit,
                 memory_limit=args.memory_limit,
                 size_limit=args.size_limit,
                 progress=progress,

@@ -53,3 +53,16 @@ def test_each_cause_has_many_faults_of_both_versions() -> None:
     assert min(counts.values()) >= 8
     assert len({p.name for p in PLANTS}) == len(PLANTS)
     assert {p.rule for p in PLANTS} <= set(RULES)
+
+
+def test_what_the_total_time_leaves_out_is_named(tmp_path: Path) -> None:
+    path = build_plant(tmp_path / "plant.fmu", "3.0", "CS", "", {})
+    report = check_fmu(path, CheckOptions(limits=Limits(time=10.0, total=0.02)))
+    (late,) = (f for f in report.findings if f.rule == "limits.total")
+    (execution,) = report.executions
+    left_out = [
+        stage for stage, reason in execution.stages.items() if reason == "the time of 0.02 s for the FMU was over"
+    ]
+    assert "misuse" in left_out
+    assert all(stage in late.message for stage in left_out)
+    assert not report.count("error")

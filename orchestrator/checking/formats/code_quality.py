@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 
 from orchestrator.checking.rules import Severity
-from orchestrator.checking.verdict import Verdict, artifact
+from orchestrator.checking.verdict import Verdict, describe_file
 from orchestrator.plain_text import plain_text
 
 _SEVERITIES: Mapping[Severity, str] = {"error": "major", "warning": "minor", "info": "info"}
@@ -19,7 +19,10 @@ def as_code_quality(verdicts: Sequence[Verdict]) -> str:
             "check_name": issue.finding.rule,
             "fingerprint": issue.fingerprint,
             "severity": _SEVERITIES[issue.severity],
-            "location": {"path": artifact(verdict.fmu), "lines": {"begin": 1}},
+            "location": {
+                "path": describe_file(verdict.fmu, issue.finding.line),
+                "lines": {"begin": issue.finding.line or 1},
+            },
         }
         for verdict in verdicts
         for issue in verdict.issues

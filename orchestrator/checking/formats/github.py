@@ -4,8 +4,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from orchestrator.checking.findings import SEVERITIES
+from orchestrator.checking.formats.text import describe_place
 from orchestrator.checking.rules import Severity
-from orchestrator.checking.verdict import Issue, Verdict, artifact
+from orchestrator.checking.verdict import Issue, Verdict, artifact, describe_file
 from orchestrator.plain_text import plain_text
 
 MOST_ANNOTATIONS = 10
@@ -28,9 +29,10 @@ def as_annotations(verdicts: Sequence[Verdict]) -> list[str]:
         seen[level] += 1
         if seen[level] <= MOST_ANNOTATIONS:
             f = issue.finding
-            file, title = (_property(plain_text(text)) for text in (artifact(verdict.fmu), f.rule))
-            text = _escape(plain_text(f"{f.path}: {f.message} -> {f.advice}"))
-            lines.append(f"::{level} file={file},title={title}::{text}")
+            file, title = (_property(plain_text(text)) for text in (describe_file(verdict.fmu, f.line), f.rule))
+            place = f",line={f.line},col={f.column}" if f.line else ""
+            text = _escape(plain_text(f"{describe_place(f)}: {f.message} -> {f.advice}"))
+            lines.append(f"::{level} file={file}{place},title={title}::{text}")
     return lines
 
 
@@ -48,7 +50,7 @@ def as_summary(verdicts: Sequence[Verdict]) -> str:
         lines += ["", "| FMU | severity | rule | what | advice |", "|---|---|---|---|---|"]
     for verdict, issue in issues[:_MOST_LISTED]:
         f = issue.finding
-        cells = (artifact(verdict.fmu), issue.severity, f.rule, f"{f.path}: {f.message}", f.advice)
+        cells = (artifact(verdict.fmu), issue.severity, f.rule, f"{describe_place(f)}: {f.message}", f.advice)
         lines.append(f"| {' | '.join(map(_cell, cells))} |")
     if len(issues) > _MOST_LISTED:
         lines += ["", f"{len(issues) - _MOST_LISTED} further findings are in the other reports."]

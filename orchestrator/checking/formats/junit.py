@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from lxml import etree
 
 from orchestrator.checking.findings import RuleOutcome
-from orchestrator.checking.formats.text import FORBIDDEN
+from orchestrator.checking.formats.text import FORBIDDEN, describe_place
 from orchestrator.checking.verdict import Issue, Verdict
 
 
@@ -59,7 +59,7 @@ def _case_text(issues: Sequence[Issue]) -> str:
     for issue in issues:
         f = issue.finding
         known = " (known)" if issue.known else ""
-        lines.append(f"{issue.severity}{known}: {f.path}\n{f.message}\n-> {f.advice}")
+        lines.append(f"{issue.severity}{known}: {describe_place(f)}\n{f.message}\n-> {f.advice}")
     return _text("\n".join(lines))
 
 

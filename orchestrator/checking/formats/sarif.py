@@ -11,8 +11,9 @@ from urllib.parse import quote
 import msgspec
 
 from orchestrator.checking.findings import FmuFindings
+from orchestrator.checking.formats.text import describe_place
 from orchestrator.checking.rules import RULES, TEXTS, VERSIONS, Rule, Severity
-from orchestrator.checking.verdict import Issue, Verdict, artifact
+from orchestrator.checking.verdict import Issue, Verdict, artifact, describe_file
 from orchestrator.plain_text import plain_text
 from orchestrator.shared.version import __version__
 
@@ -85,8 +86,8 @@ def _result(verdict: Verdict, issue: Issue, index: Mapping[str, int]) -> dict[st
         "ruleId": f.rule,
         "ruleIndex": index[f.rule],
         "level": _LEVELS[issue.severity],
-        "message": {"text": plain_text(f"{f.message} ({f.path})" if f.path else f.message)},
-        "locations": [_location(verdict.report, f.path)],
+        "message": {"text": plain_text(f"{f.message} ({describe_place(f)})" if f.path else f.message)},
+        "locations": [_location(verdict.report, f.path, f.line, f.column)],
         "partialFingerprints": {FINGERPRINT: issue.fingerprint},
     }
     if issue.known:
@@ -94,9 +95,11 @@ def _result(verdict: Verdict, issue: Issue, index: Mapping[str, int]) -> dict[st
     return result
 
 
-def _location(report: FmuFindings, path: str) -> dict[str, Any]:
-    uri = quote(artifact(report.fmu))
-    place: dict[str, Any] = {"physicalLocation": {"artifactLocation": {"uri": uri}, "region": {"startLine": 1}}}
+def _location(report: FmuFindings, path: str, line: int = 0, column: int = 0) -> dict[str, Any]:
+    """A place: a line of modelDescription.xml, which is a file of its own in an unpacked FMU alone."""
+    uri = quote(describe_file(report.fmu, line))
+    region = {"startLine": line, "startColumn": column} if line else {"startLine": 1}
+    place: dict[str, Any] = {"physicalLocation": {"artifactLocation": {"uri": uri}, "region": region}}
     if path:
         place["logicalLocations"] = [{"fullyQualifiedName": plain_text(path)}]
     return place

@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 
-from orchestrator.checking.findings import SEVERITIES, FmuFindings
-from orchestrator.checking.verdict import Verdict
+from orchestrator.checking.findings import SEVERITIES, Finding, FmuFindings, list_names
+from orchestrator.checking.rules import RULES, TEXTS, Severity
+from orchestrator.checking.verdict import Issue, Verdict, without_particulars
 from orchestrator.plain_text import plain_text
 from orchestrator.shared.results import CheckedFmu, CheckFound, FindingFound, RuleFound
 
 # XML 1.0 cannot hold these, not even escaped; names in a hostile archive can.
 FORBIDDEN = dict.fromkeys((*range(9), 11, 12, *range(14, 32), *range(0xD800, 0xE000), 0xFFFE, 0xFFFF), "?")
+
+_MOST_PLACES = 5
 
 
 def summary(verdict: Verdict) -> str:
@@ -29,13 +32,38 @@ def _extent(report: FmuFindings) -> str:
 
 
 def as_lines(verdict: Verdict) -> list[str]:
-    """The verdict for a terminal: the summary, then three lines for each issue that the baseline does not have."""
-    lines = [summary(verdict)]
+    """The verdict for a terminal: the summary, then a few lines for each issue that the baseline does not have.
+
+    The same fault at many places is one of them.
+    """
+    groups: dict[tuple[Severity, str, str], list[Finding]] = {}
     for issue in verdict.issues:
         if not issue.known:
             f = issue.finding
-            lines += [f"  {issue.severity:7} {f.rule}  {f.path}", f"          {f.message}", f"          -> {f.advice}"]
+            groups.setdefault((issue.severity, f.rule, without_particulars(f.message)), []).append(f)
+    lines = [summary(verdict)]
+    for (severity, rule, _), (first, *rest) in groups.items():
+        lines += [f"  {severity:7} {rule}  {describe_place(first)}", f"          {first.message}"]
+        if rest:
+            places = list_names([describe_place(f) or f.message for f in rest], _MOST_PLACES)
+            lines.append(f"          the same at {places}")
+        lines.append(f"          -> {first.advice} ({describe_source(rule, verdict.report.version)})")
     return [plain_text(line) for line in lines]
+
+
+def describe_place(finding: Finding) -> str:
+    """Where a finding stands: its path, and line and column where they are known."""
+    if not finding.line:
+        return finding.path
+    known = finding.path.startswith("modelDescription.xml")
+    place = f"line {finding.line}, column {finding.column}"
+    return f"{finding.path} ({place})" if known else f"{finding.path} (modelDescription.xml, {place})"
+
+
+def describe_source(rule: str, version: str) -> str:
+    """The section of the standard that a rule comes from, or that it is none of the standard's."""
+    sections = [f"FMI {TEXTS[v]}, section {s}" for v, s in RULES[rule].anchor.items() if s and version in ("", v)]
+    return "; ".join(sections) or "no rule of the standard"
 
 
 def as_results(verdicts: Sequence[Verdict]) -> CheckFound:
@@ -49,12 +77,7 @@ def as_results(verdicts: Sequence[Verdict]) -> CheckFound:
 
 def _fmu_result(verdict: Verdict) -> CheckedFmu:
     report = verdict.report
-    findings = [
-        FindingFound(
-            i.severity, i.finding.rule, i.finding.path, i.finding.message, i.finding.advice, i.fingerprint, i.known
-        )
-        for i in verdict.issues
-    ]
+    findings = [_finding_result(issue) for issue in verdict.issues]
     return CheckedFmu(
         verdict.fmu,
         verdict.ok,
@@ -64,4 +87,11 @@ def _fmu_result(verdict: Verdict) -> CheckedFmu:
         findings,
         report.not_executed,
         [RuleFound(o.rule, o.outcome, o.reason) for o in verdict.outcomes],
+    )
+
+
+def _finding_result(issue: Issue) -> FindingFound:
+    f = issue.finding
+    return FindingFound(
+        issue.severity, f.rule, f.path, f.message, f.advice, issue.fingerprint, issue.known, f.line, f.column
     )

@@ -124,7 +124,8 @@ class Library:
             raise
         except SimulationError as error:
             missing = str(error).startswith("AttributeError")
-            text = "must be exported, but is not" if missing else f"cannot be called: {error}"
+            refused = "must be callable with what the description says, but a value does not fit its type in C"
+            text = "must be exported, but is not" if missing else refused
             rule = "binary.exports" if missing else "run.status"
             raise StatusError(doing, ERROR, f"{doing} {text}", rule) from None
         self.current = ""

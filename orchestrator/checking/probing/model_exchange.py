@@ -53,7 +53,8 @@ class ModelExchange(EventDriver):
         self.memory["indicators"] = self._count("EventIndicators", self.job.indicators, "indicators.count")
         nominals = self._values("GetNominalsOfContinuousStates", "states", "after initialisation")
         if not all(math.isfinite(x) and x > 0.0 for x in nominals):
-            self.report("states.nominal", f"nominal values of states must be positive, but are {nominals[:5]}")
+            shown = ", ".join(f"{x:g}" for x in nominals[:5])
+            self.report("states.nominal", f"nominal values of states must be positive, but are {shown}")
         self.memory["nominals"] = [x if math.isfinite(x) and x > 0.0 else 1.0 for x in nominals]
         self.memory["signs"] = self._signs("after initialisation")
 

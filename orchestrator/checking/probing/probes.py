@@ -225,7 +225,10 @@ def _fault(v: ProbedVariable, value: Any) -> tuple[str, str] | None:
         slack = 1e-9 * max(abs(value), 1.0)
         low = v.minimum is not None and value < v.minimum - slack
         if low or (v.maximum is not None and value > v.maximum + slack):
-            return "value.out-of-range", f"must lie in [{v.minimum}, {v.maximum}], but is {value}"
+            limits = [
+                f"{word} {x:.9g}" for word, x in (("at least", v.minimum), ("at most", v.maximum)) if x is not None
+            ]
+            return "value.out-of-range", f"must be {' and '.join(limits)}, but is {value:.9g}"
     return None
 
 

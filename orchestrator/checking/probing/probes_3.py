@@ -157,7 +157,8 @@ def structure(context: Context) -> None:
                     driver.set([v], [sizes[v.reference]], f"for `{v.name}` in configuration mode")
                 found = driver.read(chosen, "in configuration mode")
                 if found != list(sizes.values()):
-                    message = f"structural parameters must keep what was set, {list(sizes.values())}, but are {found}"
+                    wanted, kept = (", ".join(map(str, values)) for values in (sizes.values(), found))
+                    message = f"structural parameters must keep what was set, {wanted}, but are {kept}"
                     context.report("configuration.value", message)
                     return
                 driver.call("ExitConfigurationMode")

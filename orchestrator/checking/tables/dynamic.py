@@ -6,6 +6,7 @@ See ``rules`` for the columns.
 DYNAMIC = """
 [run]
 limits.time | E | * | * | no call takes longer than the time limit | look for an endless loop; raise the limit for a slow model
+limits.total | I | * | * | all probes are done within the total time | raise the total limit, or make DefaultExperiment shorter
 limits.memory | E | * | * | memory stays below the memory limit | look for a leak; raise the limit for a large model
 limits.output | E | * | * | printed text and files stay small | print only when logging is on
 run.crash | E | * | * | no call ends the process | run the call named under a debugger

@@ -187,7 +187,7 @@ class SweepFound(ResultData, frozen=True, kw_only=True):
 
 
 class FindingFound(msgspec.Struct, frozen=True):
-    """A violated rule: where, what was expected and found, and what to do."""
+    """A violated rule: where, what was expected and found, and what to do; an unknown line is 0."""
 
     severity: Literal["error", "warning", "info"]
     rule: str
@@ -196,6 +196,8 @@ class FindingFound(msgspec.Struct, frozen=True):
     advice: str = ""
     fingerprint: str = ""
     known: bool = False
+    line: int = 0
+    column: int = 0
 
 
 class RuleFound(msgspec.Struct, frozen=True):
