@@ -78,15 +78,15 @@ def resident_memory(pid: int) -> tuple[int, int]:
 
 def processor_wait(pid: int) -> float:
     """Return how long a process has waited for a processor that others had [s]; 0 where the system does not tell."""
-    return _scheduled(pid, 1)
+    return _read_schedule(pid, 1)
 
 
 def processor_time(pid: int) -> float:
     """Return how long the first thread of a process has had a processor [s]; 0 where the system does not tell."""
-    return _scheduled(pid, 0)
+    return _read_schedule(pid, 0)
 
 
-def _scheduled(pid: int, column: int) -> float:
+def _read_schedule(pid: int, column: int) -> float:
     try:
         return int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[column]) * 1e-9
     except (OSError, IndexError, ValueError):

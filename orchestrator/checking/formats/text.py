@@ -77,7 +77,7 @@ def as_results(verdicts: Sequence[Verdict]) -> CheckFound:
 
 def _fmu_result(verdict: Verdict) -> CheckedFmu:
     report = verdict.report
-    findings = [_finding_result(issue) for issue in verdict.issues]
+    findings = [_describe_finding(issue) for issue in verdict.issues]
     return CheckedFmu(
         verdict.fmu,
         verdict.ok,
@@ -90,7 +90,7 @@ def _fmu_result(verdict: Verdict) -> CheckedFmu:
     )
 
 
-def _finding_result(issue: Issue) -> FindingFound:
+def _describe_finding(issue: Issue) -> FindingFound:
     f = issue.finding
     return FindingFound(
         issue.severity, f.rule, f.path, f.message, f.advice, issue.fingerprint, issue.known, f.line, f.column

@@ -53,7 +53,7 @@ class Context:
     _watched: WatchedRun | None = None
 
     @property
-    def watched(self) -> WatchedRun:
+    def observation(self) -> WatchedRun:
         """A driven run that was looked at closely; done when it is first asked for."""
         if self._watched is None:
             self._watched = watch(self.bench)

@@ -138,9 +138,9 @@ def _judge(
         [not o and _agree(b, c) and (b != 0.0 or _follows(context)) for o, b, c in zip(p, r, w, strict=True)]
         for p, r, w in zip(own, changes, wider, strict=True)
     ]
-    changes = _masked(changes, counts)
+    changes = _mask(changes, counts)
     for name, whole in matrices.items():
-        matrix = _masked(whole, counts)
+        matrix = _mask(whole, counts)
         if _is_off(matrix, changes):
             where = _where(matrix, changes, *variables)
             message = f"{name} derivatives must be those of small changes, but {where}"
@@ -149,7 +149,7 @@ def _judge(
     return False
 
 
-def _masked(matrix: Matrix, counts: list[list[bool]]) -> Matrix:
+def _mask(matrix: Matrix, counts: list[list[bool]]) -> Matrix:
     """A matrix with zeros where entries do not count."""
     return [[x if c else 0.0 for x, c in zip(r, s, strict=True)] for r, s in zip(matrix, counts, strict=True)]
 
@@ -161,7 +161,7 @@ def _columns(
     units = [[float(k == at) for k in range(len(knowns))] for at in range(len(knowns))]
     columns = [_sensitivities(point.driver, "Directional", unknowns, knowns, seed) for seed in units]
     matrix = [list(row) for row in zip(*columns, strict=True)]
-    seed = _mixed(len(knowns))
+    seed = _mix_seed(len(knowns))
     found = _sensitivities(point.driver, "Directional", unknowns, knowns, seed)
     wanted = [sum(a * b for a, b in zip(row, seed, strict=True)) for row in matrix]
     _judge_mixed(context, "directional", found, wanted, unknowns)
@@ -172,14 +172,14 @@ def _rows(context: Context, point: RestPoint, unknowns: list[ProbedVariable], kn
     """The matrix by adjoint derivatives."""
     units = [[float(k == at) for k in range(len(unknowns))] for at in range(len(unknowns))]
     matrix = [_sensitivities(point.driver, "Adjoint", unknowns, knowns, seed) for seed in units]
-    seed = _mixed(len(unknowns))
+    seed = _mix_seed(len(unknowns))
     found = _sensitivities(point.driver, "Adjoint", unknowns, knowns, seed)
     wanted = [sum(a * b for a, b in zip(column, seed, strict=True)) for column in zip(*matrix, strict=True)]
     _judge_mixed(context, "adjoint", found, wanted, knowns)
     return matrix
 
 
-def _mixed(count: int) -> list[float]:
+def _mix_seed(count: int) -> list[float]:
     """A seed of several directions at once, each of another size."""
     return [(-1.0) ** k * (1.7 + 0.3 * k) for k in range(count)]
 

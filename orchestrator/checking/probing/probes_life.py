@@ -44,7 +44,7 @@ def _steps(context: Context, driver: Driver) -> None:
 
 def silence(context: Context) -> None:
     """Without logging, at instantiation or switched off later, nothing is logged that is neither warning nor error."""
-    for how, notes in (("loggingOn = false", context.watched.notes), ("SetDebugLogging(false)", context.notes)):
+    for how, notes in (("loggingOn = false", context.observation.notes), ("SetDebugLogging(false)", context.notes)):
         if notes is not None and notes[0]:
             text = f"nothing must be logged with {how}, but {notes[0]} messages are, the first: {notes[1]}"
             context.report("log.off", text)

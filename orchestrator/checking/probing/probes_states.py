@@ -96,7 +96,7 @@ def _slopes(context: Context) -> None:
     if context.trace is None:
         return
     for x, r in slopes(context.bench.job):
-        path, rates = context.watched.values_of(x), context.watched.values_of(r)
+        path, rates = context.observation.values_of(x), context.observation.values_of(r)
         steps = [(b - a) / context.bench.job.step for a, b in pairwise(path)]
         if all(map(math.isfinite, (*path, *rates))) and is_far(rates, steps):
             text = f"`{r.name}` must be the derivative of `{x.name}`, but is far from its slopes at most points"

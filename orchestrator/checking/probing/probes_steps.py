@@ -26,7 +26,7 @@ def own_time(context: Context) -> None:
     if v is None or job.interface != "CoSimulation":
         raise SkippedError("the time inside cannot be read")
     found = job.start
-    for n, found in enumerate(context.watched.values_of(v)):
+    for n, found in enumerate(context.observation.values_of(v)):
         t = job.start + (n + 1) * job.step
         if found > t + _TIME * job.step:
             text = f"`{v.name}` must not be later than the communication point after a step, but is"

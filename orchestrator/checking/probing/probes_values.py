@@ -41,7 +41,7 @@ def _judge_types(context: Context) -> None:
     job = context.bench.job
     if not narrow(job):
         return
-    run = context.watched
+    run = context.observation
     seen = {v.key for v in run.variables}
     chosen = [v for v in narrow(job) if v.key in seen]
     complaints: set[str] = set()

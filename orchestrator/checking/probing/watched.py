@@ -19,7 +19,7 @@ class WatchedRun:
     """What was seen.
 
     Attributes:
-        variables: that were read.
+        variables: outputs, the time, values of narrow types, states with their derivatives; aliases once.
         initial: their values in initialisation mode; empty where they are not read there.
         rows: their values after each step, [step][value].
         notes: how many messages there were that are neither warnings nor errors, and the first of them.
