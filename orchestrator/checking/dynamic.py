@@ -199,7 +199,8 @@ class _Watcher:
                 self.add(_rule_of(error), str(error))
                 return
             self.stages[self.probe] = ""
-            self.run_seen = InterfaceRun(job, job.outputs(), context.quiet)
+            bench = context.bench
+            self.run_seen = InterfaceRun(bench.job, context.quiet, context.trace or [], bench.movement)
 
     def _report_late(self, names: tuple[str, ...]) -> None:
         """Say what the total time did not suffice for."""
