@@ -4,6 +4,7 @@ import time
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,8 +14,9 @@ from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.fmu.corrected_ssp import write_corrected
 from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnose_records
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
+from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor, read_fmu_record
-from orchestrator.diagnosis.fmu.report import FmuDiagnosis, first_test, misfit_on_record, stage_runs
+from orchestrator.diagnosis.fmu.report import Array, FmuDiagnosis, first_test, misfit_on_record, stage_runs
 from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
 from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, misfit_found, steps_found
 from orchestrator.diagnosis.report.summary import summarise_fmu
@@ -98,18 +100,33 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
 
     def write_files(self, folder: Path) -> None:
         """Write measured and simulated outputs, a figure and the corrected system."""
-        from orchestrator.diagnosis.fmu.report import draw_signals
+        super().write_files(folder)
+        if self.verdict != "unknown":
+            workings = self.diagnosis.workings
+            self.delivered[:] = [write_corrected(folder / "corrected.ssp", workings.problem, workings.final)]
 
-        problem, stages, test = stage_runs(self.diagnosis.workings)
+    def write_data(self, folder: Path) -> None:
+        """Write measured and simulated outputs as ``diagnose.csv``."""
+        problem, stages, _ = self._stage_runs
         columns = {"time": problem.data.time} | dict(zip(problem.inputs, problem.data.inputs.T, strict=True))
         for k, name in enumerate(problem.outputs):
             columns[name] = problem.data.outputs[:, k]
             columns |= {f"{name}_{stage}": values[:, k] for stage, values in stages.items()}
         write_columns(folder / "diagnose.csv", columns, "{:.9g}".format)
-        draw_signals(folder / "diagnose_signals.png", problem, stages, test)
-        if self.verdict != "unknown":
-            workings = self.diagnosis.workings
-            self.delivered[:] = [write_corrected(folder / "corrected.ssp", workings.problem, workings.final)]
+
+    def draw(self, path: Path) -> None:
+        """Draw measured and simulated outputs, and what each simulation misses."""
+        from orchestrator.diagnosis.fmu.report import draw_signals
+
+        draw_signals(path, *self._stage_runs)
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw ``diagnose_signals.png``."""
+        self.draw(folder / "diagnose_signals.png")
+
+    @cached_property
+    def _stage_runs(self) -> tuple[FmuProblem, dict[str, Array], int]:
+        return stage_runs(self.diagnosis.workings)
 
     def close(self) -> None:
         """End the child processes now; else they end with the result."""

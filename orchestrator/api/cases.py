@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Self
 
-from orchestrator.api.shown import Result
+from orchestrator.api.plotted import PlottedResult
 from orchestrator.engine import (
     CaseLimits,
     DesignCases,
@@ -100,7 +100,7 @@ class RunOptions:
         return sweep
 
 
-class AnySweepResult(Result):
+class AnySweepResult(PlottedResult):
     """What the sweeps share: a table of finished cases that streams from a journal. Close it, or use ``with``."""
 
     command: ClassVar[str] = "sweep"
@@ -120,6 +120,10 @@ class AnySweepResult(Result):
 
     def __len__(self) -> int:
         return len(self.cases)
+
+    def write_data(self, folder: Path) -> None:
+        """Write the tables."""
+        self.write_tables(folder)
 
     @property
     def failed(self) -> int:

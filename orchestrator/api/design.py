@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from orchestrator.api.arguments import within
 from orchestrator.api.estimable import require_linear
 from orchestrator.api.estimate import UNSEEN
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.shown import Block, table
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.estimation import design as designing
 from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, MachineLimits
@@ -34,7 +35,7 @@ RANGES = {
 
 
 @dataclass(frozen=True, repr=False)
-class DesignResult(Result):
+class DesignResult(PlottedResult):
     """Excitations for one gap, the best first.
 
     Attributes:
@@ -78,7 +79,7 @@ class DesignResult(Result):
         except OSError as error:
             raise OutputError(f"cannot write {path}: {error.strerror}") from None
 
-    def plot(self, path: Path | str) -> None:
+    def draw(self, path: Path) -> None:
         """Draw the torque of the best excitation against time.
 
         Args:
@@ -86,7 +87,7 @@ class DesignResult(Result):
         """
         from orchestrator.estimation.figures import draw_design
 
-        draw_design(Path(path), self.time, self.best)
+        draw_design(path, self.time, self.best)
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the candidates."""
@@ -110,10 +111,13 @@ class DesignResult(Result):
         """Return what ``estimate.json`` says of the design."""
         return EstimateFound(design=self.entries())
 
-    def write_files(self, folder: Path) -> None:
-        """Write ``design.csv`` and ``design.png``."""
+    def write_data(self, folder: Path) -> None:
+        """Write ``design.csv``."""
         self.write_csv(folder / "design.csv")
-        self.plot(folder / "design.png")
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw ``design.png``."""
+        self.draw(folder / "design.png")
 
 
 def check_design(

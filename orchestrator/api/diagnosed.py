@@ -98,7 +98,7 @@ class DiagnosisResult(AnyDiagnosisResult):
             with_law = None if law is None else run_with_law(self.diagnosis, law, fmu)
             return before_and_after(self.diagnosis, fmu), with_law
 
-    def plot(self, path: Path | str) -> None:
+    def draw(self, path: Path) -> None:
         """Draw the test part: measured, of the nominal model and of the corrected one.
 
         Args:
@@ -106,7 +106,7 @@ class DiagnosisResult(AnyDiagnosisResult):
         """
         from orchestrator.diagnosis.report.figures import draw_signals
 
-        draw_signals(Path(path), self.runs, self.diagnosis)
+        draw_signals(path, self.runs, self.diagnosis)
 
     def write_csv(self, path: Path | str) -> None:
         """Write what ``plot`` draws as CSV.
@@ -167,17 +167,24 @@ class DiagnosisResult(AnyDiagnosisResult):
 
     def write_files(self, folder: Path) -> None:
         """Write the corrected FMU, its model file ``corrected.toml``, ``diagnose.csv`` and the figures."""
-        from orchestrator.diagnosis.report.figures import draw_workings
-
         fmu = self.build(folder)
         if "_simulation" not in self.__dict__:  # else it would be built again
             self.__dict__["_simulation"] = self._co_simulated(fmu)
-        draw_workings(folder, self.diagnosis)
+        super().write_files(folder)
+
+    def write_data(self, folder: Path) -> None:
+        """Write ``diagnose.csv`` and ``corrected.toml``."""
         self.write_csv(folder / "diagnose.csv")
         (folder / "corrected.toml").write_text(
             format_corrected_model(self.diagnosis.model, self.diagnosis), encoding="utf-8"
         )
-        self.plot(folder / "diagnose_signals.png")
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw ``diagnose_*.png``."""
+        from orchestrator.diagnosis.report.figures import draw_workings
+
+        draw_workings(folder, self.diagnosis)
+        self.draw(folder / "diagnose_signals.png")
 
 
 def _torque_table(diagnosis: DiagnosisResult) -> Iterator[Block]:

@@ -3,14 +3,15 @@
 from collections.abc import Iterator
 from typing import ClassVar
 
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.result import DiagnosisOutcome, GradedEffect, TestMisfit
 from orchestrator.shared.trust import Trust
 
 STAGES = ("nominal", "parameters", "final", "noise")
 
 
-class AnyDiagnosisResult(Result):
+class AnyDiagnosisResult(PlottedResult):
     """Verdict, effects, misfits, trust and notes of a diagnosis."""
 
     command: ClassVar[str] = "diagnose"

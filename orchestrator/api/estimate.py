@@ -17,7 +17,8 @@ from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.live import live_fitted_model
 from orchestrator.api.methods import HEAD, MethodResult, describe_record, method_entry, method_row
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.report.summary import play_of
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
@@ -45,7 +46,7 @@ UNSEEN = 1.0  # rad, bound from which on a record says nothing
 
 
 @dataclass(frozen=True, repr=False)
-class EstimateResult(Result):
+class EstimateResult(PlottedResult):
     """The half-gap at the load; of several methods, that of the first that applies.
 
     Attributes:
@@ -118,7 +119,7 @@ class EstimateResult(Result):
         found = next((m.trust for m in self.methods if m.trust is not None), None)
         return found or Trust(Level.RED, ("no method can be applied to this record",))
 
-    def plot(self, path: Path | str) -> None:
+    def draw(self, path: Path) -> None:
         """Draw record against fitted model, time in the gap shaded.
 
         Args:
@@ -132,7 +133,7 @@ class EstimateResult(Result):
         fits = [e for e in self.estimates if e.method == "maximum_likelihood"]
         if not fits:
             raise ScenarioError("`method` must be maximum_likelihood for a plot of the fit, but is another", "method")
-        draw_fit(Path(path), self.record, fits[0], self._ratio(fits[0]))
+        draw_fit(path, self.record, fits[0], self._ratio(fits[0]))
 
     def _ratio(self, estimate: Estimate) -> float:
         return float(
@@ -213,23 +214,28 @@ class EstimateResult(Result):
         self.write_diagnosis(folder, place)
         super().write(folder, place, arguments)
 
-    def write_files(self, folder: Path) -> None:
-        """Write the fitted signals as CSV, and the figures."""
+    def write_data(self, folder: Path) -> None:
+        """Write a table of curves for each method that has some."""
+        for estimate in self.estimates:
+            if estimate.method == "ekf":
+                write_tables(folder, self.record, [estimate], self.model.parameters["i"].value)
+            elif estimate.method in ("maximum_likelihood", WITHOUT_TORQUE):
+                write_tables(folder, self.record, [estimate], self._ratio(estimate))
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw the fit, its profile, the online estimate and the flanks, as far as methods have them."""
         from orchestrator.estimation.figures import draw_flanks, draw_online, draw_profile
 
         for estimate in self.estimates:
             if estimate.method == "maximum_likelihood":
-                self.plot(folder / "estimate_fit.png")
-                write_tables(folder, self.record, [estimate], self._ratio(estimate))
+                self.draw(folder / "estimate_fit.png")
                 limit = estimate.diagnostics["profile_limit"]
                 if math.isfinite(estimate.alpha):
                     draw_profile(folder / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
             elif estimate.method == "ekf":
                 draw_online(folder / "estimate_online.png", self.record, estimate)
-                write_tables(folder, self.record, [estimate], self.model.parameters["i"].value)
             elif estimate.method == WITHOUT_TORQUE:
                 draw_flanks(folder / "estimate_flanks.png", estimate)
-                write_tables(folder, self.record, [estimate], self._ratio(estimate))
 
 
 def estimate(

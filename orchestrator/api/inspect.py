@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from orchestrator.api.methods import MethodResult, describe_record, method_entry
+from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.shown import Block, table
 from orchestrator.estimation.inspection.channels import (
     Band,
     Channel,
@@ -48,7 +49,7 @@ SHOWN_EXPERIMENTS = 3
 
 
 @dataclass(frozen=True, repr=False)
-class InspectResult(Result):
+class InspectResult(PlottedResult):
     """What a record holds and would show.
 
     Attributes:
@@ -85,7 +86,7 @@ class InspectResult(Result):
         """Smallest half-gap that the record would show [rad], or infinity."""
         return self.sufficiency.smallest
 
-    def plot(self, path: Path | str) -> None:
+    def draw(self, path: Path) -> None:
         """Draw the channels over time and the excitation by frequency.
 
         Args:
@@ -93,7 +94,7 @@ class InspectResult(Result):
         """
         from orchestrator.estimation.figures import draw_record
 
-        draw_record(Path(path), self.record, [(band.low, band.high, band.share) for band in self.excitation])
+        draw_record(path, self.record, [(band.low, band.high, band.share) for band in self.excitation])
 
     def verdict(self) -> list[str]:
         """Say whether the record suffices, what it lacks, and what would do better.
@@ -175,13 +176,16 @@ class InspectResult(Result):
             two_angles=None if angles is None else method_entry(MethodResult(angles.method, angles, math.inf, 0.0)),
         )
 
-    def write_files(self, folder: Path) -> None:
-        """Write the model file to start from, the record as it was read, and its picture."""
+    def write_data(self, folder: Path) -> None:
+        """Write the model file to start from, and the record as it was read."""
         (folder / STARTER).write_text(self.starter, encoding="utf-8")
         r = self.record
         columns = {"time": r.time, "u": r.u if r.has_torque else None, "theta_m": r.theta_m, "theta_l": r.theta_l}
         write_arrays(folder / "inspect_record.npz", {n: values for n, values in columns.items() if values is not None})
-        self.plot(folder / "inspect_record.png")
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw ``inspect_record.png``."""
+        self.draw(folder / "inspect_record.png")
 
 
 def inspect(

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import choose_experiment, not_negative
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.shown import Block, table
 from orchestrator.building.build import ensure_built
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import Value
@@ -28,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
-class PairResult(Result):
+class PairResult(PlottedResult):
     """A paired run.
 
     Attributes:
@@ -93,7 +94,7 @@ class PairResult(Result):
         """
         write_columns(Path(path), self.signals())
 
-    def plot(self, path: Path | str) -> None:
+    def draw(self, path: Path) -> None:
         """Draw both load angles, their difference and the torques against time.
 
         Args:
@@ -102,7 +103,7 @@ class PairResult(Result):
         from orchestrator.paired.figures import draw_pair
 
         title = f"Paired loops, {self.experiment.backlash_model}, half-gap {self.alpha:g} rad"
-        draw_pair(Path(path), self.machine, self.twin, self.experiment.reference()[0], title)
+        draw_pair(path, self.machine, self.twin, self.experiment.reference()[0], title)
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the run."""
@@ -146,10 +147,13 @@ class PairResult(Result):
             experiment=asdict(self.experiment),
         )
 
-    def write_files(self, folder: Path) -> None:
-        """Write ``simulate.csv`` and ``simulate.png``."""
+    def write_data(self, folder: Path) -> None:
+        """Write ``simulate.csv``."""
         self.write_csv(folder / "simulate.csv")
-        self.plot(folder / "simulate.png")
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw ``simulate.png``."""
+        self.draw(folder / "simulate.png")
 
 
 def run_pair(

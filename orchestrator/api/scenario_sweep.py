@@ -75,10 +75,6 @@ class ScenarioSweepResult(AnySweepResult):
             isolation=self.isolation,
         )
 
-    def write_files(self, folder: Path) -> None:
-        """Write the table."""
-        self.write_tables(folder)
-
 
 def sweep_scenario(
     scenario: Scenario | Path | str,

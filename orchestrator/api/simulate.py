@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.shown import Block, table
 from orchestrator.errors import ScenarioError
 from orchestrator.master import result as master
 from orchestrator.master.signals import Constant
@@ -25,7 +26,7 @@ HEAD = ("signal", "unit", "first", "last", "smallest", "largest")
 
 
 @dataclass(frozen=True, repr=False)
-class SimulationResult(Result):
+class SimulationResult(PlottedResult):
     """Recorded signals of one run; ``result["plant.theta_l"]`` is one of them, shape (n,).
 
     Attributes:
@@ -83,7 +84,7 @@ class SimulationResult(Result):
         """
         write_columns(Path(path), {"time": self.time} | {name: self[name] for name in self.names})
 
-    def plot(self, path: Path | str) -> None:
+    def draw(self, path: Path) -> None:
         """Draw the signals against time, those of one unit in one panel.
 
         Args:
@@ -92,7 +93,7 @@ class SimulationResult(Result):
         from orchestrator.paired.figures import draw_signals
 
         units = {name: self.units.get(name) or "" for name in self.names}
-        draw_signals(Path(path), self.time, {name: self[name] for name in self.names}, units)
+        draw_signals(path, self.time, {name: self[name] for name in self.names}, units)
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the signals, and what is to be known of the run."""
@@ -123,11 +124,14 @@ class SimulationResult(Result):
         events = EventsFound(list(took.times), took.instants, took.ticks, list(took.late)) if took.instants else None
         return SignalsFound(signals=signals, steps=self.steps, events=events, remarks=remarks, isolation=self.isolation)
 
-    def write_files(self, folder: Path) -> None:
-        """Write the signals as CSV; of ``simulate`` also the figure."""
+    def write_data(self, folder: Path) -> None:
+        """Write the signals as CSV."""
         self.write_csv(folder / f"{self.command}.csv")
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw the figure of ``simulate``."""
         if self.command == "simulate":
-            self.plot(folder / "simulate.png")
+            self.draw(folder / "simulate.png")
 
 
 def simulate(

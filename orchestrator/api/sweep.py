@@ -76,7 +76,7 @@ class SweepResult(AnySweepResult):
         level = min(c.level for c in self.calibrations.values())
         return trust_of_sweep(self.statistics.values(), level, self.failed)
 
-    def plot(self, path: Path | str) -> None:
+    def draw(self, path: Path) -> None:
         """Draw estimated against actual half-gaps, with their intervals.
 
         Args:
@@ -86,7 +86,7 @@ class SweepResult(AnySweepResult):
 
         a = self.arrays
         title = f"Estimated half-gap with 95 % intervals ({self.plan.experiment.name} experiment)"
-        draw_estimates(Path(path), a.actual, a.estimate, a.lower, a.upper, a.noise, title)
+        draw_estimates(path, a.actual, a.estimate, a.lower, a.upper, a.noise, title)
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the first cases and that of the errors."""
@@ -151,16 +151,15 @@ class SweepResult(AnySweepResult):
             fmu_kind=self.fmu_kind,
         )
 
-    def write_files(self, folder: Path) -> None:
+    def draw_files(self, folder: Path) -> None:
         """Write the table and the figures."""
-        self.write_tables(folder)
         a, plan = self.arrays, self.plan
         if not len(a.actual):
             return
         name = plan.experiment.name
         from orchestrator.paired.figures import draw_errors, draw_pair
 
-        self.plot(folder / "estimates.png")
+        self.draw(folder / "estimates.png")
         draw_errors(folder / "errors.png", a.actual, a.estimate, a.noise, f"Error against size ({name} experiment)")
         middle = float(np.sort(a.actual)[len(a.actual) // 2])
         pair = run_pair(with_settings(plan.experiment, noise=plan.noise[-1]), self.fmus, middle, plan.seed)

@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.shown import Block, table
 from orchestrator.paired.calibration import estimate_gap, load_or_calibrate
 from orchestrator.paired.compiled_loop import make_loop
 from orchestrator.paired.experiment import thesis_experiment
@@ -24,7 +25,7 @@ TABLE_HEAD = (
 
 
 @dataclass(frozen=True, repr=False)
-class ThesisResult(Result):
+class ThesisResult(PlottedResult):
     """The thesis's numbers and ours.
 
     Attributes:

@@ -37,14 +37,17 @@ _KINDS = {
 }
 
 
-def render(report: Report) -> str:
-    """Return the page. It depends on the report and the files named in ``downloads`` only, never on the date."""
+def render(report: Report, rows: int | None = None) -> str:
+    """Return the page, with at most ``rows`` rows of a curve (default: as many as a page has room for).
+
+    It depends on the report and the files named in ``downloads`` only, never on the date.
+    """
     return (
         _environment()
         .get_template("page.html")
         .render(
             report=report,
-            rows=rows_of_a_curve([section for section in report.all_sections() if isinstance(section, Plot)]),
+            rows=rows or rows_of_a_curve([part for part in report.all_sections() if isinstance(part, Plot)]),
             folds=any(isinstance(section, Fold) for section in report.sections),
             downloads=[_download(path) for path in report.downloads],
             style=Markup(plot_style()),

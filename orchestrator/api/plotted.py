@@ -1,0 +1,126 @@
+"""Results with plots: those of their page, which a notebook shows too."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from orchestrator.api.shown import Result
+from orchestrator.errors import ScenarioError
+from orchestrator.shared.output import write_result
+
+if TYPE_CHECKING:
+    from orchestrator.reporting import Plot, Report
+
+ROWS = 50_000
+"""Rows of a curve that a notebook keeps: half a megabyte of its file. The page of ``save`` has all."""
+PLOT_HEIGHT, HEAD_HEIGHT, MOST_HEIGHT = 500, 130, 1150
+"""Pixels of a plot, of the head, and of the frame at most, which scrolls."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """The plots of a result: a notebook shows them, to be zoomed and read as on its page.
+
+    Attributes:
+        report: a page of the plots alone.
+    """
+
+    report: Report
+
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """What the plots show, in their order."""
+        return tuple(section.title for section in self.report.sections)
+
+    def __repr__(self) -> str:
+        return f"Figures: {', '.join(self.titles)}"
+
+    def _repr_html_(self) -> str:
+        from orchestrator.reporting import render
+
+        if not self.titles:
+            return ""
+        height = min(HEAD_HEIGHT + PLOT_HEIGHT * len(self.titles), MOST_HEIGHT)
+        page = escape(render(self.report, ROWS))
+        return (
+            f'<iframe title="{escape(self.report.title)}" srcdoc="{page}" width="100%" height="{height}" '
+            'style="border:0" sandbox="allow-scripts"></iframe>'
+        )
+
+
+class PlottedResult(Result):
+    """Base of results whose page has plots.
+
+    A subclass gives ``write_data``, and ``draw`` and ``draw_files`` where it has pictures.
+    """
+
+    def write_data(self, folder: Path) -> None:
+        """Write the data that the page shows.
+
+        Args:
+            folder: where to; it exists.
+        """
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw the pictures that lie beside the page.
+
+        Args:
+            folder: where to; it exists.
+        """
+
+    def draw(self, path: Path) -> None:
+        """Draw the main picture.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+
+        Raises:
+            ScenarioError: there is none.
+        """
+        raise ScenarioError(f"`path` must be absent, but is {path}: this result has plots and no picture", "path")
+
+    def write_files(self, folder: Path) -> None:
+        """Write data and pictures.
+
+        Args:
+            folder: where to; it exists.
+        """
+        self.write_data(folder)
+        self.draw_files(folder)
+
+    def plot(self, path: Path | str | None = None) -> Figures:
+        """Return the plots, and draw the main picture where a path is given.
+
+        Args:
+            path: a PNG, SVG or PDF file; None: no file.
+
+        Returns:
+            The plots of the page, which a notebook shows.
+
+        Raises:
+            ScenarioError: a path is given, and the result has no picture.
+        """
+        if path is not None:
+            self.draw(Path(path))
+        return self.figures
+
+    @cached_property
+    def figures(self) -> Figures:
+        """The plots of the page."""
+        from orchestrator.reporting import Plot, Report, report_from_directory
+
+        with tempfile.TemporaryDirectory(prefix="figures-") as name:
+            folder = Path(name)
+            self.write_data(folder)
+            write_result(folder, self.command, self.arguments, self.seed, self.results(folder))
+            page = report_from_directory(folder, self.command)
+        plots: tuple[Plot, ...] = tuple(section for section in page.all_sections() if isinstance(section, Plot))
+        return Figures(Report(page.title, page.summary, plots, page.badge, angle_unit=page.angle_unit))
+
+    def _repr_html_(self) -> str:
+        return f"{super()._repr_html_()}\n{self.figures._repr_html_()}"
