@@ -67,10 +67,11 @@ _READING: dict[str, Reader] = {
 FORMS: dict[str, CommandForm] = {
     "inspect": CommandForm((1, 1), {"model": _file, **_READING}),
     "estimate": CommandForm(
-        (1, MOST_INPUTS),
+        (0, MOST_INPUTS),
         {
             "model": _file, "motor_only": _flag, "time_limit": _number, "no_diagnose": _flag,
-            "method": _one_of(*METHODS, "all"), **_READING,
+            "method": _one_of(*METHODS, "all"), "design": _flag, "size": _number, "torque_limit": _number,
+            "speed_limit": _number, "duration": _number, **_READING,
         },
     ),
     "diagnose": CommandForm(

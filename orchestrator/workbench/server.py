@@ -21,6 +21,7 @@ from starlette.routing import Route
 
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.reporting import render
+from orchestrator.reporting.plots import SCRIPTS
 from orchestrator.shared.output import write_whole
 from orchestrator.shared.version import __version__
 from orchestrator.workbench.command_lines import command_line
@@ -31,6 +32,7 @@ from orchestrator.workbench.model_fields import model_fields, model_text
 from orchestrator.workbench.scenario_text import scenario_text
 from orchestrator.workbench.session import SessionFolder
 from orchestrator.workbench.settings import WorkbenchSettings
+from orchestrator.workbench.simulation import SliderModels
 from orchestrator.workbench.uploads import UploadTooLargeError, save_upload
 
 # What a browser shows; all else is handed out as a download.
@@ -49,6 +51,7 @@ class Workbench:
     session: SessionFolder
     settings: WorkbenchSettings
     jobs: Jobs
+    models: SliderModels
 
     async def state(self, request: Request) -> Response:
         """Return files and jobs of the session."""
@@ -152,6 +155,19 @@ class Workbench:
         write_whole(path, text)
         return JSONResponse({"file": self.session.reference_of(path), "name": path.name, "text": text}, 201)
 
+    async def sliders(self, request: Request) -> Response:
+        """Return the sliders of a result's model, and what was measured."""
+        folder = self._result(request.query_params.get("job", ""))
+        return JSONResponse(await run_in_threadpool(lambda: self.models.model(folder).describe()))
+
+    async def simulate(self, request: Request) -> Response:
+        """Run a result's model with the values of the sliders."""
+        asked = await self._asked(request)
+        folder, values = self._result(str(asked.get("job"))), asked.get("values", {})
+        if not isinstance(values, Mapping):
+            raise InputError("`values` must be numbers by name, but is none")
+        return JSONResponse(await run_in_threadpool(lambda: self.models.model(folder).run(values)))
+
     async def compare(self, request: Request) -> Response:
         """Return the page on two results of one command."""
         folders = [self._result(request.query_params.get(name, "")) for name in ("first", "second")]
@@ -226,21 +242,23 @@ async def _page(request: Request) -> Response:
 
 
 def _assets() -> Mapping[str, tuple[str, str]]:
-    """Return package and folder of each file that belongs to the page; styles are the reports' own."""
+    """Return package and folder of each file that belongs to the page; styles and plots are the reports' own."""
     own = {entry.name for entry in files("orchestrator.workbench").joinpath("static").iterdir()}
-    shared = dict.fromkeys(("page.css",), ("orchestrator.reporting", "templates"))
+    shared = dict.fromkeys(("page.css", *SCRIPTS), ("orchestrator.reporting", "templates"))
     return {name: ("orchestrator.workbench", "static") for name in own if Path(name).suffix in _KINDS} | shared
 
 
 def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlette:
     """Return the application behind the guard; jobs end with it."""
     jobs = Jobs(session, settings)
-    workbench = Workbench(session, settings, jobs)
+    models = SliderModels(settings.slider_models)
+    workbench = Workbench(session, settings, jobs, models)
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
         yield
         await jobs.close()
+        models.close()
 
     routes = [
         Route("/", _page),
@@ -255,6 +273,8 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
         Route("/jobs/{name}/stop", _answer_in_words(workbench.stop), methods=["POST"]),
         Route("/variables", _answer_in_words(workbench.variables)),
         Route("/scenarios", _answer_in_words(workbench.write_scenario), methods=["POST"]),
+        Route("/sliders", _answer_in_words(workbench.sliders)),
+        Route("/simulate", _answer_in_words(workbench.simulate), methods=["POST"]),
         Route("/compare", _answer_in_words(workbench.compare)),
         Route("/file/{reference:path}", _answer_in_words(workbench.file)),
     ]

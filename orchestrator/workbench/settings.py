@@ -15,6 +15,7 @@ class WorkbenchSettings:
         largest_request: bytes of what a page asks: model files and tables, no data.
         jobs_at_once: further ones wait: each of them keeps a core busy.
         answer_seconds: that a look at a file or a model may take.
+        slider_models: models that stay ready under sliders: each holds an instance of an FMU.
         stop_seconds: that jobs have to clean up when the server ends.
         longest_message: characters of a line that a job writes to standard error.
         messages: lines of one job that are kept.
@@ -25,6 +26,7 @@ class WorkbenchSettings:
     largest_request: int = MEBIBYTE
     jobs_at_once: int = 4
     answer_seconds: float = 120.0
+    slider_models: int = 3
     stop_seconds: float = 10.0
     longest_message: int = 2000
     messages: int = 60

@@ -194,6 +194,7 @@ def test_uploads_are_never_shown_as_pages(served: Served) -> None:
         ({"command": "workbench", "inputs": []}, "command"),
         ({"command": ["check"], "inputs": []}, "command"),
         ({"command": "inspect", "inputs": []}, "inputs"),
+        ({"command": "estimate", "inputs": [], "options": {"design": "yes"}}, "design"),
         ({"command": "inspect", "inputs": "files/log.csv"}, "inputs"),
         ({"command": "inspect", "inputs": ["/etc/passwd"]}, "file"),
         ({"command": "inspect", "inputs": ["--out=/tmp"]}, "file"),

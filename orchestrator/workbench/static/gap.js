@@ -34,6 +34,11 @@ export function build(panel) {
     const place = make("div", {});
     resultOf(job).then((found) => {
       if (!found) return;
+      if (found.design) {
+        const best = found.design[0];
+        place.append(make("p", { class: "answer" }, best ? `Best: ${best.name}, bound ${digits(best.bound)} rad, up to ${digits(best.peak_torque)} N.m` : "no excitation within these limits shows it"));
+      }
+      if (!found.record && found.design) return;
       const alpha = found.alpha ?? null;
       const lines = alpha === null
         ? [found.not_applicable ?? found.message ?? "no half-gap"]
@@ -56,9 +61,17 @@ export function build(panel) {
     }
   }
 
+  // An experiment that would show the gap better, by the command's own design.
+  const limits = [["size", "Half-gap to be seen [rad]", "the estimate"], ["torque_limit", "Largest torque [N.m]", "250"], ["speed_limit", "Largest motor speed [rad/s]", "50"], ["duration", "Length [s]", "10"]]
+    .map(([key, text, usual]) => ({ key, text, input: make("input", { class: "number", inputmode: "decimal", placeholder: usual }) }));
+  const wanted = () => Object.fromEntries(limits.filter(({ input }) => input.value.trim() !== "").map(({ key, input }) => [key, Number(input.value.replace(",", "."))]));
+  const proposal = make("details", {}, make("summary", {}, "What to log next: propose an experiment"),
+    make("div", { class: "row" }, limits.map(({ text, input }) => field(text, input)),
+      action("Propose an experiment", said, async () => view.show(await start("estimate", [], { model: choices.model, design: true, ...wanted() })))));
+
   panel.append(inputs(), make("div", { class: "row" }, motorOnly), read.element, said.element,
     make("div", { class: "row" },
       action("What will it cost?", said, price),
       action("Estimate the gap", said, async () => { needLog(); view.show(await start("estimate", [choices.log], options())); }, "main")),
-    cost, view.element);
+    cost, proposal, view.element);
 }

@@ -1,0 +1,171 @@
+"""The model of a result under sliders: its native FMU runs beside the measured angles, anew for every move.
+
+The FMU is ours, built here (native where there is a C compiler), and it stays instantiated: a move costs a reset and a
+run.
+"""
+
+import csv
+import json
+import math
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.building.fastest import ensure_fastest
+from orchestrator.errors import InputError
+from orchestrator.fmi.instances import fmu_instance
+from orchestrator.master.algorithms import GaussSeidel
+from orchestrator.master.session import Session
+from orchestrator.master.signals import Samples
+from orchestrator.master.system import SignalSource, System
+from orchestrator.plants.description import Plant
+from orchestrator.plants.known import plants
+from orchestrator.shared.results import LiveFound
+
+SPAN = 2.0  # s: what a slider moves at once
+LEAST_ROWS = 20
+MOST_BYTES = 50_000_000  # of a result file
+NAME = "plant"
+
+
+class SliderModel:
+    """A fitted or corrected model that runs under sliders; close it after use.
+
+    Args:
+        folder: results of ``diagnose`` or ``estimate``, which say the model and where its runs begin.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        command = folder.name.rpartition("-")[0]
+        live = _live(folder / f"{command}.json")
+        self._plant: Plant = plants()[live.fmu]
+        self._given = {name: float(value) for name, value in live.values.items()}
+        columns = _columns(folder / f"{command}.csv", live.rows[0], max(round(SPAN / live.step), LEAST_ROWS) + 1)
+        self._time = columns["time"] - columns["time"][0]
+        self._requests = columns["u"]
+        self._measured = {name: columns[name] for name in self._plant.encoders if name in columns}
+        builds = ensure_fastest([live.fmu])
+        self._kind = builds.kind
+        instance = fmu_instance(NAME, builds.paths[live.fmu], {**self._given, **live.starts[0]})
+        step, self._lock = live.step, threading.Lock()
+        asked = Samples(self._requests, step)
+        system = System((instance,), (), (SignalSource(f"{NAME}.u", asked),))
+        self._start = {**{name: self._given.get(name, self._default(name)) for name in self._names()}, **live.starts[0]}
+        self._session = Session(
+            system, tuple(f"{NAME}.{name}" for name in self._measured), GaussSeidel(step), (self._time.size - 1) * step
+        )
+        self._session.__enter__()
+
+    def close(self) -> None:
+        """Free the FMU."""
+        with self._lock:
+            self._session.__exit__(None, None, None)
+
+    def describe(self) -> dict[str, Any]:
+        """Return the sliders, and what was measured."""
+        table = {entry.name: entry for entry in self._plant.table}
+        sliders = []
+        for name in self._names():
+            entry, value = table[name], self._given.get(name, self._default(name))
+            high = min(3.0 * abs(value), entry.maximum) if value else 0.05
+            sliders.append({
+                "name": name, "unit": entry.unit, "meaning": entry.description, "value": value,
+                "low": max(entry.minimum, value / 20.0 if name in self._plant.linear else 0.0), "high": high,
+            })  # fmt: skip
+        measured = {name: _as_list(values) for name, values in self._measured.items()}
+        return {"kind": self._kind, "sliders": sliders, "time": _as_list(self._time), "measured": measured}
+
+    def run(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Simulate with these values.
+
+        Args:
+            values: of sliders; the others stay as in the result.
+
+        Returns:
+            ``curves`` by encoder [rad] and the ``seconds`` that the run took.
+
+        Raises:
+            InputError: a value is none, or is out of its range.
+        """
+        given = dict(self._start)
+        table = {entry.name: entry for entry in self._plant.table}
+        for name, value in values.items():
+            if name not in self._names() or isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise InputError(f"`values` must be numbers of the sliders, but `{str(name)[:60]}` is none")
+            entry = table[name]
+            if not (math.isfinite(value) and entry.minimum <= value <= entry.maximum):
+                raise InputError(f"`{name}` must be in [{entry.minimum:g}, {entry.maximum:g}], but is {value:g}")
+            given[name] = float(value)
+        begun = time.perf_counter()
+        with self._lock:
+            result = self._session.run({f"{NAME}.{name}": value for name, value in given.items()})
+            curves = {name: _as_list(result[f"{NAME}.{name}"]) for name in self._measured}
+        return {"curves": curves, "seconds": time.perf_counter() - begun}
+
+    def _names(self) -> list[str]:
+        """Return the parameters with a slider: those of the linear plant, and what the model has besides."""
+        shown = {*self._plant.linear, *self._given} - {*self._plant.enumerations}
+        return [entry.name for entry in self._plant.table if entry.name in shown]
+
+    def _default(self, name: str) -> float:
+        return next(entry.default for entry in self._plant.table if entry.name == name)
+
+
+class SliderModels:
+    """The models under sliders, the latest few of them; for threads."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._lock = most, threading.Lock()
+        self._models: dict[str, SliderModel] = {}
+
+    def model(self, folder: Path) -> SliderModel:
+        """Return the model of a result, opened when it is first asked for."""
+        with self._lock:
+            model = self._models.pop(folder.name, None) or SliderModel(folder)
+            self._models[folder.name] = model
+            while len(self._models) > self._most:
+                self._models.pop(next(iter(self._models))).close()
+            return model
+
+    def close(self) -> None:
+        """Free all of them."""
+        with self._lock:
+            while self._models:
+                self._models.popitem()[1].close()
+
+
+def _live(path: Path) -> LiveFound:
+    """Return what a result says of its model."""
+    if not path.is_file() or path.stat().st_size > MOST_BYTES:
+        raise InputError(f"the result must be that of a diagnosis or an estimate, but {path.parent.name} has none")
+    try:
+        live = msgspec.convert(json.loads(path.read_text(encoding="utf-8"))["results"]["live"], LiveFound)
+    except (ValueError, KeyError, TypeError, msgspec.ValidationError):
+        raise InputError(f"{path.parent.name} has no model to simulate: no plant of ours was fitted") from None
+    if live.fmu not in plants() or not live.rows or len(live.starts) != len(live.rows) or not live.step > 0.0:
+        raise InputError(f"{path.parent.name} has no model to simulate: its runs have no starts")
+    return live
+
+
+def _columns(path: Path, first: int, count: int) -> dict[str, NDArray[np.float64]]:
+    """Return some rows of a result's table, by heading."""
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            names, *rows = list(csv.reader(stream))
+        part = np.array(rows[first : first + count], dtype=float)
+    except (OSError, ValueError):
+        raise InputError(f"{path.parent.name} must have its table {path.name}, but it cannot be read") from None
+    columns = dict(zip(names, part.T, strict=True)) if part.ndim == 2 else {}
+    if not {"time", "u"} <= columns.keys() or part.shape[0] < LEAST_ROWS or not np.isfinite(columns["u"]).all():
+        raise InputError(f"{path.parent.name} must have times and torques in {path.name}, but has not")
+    return columns
+
+
+def _as_list(values: NDArray[np.float64]) -> list[float | None]:
+    return [float(f"{value:.9g}") if math.isfinite(value) else None for value in values.tolist()]

@@ -1,0 +1,72 @@
+/* global Plot, Units */
+import { get, post } from "./api.js";
+import { choice, digits, field, fill, make } from "./dom.js";
+
+const TITLES = { theta_m: "Motor angle", theta_l: "Load angle", theta_x: "Angle" };
+const STEPS = 400;
+
+// The model of a result under sliders: every move runs its native FMU, beside what was measured.
+export async function sliders(job) {
+  const model = await get(`sliders?job=${encodeURIComponent(job)}`);
+  const values = {}, said = make("p", { class: "note", role: "status" });
+  const plots = Object.entries(model.measured).map(([name, y]) => {
+    const figure = make("figure", { class: "plot", "aria-label": TITLES[name] ?? name });
+    const title = TITLES[name] ?? name;
+    return { name, figure, title, measured: { name: "measured", x: model.time, y } };
+  });
+  let busy = false, again = false, begun = 0;
+
+  function draw(curves) {
+    for (const one of plots) {
+      const series = [one.measured, { name: "simulated", x: model.time, y: curves[one.name] }];
+      if (one.plot) one.plot.show(series);
+      else one.plot = new Plot(one.figure, { title: one.title, xLabel: "time [s]", yLabel: "angle [rad]", series, link: "sliders" });
+    }
+  }
+
+  // The latest values win: while a run is under way, later moves wait as one.
+  async function run() {
+    if (busy) { again = true; return; }
+    busy = true;
+    begun ||= performance.now();
+    try {
+      const found = await post("simulate", { job, values });
+      draw(found.curves);
+      said.textContent = `${model.kind} FMU, ${(1000 * found.seconds).toFixed(0)} ms a run`;
+      performance.measure("slider to curve", { start: begun, end: performance.now() });
+    } catch (error) { said.textContent = error.message; }
+    busy = false;
+    begun = 0;
+    if (again) { again = false; begun = performance.now(); run(); }
+  }
+
+  const controls = model.sliders.map((slider) => {
+    const shown = make("output", {});
+    const input = make("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${slider.name}: ${slider.meaning}` });
+    const show = (value) => {
+      shown.textContent = `${digits(value)} ${slider.unit === "1" ? "" : slider.unit}`;
+      input.setAttribute("aria-valuetext", shown.textContent);
+    };
+    const home = () => {
+      input.value = String(Math.round((STEPS * (slider.value - slider.low)) / (slider.high - slider.low)));
+      delete values[slider.name];
+      show(slider.value);
+    };
+    input.addEventListener("input", () => {
+      values[slider.name] = slider.low + ((slider.high - slider.low) * Number(input.value)) / STEPS;
+      show(values[slider.name]);
+      run();
+    });
+    home();
+    return { home, element: make("div", { class: "field" }, make("span", {}, slider.name.startsWith("effects.") ? slider.name.slice(8).replaceAll("_", " ") : slider.name), input, shown) };
+  });
+  const units = choice(["rad", "deg", "arcmin", "turns"].map((unit) => [unit, unit]), Units.chosen, (unit) => Units.choose(unit));
+  const place = make("div", {});
+  fill(place,
+    make("div", { class: "row" }, field("Angles in", units),
+      make("button", { type: "button", onclick: () => { controls.forEach(({ home }) => home()); run(); } }, "Back to the result"), said),
+    make("div", { class: "cards sliders" }, controls.map(({ element }) => element)),
+    plots.map(({ title, figure }) => [make("h3", {}, title), figure]).flat());
+  await run();
+  return place;
+}
