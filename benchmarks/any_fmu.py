@@ -24,7 +24,7 @@ from benchmarks.diagnosis import print_figures
 from benchmarks.judging import Row, Truth, judge, parameter_line
 from benchmarks.rows import run_tasks
 from benchmarks.verdicts import diagnose_with_fmu
-from orchestrator.diagnosis.fmu.bank import BANK
+from orchestrator.effects.of_fmus import BANK
 from tests.support.box_fmu import DOMAINS, write_fmu, write_map, write_scenario
 from tests.support.box_records import coupled_record, record, write_record
 
@@ -54,7 +54,7 @@ class Hidden:
             return Truth()
         expected = tuple((name, SAME.get(name, name)) for name in self.names)
         sizes = {
-            name: {BANK[name].parameters[0]: (size, 0.0)}
+            name: {next(iter(BANK[name].parameters)): (size, 0.0)}
             for name, size in zip(self.names, self.sizes, strict=True)
             if name != "ripple"  # its size is that of a sine and a cosine together
         }

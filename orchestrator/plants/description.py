@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.effects import Effect
+from orchestrator.effects.effect import Effect
 from pyfmu_sources.parameter_rows import BIG, Parameter
 
 Array = NDArray[np.float64]

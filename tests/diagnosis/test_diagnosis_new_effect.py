@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.support import axis_record
+from tests.support.c_fmu import have_compiler
 from tests.support.copies import ROOT, copy_project, run_in_copy
 
 PROGRAM = """
@@ -58,6 +59,32 @@ without, fan = (
 print(abs(speeds[1] - speeds[0]) > 0.1, without > 10.0 * fan, without, fan)
 """
 
+# A foreign FMU, a mass on a spring, whose record was made with such a fan; what is delivered reproduces the fit.
+AROUND_AN_FMU = """
+from pathlib import Path
+import numpy as np
+from orchestrator.api.diagnose import diagnose
+from orchestrator.diagnosis.selection.outcome import Grade
+from tests.support.box_fmu import DOMAINS, write_fmu, write_map
+
+rng, h, parts, fan = np.random.default_rng(5), 0.01, 20, 0.05
+u = np.repeat(rng.uniform(-9.0, 9.0, 40), 20)
+x, v, rows = 0.0, 0.0, []
+for torque in u:
+    rows.append(x)
+    for _ in range(parts):
+        middle = v + 0.5 * h / parts * (torque - 20.0 * x - 0.8 * v - fan * v**3)
+        place = x + 0.5 * h / parts * v
+        x, v = x + h / parts * middle, v + h / parts * (torque - 20.0 * place - 0.8 * middle - fan * middle**3)
+table = np.column_stack([h * np.arange(len(u)), u, np.array(rows) + 2e-4 * rng.standard_normal(len(u))])
+np.savetxt("record.csv", table, delimiter=",", header="time [s],F [N],x [m]", comments="", fmt="%.9g")
+found = diagnose("record.csv", write_fmu(Path("Spring.fmu"), DOMAINS[0]), write_map(Path("map.toml"), DOMAINS[0]))
+size = found.effects[0].parameters["coefficient"]
+names = [effect.name for effect in found.diagnosis.graded(Grade.LIKELY)]
+print(found.verdict, ",".join(names), abs(size.value - fan) < 0.05 * fan, size.unit)
+found.close()
+"""
+
 
 def apply(edit: str, root: Path) -> Path:
     """Make one edit of the page, a line that says where, then what to insert; return the file."""
@@ -90,8 +117,18 @@ def test_worked_example_adds_an_effect(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_worked_example_adds_an_effect_to_the_drivetrain(tmp_path: Path) -> None:
     copy_project(tmp_path)
-    edits = edits_between("### In the drivetrain", "## Adding a plant")
+    edits = edits_between("### In the drivetrain", "### Around any FMU")
     assert len(edits) == 4
     assert len({apply(edit, tmp_path) for edit in edits}) == 2
     found = run_in_copy(BALANCE, tmp_path).split()
     assert found[:2] == ["True", "True"], found
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not have_compiler(), reason="no C compiler")
+def test_worked_example_adds_an_effect_around_any_fmu(tmp_path: Path) -> None:
+    copy_project(tmp_path)
+    edits = edits_between("### Around any FMU", "## Adding a plant")
+    assert len(edits) == 3
+    assert len({apply(edit, tmp_path) for edit in edits}) == 2
+    assert run_in_copy(AROUND_AN_FMU, tmp_path).split() == ["effects", "fan", "True", "N.s3/m3"]

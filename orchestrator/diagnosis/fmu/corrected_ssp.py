@@ -12,9 +12,9 @@ from lxml import etree
 
 from orchestrator.building.archive import write_archive
 from orchestrator.building.sources import digest
-from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
 from orchestrator.diagnosis.fmu.coupled_fmus import split_name
 from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem
+from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
 from orchestrator.errors import FmuError, OrchestratorError
 from orchestrator.fmi.model_description import read_description
 from orchestrator.master.protocol import Value
@@ -108,9 +108,9 @@ def effect_parts(problem: FmuProblem, model: FmuModel) -> tuple[Part, ...]:
         parts.append(Part(f"connection_{k + 1}", values | {"lead": LEAD}))
     for k, (effect, fitted) in enumerate(zip(model.effects, model.values, strict=True)):
         given: dict[str, float | int | bool] = {f"q{n}": float(v) for n, v in enumerate(fitted)}
-        name, where, place = effect.kind.name, effect.kind.where, effect.place
+        name, where, place = effect.row.name, effect.row.site, effect.place
         if where in (PORT, CUT):
-            given |= {"series": -1, "law": effect.kind.law, "sign": problem.sign.get(place, 1.0), "lead": LEAD}
+            given |= {"series": -1, "law": effect.row.law, "sign": problem.sign.get(place, 1.0), "lead": LEAD}
             if where == PORT:
                 given["has_velocity"] = problem.map.ports[place].velocity is not None
         else:

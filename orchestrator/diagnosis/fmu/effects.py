@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu.bank import BANK, CUT, INPUT, OUTPUT, PORT, FmuEffect, PlaceScales
 from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
+from orchestrator.effects.effect import PlaceScales
+from orchestrator.effects.of_fmus import BANK, CUT, INPUT, OUTPUT, PORT, FmuEffect
 from orchestrator.plants.compiled import compile_module
 from orchestrator.shared.inference.noise import rms
 from orchestrator.shared.numba_cache import njit_on_disk
@@ -99,11 +100,11 @@ def find_effects(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
         u = data.file_inputs[:, k]
         if float(np.ptp(u)) > 0.0:
             scales = PlaceScales(h / data.factor, rms(u), float(np.max(np.abs(u))), u)
-            found += [FmuEffect(kind, name, scales) for kind in BANK.values() if kind.where == INPUT]
+            found += [FmuEffect(row, name, scales) for row in BANK.values() if row.site == INPUT]
     for k, name in enumerate(problem.outputs):
         y = data.outputs[:, k]
         scales = PlaceScales(h, rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
-        found += [FmuEffect(kind, name, scales) for kind in BANK.values() if kind.where == OUTPUT]
+        found += [FmuEffect(row, name, scales) for row in BANK.values() if row.site == OUTPUT]
     for name, motion in port_motions(problem, nominal).items():
         port = problem.map.ports[name]
         effort = float(problem.drive([problem.runner.inputs.index(port.input)])[0])
@@ -118,8 +119,8 @@ def find_effects(problem: FmuProblem, nominal: Array) -> list[FmuEffect]:
                               cycles=cycles)  # fmt: skip
         left_out: tuple[str, ...] = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
         left_out += (OF_POSITION if port.flow_only else ()) + (() if angular else ("gravity",))
-        kinds = [kind for kind in BANK.values() if kind.where == PORT and kind.name not in left_out]
-        found += [FmuEffect(kind, name, scales) for kind in kinds]
+        rows = [row for row in BANK.values() if row.site == PORT and row.name not in left_out]
+        found += [FmuEffect(row, name, scales) for row in rows]
     return [*found, *_of_parameters(problem), *_of_cuts(problem, nominal)]
 
 
@@ -171,60 +172,58 @@ def candidate_effects(
         through: port, gradient (outputs, n) by the residuals -> gradient (n,) by the effort at the port.
         linear: responses of the FMU are the same all along the record.
     """
-    timing = [effect.label for effect in effects if effect.kind.sort == "timing"]
+    timing = [effect.label for effect in effects if effect.row.kind == "timing"]
     found = {}
     for effect in effects:
-        kind, label, count = effect.kind, effect.label, len(effect.kind.parameters)
-        amplitudes = tuple(range(count if kind.starts is None else kind.amplitudes))
+        row, label, names = effect.row, effect.label, tuple(effect.row.parameters)
+        amplitudes = tuple(names.index(name) for name in row.amplitudes)
         flag = (1.0,) if effect.remembers else ()
-        starts = _starts(effect, linear)
-        excludes = [other for other in timing if kind.sort == "timing" and other != label]
-        excludes += [o.label for o in effects if o.kind.needs == kind.name and o.place == effect.place]
+        starts, small = _starts(effect, linear), row.scales(effect.scales)
+        excludes = [other for other in timing if row.kind == "timing" and other != label]
+        excludes += [o.label for o in effects if o.row.contains == row.name and o.place == effect.place]
         found[label] = CandidateEffect(
-            label=label, kind=kind.sort, values=(*kind.parameters, *(AT_REST for _ in flag)),
-            scales=(*kind.scales(effect.scales), *flag),
+            label=label, kind=row.kind, values=(*names, *(AT_REST for _ in flag)),
+            scales=(*(small[name] for name in names), *flag),
             starts=tuple((*start, *past) for start, past in product(starts, ((0.0,), (1.0,)) if flag else ((),))),
-            amplitudes=amplitudes, fitted=tuple(range(count)), sizes=amplitudes or (0,),
-            lower=(*(kind.lower or (-np.inf,) * count), *(0.0 for _ in flag)),
-            positive=amplitudes if kind.positive else (),
-            wave=_wave_scan(effect, motions, through) if kind.name == "ripple" else None,
-            comb=COMBS if kind.sort == "resolution" else 0,
-            contains=(f"{kind.needs}@{effect.place}",) if kind.needs else (), excludes=tuple(excludes),
+            amplitudes=amplitudes, fitted=tuple(range(len(names))), sizes=amplitudes or (0,),
+            lower=(*effect.lower, *(0.0 for _ in flag)), positive=() if row.signed else amplitudes,
+            wave=_wave_scan(effect, motions, through) if row.name == "ripple" else None,
+            comb=COMBS if row.kind == "resolution" else 0,
+            contains=(f"{row.contains}@{effect.place}",) if row.contains else (), excludes=tuple(excludes),
         )  # fmt: skip
     return found
 
 
 def _starts(effect: FmuEffect, linear: bool) -> list[Values]:
     """Return values to try; those in which the response is linear are zero, and found by regression."""
-    kind = effect.kind
-    if kind.starts is None:
-        return [(0.0,) * len(kind.parameters)]
-    scanned = [(value,) for value in kind.scan(effect.scales)] if linear else []
-    return list(dict.fromkeys([*kind.starts(effect.scales), *scanned]))
+    row, given = effect.row, effect.row.starts(effect.scales)
+    starts = list(product(*(given.get(name, (0.0,)) for name in row.parameters)))
+    scanned = [(value,) for value in row.scan(effect.scales)] if linear else []
+    return list(dict.fromkeys([*starts, *scanned]))
 
 
 def _wave_scan(
     effect: FmuEffect, motions: Mapping[str, Motion], through: Callable[[str, Array], Array]
 ) -> WaveScan:  # fmt: skip
     place, cycles = effect.place, np.array(effect.scales.cycles)
-    return WaveScan(motions[place].x, 0, len(effect.kind.parameters) - 1, cycles, lambda g: through(place, g))
+    return WaveScan(motions[place].x, 0, len(effect.row.parameters) - 1, cycles, lambda g: through(place, g))
 
 
 def effect_units(problem: FmuProblem, effect: FmuEffect) -> dict[str, str]:
     """Return the units of an effect's values, at the place where it acts."""
     unit_of, place = problem.units, effect.place
-    if effect.kind.where == PORT:
+    if effect.row.site == PORT:
         port = problem.map.ports[place]
         flow = unit_of.get(port.position, "")
         names = {"effort": unit_of.get(port.input, ""), "flow": f"({flow or '1'}.s)" if port.flow_only else flow}
-    elif effect.kind.where == CUT:
+    elif effect.row.site == CUT:
         cut = problem.map.cuts[place]
         names = {"effort": unit_of.get(cut.effort or "", ""), "flow": unit_of.get(cut.input, "")}
     else:
         unit = unit_of.get(place, "")
         names = {"effort": unit, "flow": unit, "signal": effect.signal}
     found = {}
-    for parameter, general in zip(effect.kind.parameters, effect.kind.units, strict=True):
+    for parameter, general in effect.row.parameters.items():
         shown = general
         for key, name in names.items():
             shown = shown.replace(key, name or "1")

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
 from orchestrator.diagnosis.fmu.coupled_fmus import Run
 from orchestrator.diagnosis.fmu.loop import delay_input, delay_output, lag_input, lag_output, limit_rate, quantise
 from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.record import FmuRecord, divide_samples
 from orchestrator.diagnosis.fmu.runner import Runner
+from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
 from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import Value
 from pyfmu_sources.laws.port import COMPLIANCE
@@ -102,10 +102,10 @@ class FmuProblem:
         ports, laws = [], []
         reads, inputs = self.runner.reads, self.runner.inputs
         for effect, values in zip(model.effects, model.values, strict=True):
-            law, most, velocity = effect.kind.law, math.inf, -1
-            if effect.kind.where == CUT:
+            law, most, velocity = effect.row.law, math.inf, -1
+            if effect.row.site == CUT:
                 place, position = inputs.index(self.map.cuts[effect.place].input), reads.index(self.beyond(effect))
-            elif effect.kind.where == PORT:
+            elif effect.row.site == PORT:
                 port = self.map.ports[effect.place]
                 place, position = inputs.index(port.input), reads.index(port.position)
                 velocity = -1 if port.velocity is None else reads.index(port.velocity)
@@ -172,15 +172,15 @@ class FmuProblem:
             of parameters that may change within a run, where one does.
         """
         plain = table = self.plain_table()
-        if any(effect.kind.where == PARAMETER for effect in model.effects):
+        if any(effect.row.site == PARAMETER for effect in model.effects):
             starts = self.starts(model)
             constant = np.tile([starts[name] for name in self.runner.tunables], (len(plain), 1))
             table = np.hstack([plain, constant])
         for effect, values in zip(model.effects, model.values, strict=True):
-            if effect.kind.where == PARAMETER:
+            if effect.row.site == PARAMETER:
                 column = len(self.runner.inputs) + self.runner.tunables.index(effect.place)
                 table[:, column] += float(values[0]) * self._follows(effect, len(plain))
-            if effect.kind.where != INPUT:
+            if effect.row.site != INPUT:
                 continue
             if table is plain:
                 table = plain.copy()
@@ -198,7 +198,7 @@ class FmuProblem:
     def beyond(self, effect: FmuEffect) -> str:
         """Return what an effect in a cut needs beside the position that is handed on."""
         cut = self.map.cuts[effect.place]
-        name = cut.effort if effect.kind.law == COMPLIANCE else cut.far
+        name = cut.effort if effect.row.law == COMPLIANCE else cut.far
         assert name is not None
         return name
 
@@ -209,7 +209,7 @@ class FmuProblem:
         """
         y = fine[:, : len(self.outputs)]
         for effect, values in zip(model.effects, model.values, strict=True):
-            if effect.kind.where != OUTPUT:
+            if effect.row.site != OUTPUT:
                 continue
             if y.base is not None:
                 y = y.copy()
@@ -264,7 +264,7 @@ class FmuProblem:
 def at_input(effect: FmuEffect, fine: Array, step: float, value: float) -> Array:
     """Return an input behind an effect in series with it; before the record it had its first value, or was zero."""
     before = 0.0 if effect.at_rest else float(fine[0])
-    match effect.kind.name:
+    match effect.row.name:
         case "input_gain":
             return np.asarray(fine * (1.0 + value))
         case "input_offset":
@@ -284,7 +284,7 @@ def at_input(effect: FmuEffect, fine: Array, step: float, value: float) -> Array
 
 def at_output(effect: FmuEffect, rows: Array, step: float, value: float, m: int) -> Array:
     """Return an output behind an effect in series with it; ``m``: see :func:`delay_output`."""
-    match effect.kind.name:
+    match effect.row.name:
         case "output_gain":
             return np.asarray(rows * (1.0 + value))
         case "output_offset":

@@ -12,7 +12,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, FmuEffect
 from orchestrator.diagnosis.fmu.effects import candidate_effects, efforts_along, find_effects, port_motions
 from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem, at_input, at_output
 from orchestrator.diagnosis.fmu.response import PulseResponses, measure_responses, start_responses
@@ -25,6 +24,7 @@ from orchestrator.diagnosis.model.interface import (
     UncertainParameter,
     Values,
 )
+from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, FmuEffect
 from pyfmu_sources.laws.port import COMPLIANCE
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ class FmuResiduals(ResidualModel):
     def is_possible(self, label: str, point: ModelPoint) -> bool:
         """Tell whether a machine can have an effect as a point has it; see :class:`ResidualModel`."""
         effect, given = self.placed[label].at(point.effects[label])
-        return effect.kind.plausible(tuple(given), effect.scales)
+        return effect.is_possible(tuple(given))
 
     def reference_signals(self, point: ModelPoint) -> Array:
         """Return the measured outputs (outputs, n); see :class:`ResidualModel`."""
@@ -163,9 +163,9 @@ class FmuResiduals(ResidualModel):
         table = self.problem.table(model)
         for n, (label, values) in enumerate(trials):
             effect, given = self.placed[label].at(values)
-            if effect.kind.where == OUTPUT:
+            if effect.row.site == OUTPUT:
                 found[n] = self._output_change(effect, given, reads)
-            elif effect.kind.where != PARAMETER:
+            elif effect.row.site != PARAMETER:
                 place, push = self._push(effect, given, reads, table)
                 pushes.setdefault(place, []).append((n, push))
         for place, of_place in pushes.items():
@@ -178,16 +178,16 @@ class FmuResiduals(ResidualModel):
         """Return the input at which an effect acts, and the effort (n,) that it adds there in each sample."""
         problem, runner = self.problem, self.problem.runner
         push = np.zeros(self.size)
-        if effect.kind.where == INPUT:
+        if effect.row.site == INPUT:
             place = runner.inputs.index(effect.place)
             fine = table[:, place]
             added = at_input(effect, fine, problem.step, float(values[0])) - fine
             push[:-1] = added.reshape(-1, problem.m).mean(axis=1)
             return place, push
-        if effect.kind.where == CUT:
+        if effect.row.site == CUT:
             return self._push_at_cut(effect, values, reads)
         place = runner.inputs.index(problem.map.ports[effect.place].input)
-        effort = efforts_along(self.motions[effect.place], effect.kind.law, tuple(values), self.step)
+        effort = efforts_along(self.motions[effect.place], effect.row.law, tuple(values), self.step)
         push[:-1] = -problem.sign.get(effect.place, 1.0) * 0.5 * (effort[:-1] + effort[1:])
         return place, push
 
@@ -196,7 +196,7 @@ class FmuResiduals(ResidualModel):
         target = problem.map.cuts[effect.place].input
         wire = next(c for c in runner.system.connections if c.target == target)
         other = reads[:, runner.reads.index(problem.beyond(effect))]
-        if effect.kind.law == COMPLIANCE:
+        if effect.row.law == COMPLIANCE:
             return runner.inputs.index(target), -values[0] * problem.sign.get(effect.place, 1.0) * other
         between = wire.factor * reads[:, runner.reads.index(wire.source)] + wire.offset - other
         return runner.inputs.index(target), -np.clip(between, -0.5 * values[0], 0.5 * values[0])

@@ -6,8 +6,8 @@ from scipy.ndimage import shift as shift_samples
 from scipy.signal import lfilter
 
 from orchestrator.diagnosis.data.signals import triangle_average
+from orchestrator.effects.of_logs import LEAD, SAMPLED
 from orchestrator.plants.description import Plant
-from orchestrator.plants.measurement import LEAD, SAMPLED
 
 Array = NDArray[np.float64]
 SHORT_LAG = 0.3  # of a sample: a lag below it is a delay as long, which no triangle average tells from it

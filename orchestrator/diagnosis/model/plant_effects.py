@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
-from orchestrator.plants.bank import LEAST_CYCLES
+from orchestrator.effects.effect import Effect, SignalScales
+from orchestrator.effects.of_plants import LEAST_CYCLES
 from orchestrator.plants.description import Plant
-from orchestrator.plants.effects import Effect, SignalScales
 from orchestrator.records.model_file import Model
 
 MOST_CYCLES = 40.0  # a revolution: teeth and poles of drives lie below
@@ -107,7 +107,7 @@ def effect_parameters(plant: Plant, effect: CandidateEffect, values: Values) -> 
     if row.phase:
         sine, cosine = given.pop(SINE), given.pop(COSINE)
         given |= {row.size: math.hypot(sine, cosine), row.phase: math.atan2(cosine, sine)}
-    full = row.parameters | row.unreported
+    full = {**row.parameters, **row.unreported}
     return {full[short]: value for short, value in given.items()}
 
 

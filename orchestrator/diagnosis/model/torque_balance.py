@@ -44,8 +44,8 @@ from orchestrator.diagnosis.model.interface import (
 )
 from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters, in_metres
 from orchestrator.diagnosis.settings import BalanceSettings, DiagnosisSettings
-from orchestrator.plants.effects import SignalScales, rms
-from orchestrator.plants.measurement import LEAD, SAMPLED, SHIFT
+from orchestrator.effects.effect import SignalScales, rms
+from orchestrator.effects.of_logs import LEAD, SAMPLED, SHIFT
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 

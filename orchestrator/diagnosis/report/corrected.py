@@ -15,6 +15,7 @@ from orchestrator.diagnosis.report.free_run import free_runs, run_parts
 from orchestrator.diagnosis.report.open_test_data import signals_of_test_data
 from orchestrator.diagnosis.report.simulation import RunSignals
 from orchestrator.diagnosis.result import Diagnosis, ValueEstimate
+from orchestrator.effects.of_logs import LEAD
 from orchestrator.errors import SimulationError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
@@ -22,7 +23,6 @@ from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
-from orchestrator.plants.measurement import LEAD
 from orchestrator.records.model_file import Model
 from orchestrator.records.model_text import entry_texts, toml_text
 

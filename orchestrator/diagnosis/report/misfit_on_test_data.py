@@ -16,8 +16,8 @@ from orchestrator.diagnosis.report.open_test_data import open_test_data, signals
 from orchestrator.diagnosis.report.simulation import RunSignals
 from orchestrator.diagnosis.result import Diagnosis, SignalMisfit, TestMisfit, Workings
 from orchestrator.diagnosis.settings import DiagnosisSettings, ReportSettings
+from orchestrator.effects.effect import rms
 from orchestrator.plants.description import Plant
-from orchestrator.plants.effects import rms
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect
-from orchestrator.plants.effects import Effect
+from orchestrator.effects.effect import Effect
 
 Array = NDArray[np.float64]
 BINS = 40

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import first_derivative, smooth
 from orchestrator.diagnosis.model.drive import apply_lag, logged_torque, shift_signal
+from orchestrator.effects.of_logs import LEAD, SHIFT
 from orchestrator.plants.coarse_run import FINER, coarse_runner_of, coarse_steps, runs_coarsely
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import is_linear, linear_run_of
-from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import residual_noise
 from pyfmu_sources.laws.drive import UNASKED

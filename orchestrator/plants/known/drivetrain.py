@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
+from orchestrator.effects.of_logs import EARLY_TORQUE, LATE_LOAD, LEAD, SAMPLED, SAMPLED_TORQUE, SHIFT
+from orchestrator.effects.of_plants import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant, Resonance, Shaft
-from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD, LEAD, SAMPLED, SAMPLED_TORQUE, SHIFT
 from orchestrator.shared.cores import cache_once
 from pyfmu_sources import equations as dt
 from pyfmu_sources.backlash_models import GRADUAL, MODELS

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
+from orchestrator.effects.of_logs import EARLY_TORQUE, LEAD, SAMPLED, SAMPLED_TORQUE
+from orchestrator.effects.of_plants import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant
-from orchestrator.plants.measurement import EARLY_TORQUE, LEAD, SAMPLED, SAMPLED_TORQUE
 from orchestrator.shared.cores import cache_once
 from pyfmu_sources import axis_equations as ap
 from pyfmu_sources.axis_equations import breakaway_torque

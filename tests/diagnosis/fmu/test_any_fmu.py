@@ -12,7 +12,6 @@ from orchestrator.api.any_fmu import draft_map
 from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
-from orchestrator.diagnosis.fmu.bank import PORT
 from orchestrator.diagnosis.fmu.effects import find_effects
 from orchestrator.diagnosis.fmu.mapping import read_map
 from orchestrator.diagnosis.fmu.probing import prepare_problems
@@ -21,6 +20,7 @@ from orchestrator.diagnosis.fmu.record import read_fmu_record
 from orchestrator.diagnosis.fmu.system import read_system
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.diagnosis.settings import DiagnosisSettings, FmuSettings
+from orchestrator.effects.of_fmus import PORT
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.results import read
@@ -200,7 +200,7 @@ def test_a_run_whose_fed_back_effort_runs_away_is_given_up_before_the_fmu_meets_
     (problem,), _ = prepare_problems(system, given, [read_fmu_record(record_path, given)], workers=1)
     try:
         effects = find_effects(problem, problem.must_read(problem.nominal))
-        inertia = next(e for e in effects if e.kind.name == "added_inertia")
+        inertia = next(e for e in effects if e.row.name == "added_inertia")
         heavier, unstable = (FmuModel(problem.nominal.p, (inertia,), (np.array([m]),)) for m in (0.1, 5.0))
         assert problem.simulate([heavier])[0] is not None
         assert problem.simulate([unstable])[0] is None
@@ -217,9 +217,7 @@ def test_where_the_input_is_a_flow_no_law_of_motion_is_tried(made, domain, moves
     given = read_map(map_path, system)
     (problem,), _ = prepare_problems(system, given, [read_fmu_record(record_path, given)], workers=1)
     try:
-        at_port = {
-            e.kind.name for e in find_effects(problem, problem.must_read(problem.nominal)) if e.kind.where == PORT
-        }
+        at_port = {e.row.name for e in find_effects(problem, problem.must_read(problem.nominal)) if e.row.site == PORT}
     finally:
         problem.runner.close()
     assert {"load", "spring", "quadratic_drag"} <= at_port
@@ -235,7 +233,7 @@ def test_a_run_that_hangs_is_given_up_soon_and_others_go_on(made):
     (problem,), _ = prepare_problems(system, given, [read_fmu_record(record_path, given)], workers=1, settings=settings)
     try:
         zone = next(
-            e for e in find_effects(problem, problem.must_read(problem.nominal)) if e.kind.name == "input_dead_zone"
+            e for e in find_effects(problem, problem.must_read(problem.nominal)) if e.row.name == "input_dead_zone"
         )
         wide = FmuModel(problem.nominal.p, (zone,), (np.array([1e9]),))
         begun = time.monotonic()

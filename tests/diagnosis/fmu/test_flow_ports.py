@@ -54,7 +54,7 @@ def test_a_resistance_that_grows_with_the_current_is_named_by_its_flow_alone(tmp
         assert (value.value, value.unit) == (pytest.approx(size, rel=0.05), "V.s2/(A.s)2")
         assert max(one.final / one.noise for one in found.test[0].signals) < 1.3
         problem = found.diagnosis.workings.problem
-        offered = {e.kind.name for e in find_effects(problem, problem.must_read(problem.nominal)) if e.place == "coil"}
+        offered = {e.row.name for e in find_effects(problem, problem.must_read(problem.nominal)) if e.place == "coil"}
         assert {"viscous_drag", "quadratic_drag", "load"} <= offered
         assert not offered & set(OF_POSITION)
     finally:

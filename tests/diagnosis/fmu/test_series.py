@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.fmu import loop
-from orchestrator.diagnosis.fmu.bank import BANK, FmuEffect, PlaceScales
 from orchestrator.diagnosis.fmu.problem import at_input
 from orchestrator.diagnosis.fmu.record import divide_samples
+from orchestrator.effects.effect import PlaceScales
+from orchestrator.effects.of_fmus import BANK, FmuEffect
 from pyfmu_sources.attachment import SERIES, AttachedEffect
 
 STEP = 0.01

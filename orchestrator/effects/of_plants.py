@@ -9,8 +9,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from orchestrator.plants.effects import Effect, SignalScales, rms
-from orchestrator.plants.measurement import longest_time, times
+from orchestrator.effects.effect import Effect, SignalScales, rms
+from orchestrator.effects.of_logs import longest_time, times
 from pyfmu_sources.parameter_rows import BIG, Parameter
 
 # Of the analysis alone: logarithm [rad] of the distance over which dry friction builds up, or of the penetration over
@@ -68,7 +68,7 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         "coulomb_friction", site, "friction", group("coulomb_friction", f"{site}.torque"), "torque",
         lambda s: {"torque": small(s), "presliding": SMALL_LOGARITHM}, lambda s: {"presliding": (distance(s),)},
         ("torque",), signed=False, priors=build_up, unreported=unreported,
-        possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed",
+        possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed", passive=True,
     )  # fmt: skip
     stribeck = Effect(
         "stribeck_friction", site, "friction",
@@ -81,14 +81,14 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         possible=lambda v, s: 1.02 * v["coulomb"] < v["breakaway"] < 1.5 * _largest_torque(s, site)
         and v["coulomb"] > LEAST_COULOMB * v["breakaway"]
         and v["stribeck_speed"] > 0.01 * s.rms_speed(site),
-        contains="coulomb_friction", against="speed",
+        contains="coulomb_friction", against="speed", passive=True,
     )  # fmt: skip
     loaded = Effect(
         "load_dependent_friction", site, "friction", group("load_dependent_friction", f"{site}.coefficient"),
         "coefficient", lambda s: {"coefficient": 0.01, "presliding": SMALL_LOGARITHM},
         lambda s: {"presliding": (distance(s),)}, ("coefficient",), signed=False,
         bounds=lambda s: {"coefficient": (0.0, 0.9)}, priors=build_up, unreported=unreported,
-        possible=lambda v, s: v["coefficient"] < 0.5, against="speed",
+        possible=lambda v, s: v["coefficient"] < 0.5, against="speed", passive=True,
     )  # fmt: skip
     return coulomb, stribeck, loaded
 
@@ -184,6 +184,7 @@ def _end_stop(side: str) -> Effect:
         {"angle": f"effects.end_stop.{side}", "stiffness": "effects.end_stop.stiffness"}, "stiffness",
         lambda s: {"angle": 1e-3 * float(np.ptp(s.angles["load"])), "stiffness": stiffness(s)},
         lambda s: {"angle": angles(s)}, ("stiffness",), signed=False, possible=is_touched, against="position",
+        passive=True,
     )  # fmt: skip
 
 
@@ -221,12 +222,12 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     _wave("gear_eccentricity", "shaft", "twist"),
     Effect(
         "load_torque", "load", "constant", group("load_torque", "torque"), "torque",
-        lambda s: {"torque": 0.01 * s.torque_at("load")}, amplitudes=("torque",),
+        lambda s: {"torque": 0.01 * s.torque_at("load")}, amplitudes=("torque",), passive=True,
     ),
     Effect(
         "gravity_load", "load", "position", group("gravity_load", "amplitude", "phase"), "amplitude",
         lambda s: {"amplitude": 0.01 * s.torque_at("load")}, amplitudes=("amplitude",), phase="phase", angular=True,
-        against="angle",
+        against="angle", passive=True,
     ),
     Effect(
         "extra_resonance", "load", "resonance",
@@ -241,7 +242,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "quadratic_drag", "load", "speed", group("quadratic_drag", "coefficient"), "coefficient",
         lambda s: {"coefficient": 0.01 * s.torque_at("load") / s.rms_speed("load") ** 2},
-        amplitudes=("coefficient",), signed=False, against="speed",
+        amplitudes=("coefficient",), signed=False, against="speed", passive=True,
     ),
     Effect(
         "sensor_offset", "motor", "constant", group("sensor_offset", "motor.offset"), "offset",
@@ -258,6 +259,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: {"stiffness": 0.01 * s.torque_at("load") / rms(s.angles["load"] - s.angles["load"].mean()),
                    "angle": 0.05},
         lambda s: {"angle": (float(s.angles["load"].mean()),)}, ("stiffness",), signed=False, against="position",
+        passive=True,
     ),
     Effect(
         "varying_inertia", "load", "position", group("varying_inertia", "amplitude", "phase"), "amplitude",

@@ -1,12 +1,10 @@
-"""One row of a bank of effects: its parameters in the plant's table, where a search starts, which values a machine
-can have.
-"""
+"""One row of a bank of effects: its parameters, where a search starts, which values a machine can have."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,30 +87,61 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values * values))) + 1e-300
 
 
-def _any_values(values: Mapping[str, float], scales: SignalScales) -> bool:
+@dataclass(frozen=True, eq=False)
+class PlaceScales:
+    """Typical sizes of what happens where an effect would act around an FMU.
+
+    Attributes:
+        h: sample time [s].
+        size: rms of the signal (at a port: of the effort that drives it).
+        signal: its samples (rows,).
+        noise: standard deviation of the measurement, for outputs.
+        position: rms of the position about zero; span: from the smallest to the largest.
+        speed: rms of the speed.
+        angular: the position is an angle.
+        effort: rms of what goes through a cut, negative where it acts against the twist.
+        cycles: wavenumbers of ripples over the position, in order, told apart within its span.
+    """
+
+    h: float
+    size: float
+    peak: float
+    signal: Array
+    noise: float = 0.0
+    position: float = 1.0
+    span: float = 1.0
+    speed: float = 1.0
+    acceleration: float = 1.0
+    angular: bool = False
+    effort: float = 1.0
+    cycles: tuple[float, ...] = ()
+
+
+def _any_values(values: Mapping[str, float], scales: Any) -> bool:
     del values, scales
     return True
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One row of a bank.
+    """One row of a bank. Functions take the scales of a plant's signals, or those of a place around an FMU.
 
     Attributes:
-        site: part of the machine at which it acts.
+        site: part of the machine at which it acts; around an FMU what sort of place: in series at an ``input`` or an
+            ``output``, as feedback at a ``port``, in the value of a ``parameter``, or in a ``cut`` between two FMUs.
         kind: what sort of law it is; effects of one kind may stand for each other.
-        parameters: short name -> name in the plant's table.
+        parameters: short name -> name in the plant's table; around an FMU its unit, in which "effort", "flow" and
+            "signal" stand for the units at the place where it acts.
         size: the parameter whose zero (or default) switches the effect off.
-        scales: signal scales -> short name -> a small change of each parameter.
-        starts: signal scales -> short name -> values to try, in all combinations.
-        amplitudes: short names of parameters in which the torque balance is linear, found by regression.
+        scales: scales -> short name -> a small change of each parameter.
+        starts: scales -> short name -> values to try, in all combinations; others start at zero or their default.
+        amplitudes: short names of parameters in which the response is linear, found by regression.
         phase: short name of a phase; amplitude and phase are then found together from sine and cosine.
         signed: amplitudes may have either sign.
-        bounds: signal scales -> short name -> (least, largest), narrower than the table's.
-        priors: signal scales -> short name -> (mean, standard deviation).
+        bounds: scales -> short name -> (least, largest), narrower than the table's.
+        priors: scales -> short name -> (mean, standard deviation).
         unreported: short name -> name in the plant's table: what is fitted beside its parameters and not reported.
-        possible: (values by short name, signal scales) -> whether a machine can have them, and the record can show it;
-            ``viscous`` [N.m.s/rad] among the values is the viscous friction that the site has beside them.
+        possible: (values by short name, scales) -> whether a machine can have them, and the record can show it.
         contains: name of the simpler effect at the same site that it stands for.
         both_encoders: it can be seen only with an encoder on either side.
         angular: it makes sense for an angle only, not for a position in metres.
@@ -122,22 +151,27 @@ class Effect:
         measurement: it is no physics of the machine but a property of its log.
         rare_torque: it can be only where the torque has rows of its own, rarer than the angles'.
         against: quantity against which its law is drawn: "speed", "angle" within a turn, or "position"; "": none.
+        law: around an FMU, number of the law of feedback.
+        remembers: it matters what the signal was before the record.
+        scan: scales -> values in order, so close that the best of them leads a fit to the right one: more than an FMU
+            is run for, looked through where it is linear.
+        passive: no value of it that is possible makes energy: what it takes from the motion it keeps or burns.
     """
 
     name: str
     site: str
     kind: str
-    parameters: dict[str, str]
+    parameters: Mapping[str, str]
     size: str
-    scales: Callable[[SignalScales], Mapping[str, float]]
-    starts: Callable[[SignalScales], Starts] = lambda scales: {}
+    scales: Callable[[Any], Mapping[str, float]]
+    starts: Callable[[Any], Starts] = lambda scales: {}
     amplitudes: tuple[str, ...] = ()
     phase: str = ""
     signed: bool = True
-    bounds: Callable[[SignalScales], Bounds] = lambda scales: {}
-    priors: Callable[[SignalScales], Bounds] = lambda scales: {}
-    unreported: dict[str, str] = field(default_factory=dict)
-    possible: Callable[[Mapping[str, float], SignalScales], bool] = _any_values
+    bounds: Callable[[Any], Bounds] = lambda scales: {}
+    priors: Callable[[Any], Bounds] = lambda scales: {}
+    unreported: Mapping[str, str] = field(default_factory=dict)
+    possible: Callable[[Mapping[str, float], Any], bool] = _any_values
     contains: str = ""
     both_encoders: bool = False
     angular: bool = False
@@ -147,6 +181,10 @@ class Effect:
     measurement: bool = False
     rare_torque: bool = False
     against: str = ""
+    law: int = 0
+    remembers: bool = False
+    scan: Callable[[Any], tuple[float, ...]] = lambda scales: ()
+    passive: bool = False
 
     @property
     def label(self) -> str:
@@ -155,4 +193,4 @@ class Effect:
 
     def places(self, plant: ParameterTable) -> dict[str, int]:
         """Return the place of each parameter in the plant's tuple by short name, unreported ones last."""
-        return {short: plant.index(name) for short, name in (self.parameters | self.unreported).items()}
+        return {short: plant.index(name) for short, name in {**self.parameters, **self.unreported}.items()}

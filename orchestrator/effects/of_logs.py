@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.plants.effects import Effect, SignalScales
+from orchestrator.effects.effect import Effect, SignalScales
 from pyfmu_sources.parameter_rows import Parameter
 
 LEAD = Parameter("measurement.lead", "s", 0.0, 0.0, 1.0, "Time by which torques act before their stamp")
