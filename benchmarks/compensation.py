@@ -4,7 +4,7 @@ Run as ``python -m benchmarks.compensation [--plants 200] [--seed 0]`` (with a C
 independent simulator (Hunt-Crossley contact, LuGre friction), each parameter up to 5 % off; encoders of 10,000
 and 20,000 counts with noise of 3e-4 and 1.5e-4 rad; half-gap 0.02 rad, known to 1 %; torque limit 300 N.m.
 States come from one filter of :mod:`pyfmu_sources.backlash_estimator` that is told the half-gap; the request
-from the native FMU.
+from the native FMU. The LQR has the thesis's weights, and others that damp the load.
 """
 
 import argparse
@@ -34,7 +34,7 @@ LIMIT = 300.0
 DRIVES = {"slow": 1.0, "fast": 5e-3}
 COUNT = 2.0 * np.pi / 20_000
 ENCODERS = (2.0 * np.pi / 10_000, COUNT)
-WEIGHTS = np.diag((10.0, 50.0, 1.0, 1.0, 0.01))
+WEIGHTS = {"thesis": (10.0, 50.0, 1.0, 1.0, 0.01), "load": (10.0, 1.0, 1000.0, 500.0, 0.01)}
 _CASES = {"friction 2 N.m": {"Fc_l": 2.0}, "load 5 N.m": {"T0": 5.0}}
 NAMES = [variable.name for variable in BacklashCompensator.table]
 Array = np.ndarray
@@ -94,13 +94,13 @@ def kernels() -> tuple[Callable[..., None], Callable[..., Array]]:
 class Compensator:
     """The FMU, stepped once a sample; without a known half-gap it is the plain LQR."""
 
-    def __init__(self, path: Path, tau: float, impact_speed: float, known: bool) -> None:
+    def __init__(self, path: Path, tau: float, impact_speed: float, known: bool, weights: str) -> None:
         self.fmu = RawFmu(path)
         component = self.fmu.instantiate()
         assert component is not None
         self.component = component
         model = five_state_model(DrivetrainValues(tau=tau))
-        gains = design_regulator(model, WEIGHTS, 2e-3, STEP).gains
+        gains = design_regulator(model, np.diag(WEIGHTS[weights]), 2e-3, STEP).gains
         values = {f"K[{n + 1}]": gain for n, gain in enumerate(gains)}
         self.known = known
         self.set(values | {"tau": tau, "impact_speed": impact_speed, "u_max": LIMIT})
@@ -141,6 +141,7 @@ def simulate(
     known: bool = True,
     wait: int = 0,
     effects: Mapping[str, float] = MappingProxyType({}),
+    weights: str = "thesis",
 ) -> Run:
     """Run one loop; for the first ``wait`` samples nothing is requested."""
     tau = DRIVES[drive]
@@ -164,7 +165,7 @@ def simulate(
     f[6] = alpha
     bend = np.zeros(1)
     states = np.empty((n, SUBSTEPS, 8))
-    controller = Compensator(path, tau, speed, known)
+    controller = Compensator(path, tau, speed, known, weights)
     u = 0.0
     for k in range(n):
         seen = [round((x[2 * m] + noise[k, m]) / ENCODERS[m]) * ENCODERS[m] for m in range(2)]
@@ -210,8 +211,9 @@ def print_crossings(path: Path, plants: int, seed: int) -> None:
             )
 
 
-def print_moves(path: Path, plants: int, seed: int) -> None:
+def print_moves(path: Path, plants: int, seed: int, weights: str) -> None:
     """Print impact and tracking error of a smooth move, and the motion at rest, beside the plain LQR's."""
+    print(f"weights of the LQR: {weights}")
     print("drive, case, impact and rms error over the LQR's (medians), at rest peak to peak [counts] median, 90 %, LQR")
     for drive in DRIVES:
         for case, effects in _CASES.items():
@@ -219,7 +221,16 @@ def print_moves(path: Path, plants: int, seed: int) -> None:
             reference = smooth_move(0.5, 1.0, 0.5, 10.0)
             for n in range(plants):
                 both = [
-                    simulate(path, np.random.default_rng([seed, n]), drive, 0.1, reference, known, effects=effects)
+                    simulate(
+                        path,
+                        np.random.default_rng([seed, n]),
+                        drive,
+                        0.1,
+                        reference,
+                        known,
+                        effects=effects,
+                        weights=weights,
+                    )
                     for known in (True, False)
                 ]
                 moves = slice(500 * SUBSTEPS, 4000 * SUBSTEPS)
@@ -243,7 +254,8 @@ def main() -> None:
     arguments = parser.parse_args()
     path = ensure_native(["BacklashCompensator"], here=True)["BacklashCompensator"]
     print_crossings(path, arguments.plants, arguments.seed)
-    print_moves(path, max(arguments.plants // 4, 1), arguments.seed)
+    for weights in WEIGHTS:
+        print_moves(path, max(arguments.plants // 4, 1), arguments.seed, weights)
 
 
 if __name__ == "__main__":

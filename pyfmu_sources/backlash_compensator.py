@@ -14,6 +14,7 @@ torque away from the flank, the flank is approached anew. Both keep the loop fro
 Without a half-gap that is known, the request is that of the plain LQR.
 """
 
+from math import fabs
 from typing import NamedTuple
 
 from .gap_traversal import Traversal, plan, point_at, request_at
@@ -96,6 +97,14 @@ def after_crossing(x: Estimate, duration: float, d: Train) -> Estimate:
     return (x[0], x[1], theta_l, x[3] - duration * slowing, x[4], x[5])
 
 
+def crossing_time(alpha: float, end: float, speed: float, d: Train, s: Tuning) -> float:
+    """Return how long [s] a crossing from rest to the way ``end`` [rad] and on to the flank takes; 0 without plans."""
+    if s.torque_share == 0.0:
+        return 0.0
+    ahead = plan((-alpha, 0.0, 0.0), end, speed, s.torque_share * s.u_max, d.tau, d.J_m * d.i)
+    return ahead.first + ahead.second + ahead.third + (alpha - end) / speed
+
+
 def impact_speed(reference: float, reference_speed: float, x: Estimate, alpha: float, s: Tuning) -> float:
     """Return the speed [rad/s] at which to land: less where little is to move, as the impact moves the load."""
     need = abs(x[2] - reference) / alpha + abs(reference_speed) / s.impact_speed
@@ -160,16 +169,16 @@ def act(
         return (CrossingState(HOLD, flank, 0, smoothed, traversal), plain)
     end = lowest - s.margin
     speed = impact_speed(reference, reference_speed, x, gap.alpha, s)
-    if phase == HOLD and wanted * flank < -s.flank_torque:
-        ahead = plan((-gap.alpha, 0.0, 0.0), end, speed, s.torque_share * s.u_max, d.tau, d.J_m * d.i)
-        h = ahead.first + ahead.second + ahead.third + (gap.alpha - end) / speed
+    settled = reference_speed == 0.0 and fabs(x[2] - reference) <= s.margin
+    if phase == HOLD and not settled and wanted * flank < -s.flank_torque:
+        h = crossing_time(gap.alpha, end, speed, d, s)
         coming, _ = wanted_torque(reference + h * reference_speed, reference_speed, after_crossing(x, h, d), gains, d)
         if coming * flank < -s.flank_torque:
             phase, flank, samples = CROSS, -flank, 0
     shifted = (x[0] - flank * d.i * gap.alpha, x[1], x[2], x[3], x[4], x[5])
     held = control(reference, reference_speed, shifted, gains, d.i, d.compliance, s.u_max)
     way = flank * (x[0] / d.i - x[2])
-    if way > gap.alpha:
+    if way > gap.alpha or s.torque_share == 0.0:
         return (CrossingState(HOLD, flank, 0, smoothed, traversal), held)
     if phase == HOLD:
         if held * flank >= 0.0:

@@ -52,7 +52,7 @@ _TRAIN = (
 )
 _TUNING = (
     ("impact_speed", "rad/s", 0.1, "Speed of the twist at which to land", 1e-6, 1e6),
-    ("torque_share", "1", 0.85, "Share of the torque limit that a plan uses", 0.01, 1.0),
+    ("torque_share", "1", 0.85, "Share of the torque limit that a plan uses; 0: no plans, a shifted LQR", 0.0, 1.0),
     ("u_max", "N.m", 1e4, "Torque limit", 1e-9, 1e12),
     ("flank_torque", "N.m", 2.0, "Wanted torque against a flank from which it is left", 0.0, 1e12),
     ("margin", "rad", 3e-4, "Way before the flank at which a plan ends: noise of the encoders", 0.0, 1e6),

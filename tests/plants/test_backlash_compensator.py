@@ -73,3 +73,27 @@ def test_the_end_of_a_plan_leaves_two_deviations_to_the_flank():
         assert (state.phase, state.flank) == (CROSS, 1)
         assert state.traversal.end_way == pytest.approx(0.02 - 2.0 * deviation - 3e-4)
         assert state.traversal.end_speed == 0.1
+
+
+def test_without_torque_for_plans_it_is_the_shifted_lqr_on_the_wanted_flank():
+    rng = np.random.default_rng(4)
+    tuning = TUNING._replace(torque_share=0.0)
+    flanks = set()
+    for _ in range(200):
+        x, reference = draw_estimate(rng), rng.uniform(-1.0, 1.0)
+        state, u = act(
+            CrossingState(HOLD, 1, 0, 0.0, NO_PLAN), reference, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, tuning
+        )
+        shifted = (x[0] - state.flank * 3.984 * 0.02, *x[1:])
+        assert u == control(reference, 0.0, shifted, GAINS, 3.984, 1.0 / 3300.0, 300.0)
+        flanks.add(state.flank)
+    assert flanks == {-1, 1}
+
+
+def test_at_the_reference_it_stays_on_its_flank_while_at_rest():
+    """A landing shoves the load: what its speed asks for is no reason to cross."""
+    for error, speed, phase in ((2e-4, 0.0, HOLD), (2e-3, 0.0, CROSS), (2e-4, 0.1, CROSS)):
+        x = (3.984 * 0.0205, 0.0, 0.0, 0.05, 0.0, 0.0)
+        state = CrossingState(HOLD, 1, 0, -30.0, NO_PLAN)
+        state, _ = act(state, -error, -speed, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        assert state.phase == phase
