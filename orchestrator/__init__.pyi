@@ -9,6 +9,8 @@ from orchestrator.api.calibrate import calibrate as calibrate
 from orchestrator.api.cases import RunOptions as RunOptions
 from orchestrator.api.check import CheckResult as CheckResult
 from orchestrator.api.check import check as check
+from orchestrator.api.compensate import CompensateResult as CompensateResult
+from orchestrator.api.compensate import compensate as compensate
 from orchestrator.api.design import DesignResult as DesignResult
 from orchestrator.api.design import design as design
 from orchestrator.api.diagnose import diagnose as diagnose

@@ -79,7 +79,7 @@ def start_state(x: Estimate, i: float) -> CrossingState:
     return CrossingState(HOLD, flank, 0, 0.0, Traversal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def wanted_torque(reference: float, reference_speed: float, x: Estimate, gains: Gains, d: Train) -> tuple[float, float]:
+def rigid_torque(reference: float, reference_speed: float, x: Estimate, gains: Gains, d: Train) -> tuple[float, float]:
     """Return the torque [N.m] that the LQR asks of a motor that follows the load rigidly, and the part of the angles.
 
     The other part, of speed and load torque, has their noise.
@@ -160,7 +160,7 @@ def act(
         x: estimate ``(theta_m, omega_m, theta_l, omega_l, T_l, T_m)``, whose twist is zero in mid-gap.
     """
     phase, flank, samples, smoothed, traversal = state
-    whole, of_angles = wanted_torque(reference, reference_speed, x, gains, d)
+    whole, of_angles = rigid_torque(reference, reference_speed, x, gains, d)
     smoothed += (whole - of_angles - smoothed) * s.sample_time / (s.sample_time + SMOOTHING)
     wanted = of_angles + smoothed
     lowest = gap.alpha - DEVIATIONS * gap.deviation
@@ -172,7 +172,7 @@ def act(
     settled = reference_speed == 0.0 and fabs(x[2] - reference) <= s.margin
     if phase == HOLD and not settled and wanted * flank < -s.flank_torque:
         h = crossing_time(gap.alpha, end, speed, d, s)
-        coming, _ = wanted_torque(reference + h * reference_speed, reference_speed, after_crossing(x, h, d), gains, d)
+        coming, _ = rigid_torque(reference + h * reference_speed, reference_speed, after_crossing(x, h, d), gains, d)
         if coming * flank < -s.flank_torque:
             phase, flank, samples = CROSS, -flank, 0
     shifted = (x[0] - flank * d.i * gap.alpha, x[1], x[2], x[3], x[4], x[5])

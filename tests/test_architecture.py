@@ -37,7 +37,7 @@ LAYERS = (
     {"building"},
     {"scenarios"},
     {"checking"},
-    {"paired", "estimation"},
+    {"paired", "estimation", "control"},
     {"estimation.inspection", "estimation.methods"},
     {"diagnosis.settings"},
     {"diagnosis.data"},

@@ -6,14 +6,26 @@ from pathlib import Path
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
-from orchestrator.reporting.pages import calibrate, check, diagnose, estimate, generic, inspect, simulate, sweep, thesis
+from orchestrator.reporting.pages import (
+    calibrate,
+    check,
+    compensate,
+    diagnose,
+    estimate,
+    generic,
+    inspect,
+    simulate,
+    sweep,
+    thesis,
+)
 from orchestrator.reporting.source import ResultDocument, load
 from orchestrator.shared.output import write_whole
 from orchestrator.shared.source_tree import import_masters
 
 PAGE = "report.html"
 COMMANDS = (
-    "build", "check", "simulate", "sweep", "inspect", "estimate", "diagnose", "calibrate", "thesis", "ssp", "bench",
+    "build", "check", "simulate", "sweep", "inspect", "estimate", "diagnose", "calibrate", "compensate",
+    "thesis", "ssp", "bench",
 )  # fmt: skip
 
 
@@ -31,6 +43,7 @@ _BUILDERS: dict[str, Callable[[ResultDocument], Report]] = {
     "bench": _bench_page,
     "calibrate": calibrate.build,
     "check": check.build,
+    "compensate": compensate.build,
     "diagnose": diagnose.build,
     "estimate": estimate.build,
     "inspect": inspect.build,

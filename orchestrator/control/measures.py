@@ -1,0 +1,95 @@
+"""What is measured of a loop with a gap: traversals, impacts, error of the load, and how it rests."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.control.loops import COUNTS, REST, ControlTask
+from orchestrator.master.result import Recording
+from pyfmu_sources.gap_traversal import Traversal, plan, point_at
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoopMeasures:
+    """One run.
+
+    Attributes:
+        times: from one flank to the other [s], shape (traversals,).
+        impacts: speeds of the twist at their ends [rad/s], shape (traversals,).
+        largest_impact: of all contacts, those on the same flank included [rad/s].
+        error: root mean square error of the load from the begin of the move on [rad].
+        rest: motion of the load at the end of the run, peak to peak [counts of its encoder].
+        contacts: at the end of the run [1/s].
+    """
+
+    times: Array
+    impacts: Array
+    largest_impact: float
+    error: float
+    rest: float
+    contacts: float
+
+
+def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
+    """Return the measures of a run of ``make_loop``."""
+    contact = np.round(run["plant.contact"])
+    speed = np.abs(run["plant.omega_m"] / task.nominal.i - run["plant.omega_l"])
+    met = np.flatnonzero((contact[1:] != 0) & (contact[:-1] != contact[1:]))
+    left = np.flatnonzero((contact[:-1] != 0) & (contact[:-1] != contact[1:]))
+    times, impacts = [], []
+    for end in met:
+        before = left[left <= end]
+        if before.size and contact[before[-1]] == -contact[end + 1]:
+            times.append((end - before[-1]) * task.sample_time)
+            impacts.append(speed[end])
+    theta_l = run["plant.theta_l"]
+    moving = task.stop - REST
+    tail = run.time >= moving
+    reference = task.reference()[0][: theta_l.size]
+    return LoopMeasures(
+        np.array(times),
+        np.array(impacts),
+        float(speed[met].max(initial=0.0)),
+        float(np.sqrt(np.mean((theta_l - reference)[~tail] ** 2))),
+        float(np.ptp(theta_l[tail]) * COUNTS[1] / (2.0 * np.pi)),
+        float(np.sum(run.time[met] >= moving) / REST),
+    )
+
+
+def bound_time(task: ControlTask, impact_speed: float) -> float:
+    """Return the least time [s] of a traversal from rest that lands at ``impact_speed`` [rad/s] without torque.
+
+    See :mod:`pyfmu_sources.gap_traversal`: it is reached by the whole torque in three parts.
+    """
+    t = _best(task, impact_speed)
+    return t.first + t.second + t.third
+
+
+def bound_path(task: ControlTask, impact_speed: float) -> tuple[Array, Array]:
+    """Return times [s] and twist from the flank that is left [rad] of the traversal in the least time."""
+    t = _best(task, impact_speed)
+    times = np.linspace(0.0, t.first + t.second + t.third, 101)
+    inertia = task.nominal.J_m * task.nominal.i
+    return times, np.array([point_at(t, float(time), task.tau, inertia)[0] for time in times]) + task.alpha
+
+
+def first_path(run: Recording, task: ControlTask) -> tuple[Array, Array]:
+    """Return times [s] and twist from the flank that is left [rad] of the first traversal of a run."""
+    contact = np.round(run["plant.contact"])
+    flank = 0.0
+    begin = 0
+    for n, now in enumerate(contact):
+        if now != 0.0:
+            if flank and now != flank:
+                twist = now * (run["plant.theta_m"] / task.nominal.i - run["plant.theta_l"])
+                return run.time[begin : n + 1] - run.time[begin], twist[begin : n + 1] + task.alpha
+            flank, begin = now, n
+    return np.zeros(0), np.zeros(0)
+
+
+def _best(task: ControlTask, impact_speed: float) -> Traversal:
+    inertia = task.nominal.J_m * task.nominal.i
+    return plan((-task.alpha, 0.0, 0.0), task.alpha, impact_speed, task.torque_limit, task.tau, inertia)

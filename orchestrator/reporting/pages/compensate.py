@@ -1,0 +1,64 @@
+"""The page of ``compensate``: time against impact of every traversal, and one of each law beside the bound."""
+
+from statistics import median
+
+from orchestrator.reporting.model import Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.source import ResultDocument
+from orchestrator.shared.results import read
+from orchestrator.shared.results.compensate import CompensateFound
+
+
+def build(source: ResultDocument) -> Report:
+    """Return the page."""
+    results = read(source.results, CompensateFound)
+    bound = Series("bound", results.bound_times, results.bound_speeds)
+    clouds = tuple(Series(law.law, law.times, law.impacts, "points") for law in results.laws if law.times)
+    paths = tuple(Series(law.law, law.path_times, law.path) for law in results.laws if law.path)
+    quickest = Series("bound", results.path_times, results.path)
+    last = results.laws[-1]
+    time = f"takes {median(last.times):.3f} s" if last.times else "is not made"
+    return Report(
+        title="Laws across the gap",
+        summary=(
+            f"A traversal of the {last.law} {time}; none that lands at {results.impact_speed:g} rad/s takes less than "
+            f"{results.bound:.4f} s. Its largest impact is {last.impact:.3g} rad/s, that of the {results.laws[0].law} "
+            f"{results.laws[0].impact:.3g} rad/s."
+        ),
+        sections=(
+            _table(results),
+            Plot("Traversals", "time [s]", "impact [rad/s]", (bound, *clouds), log_x=True, log_y=True),
+            Plot(
+                "The first traversal of each law",
+                "time [s]",
+                "twist from the flank that is left [rad]",
+                (quickest, *paths),
+            ),
+        ),
+        origin=source.origin(),
+        downloads=source.downloads(),
+    )
+
+
+def _table(results: CompensateFound) -> ReportTable:
+    columns = (
+        TableColumn("law"),
+        TableColumn("traversal", "s", 3),
+        TableColumn("its impact", "rad/s", 3),
+        TableColumn("largest impact", "rad/s", 3),
+        TableColumn("rms error", "rad", 3),
+        TableColumn("rest, peak to peak", "counts", 3),
+        TableColumn("contacts at rest", "1/s", 3),
+    )
+    rows = tuple(
+        (
+            law.law,
+            median(law.times) if law.times else None,
+            median(law.impacts) if law.impacts else None,
+            law.impact,
+            law.error,
+            law.rest,
+            law.contacts,
+        )
+        for law in results.laws
+    )
+    return ReportTable("Medians over plants", columns, rows)
