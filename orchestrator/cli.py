@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from orchestrator.commands._completion import add_completion_argument
 from orchestrator.commands._outcome import exit_code
 from orchestrator.commands._parser import Parser, flags_of
 from orchestrator.commands._progress_lines import add_progress_argument, choose_progress
@@ -31,16 +32,20 @@ COMMANDS = {
 }
 
 
-def build_parser(command: str | None) -> argparse.ArgumentParser:
-    """Return the parser; only the module of ``command`` is imported, so that start-up stays quick."""
+def build_parser(command: str | None, every: bool = False) -> argparse.ArgumentParser:
+    """Return the parser.
+
+    Only the module of ``command`` is imported, so that start-up stays quick; with ``every``, those of all commands.
+    """
     called = Path(sys.argv[0]).name  # the module itself when run by `python -m`
-    program = called if called == PROGRAM else "python -m orchestrator"
+    program = PROGRAM if every or called == PROGRAM else "python -m orchestrator"
     parser = Parser(prog=program, description=importlib.import_module("orchestrator").__doc__)
     parser.add_argument("--version", action="version", version=__version__)
+    add_completion_argument(parser, lambda: build_parser(None, every=True))
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, summary in COMMANDS.items():
         sub = subparsers.add_parser(name, help=summary, description=summary)
-        if name != command:
+        if name != command and not every:
             continue
         module = importlib.import_module(f"orchestrator.commands.{name}")
         module.add_arguments(sub)
