@@ -241,3 +241,37 @@ def test_rooms_keep_their_private_names():
 def test_no_test_reads_a_place_of_one_machine():
     named = re.compile(r"""Path\(f?["']/(home|root|srv|Users|work)\b""")
     assert [path for path in (ROOT / "tests").rglob("*.py") if named.search(path.read_text(encoding="utf-8"))] == []
+
+
+def headers_in_use(folder):
+    """Of each C header, the others whose functions, types and macros it uses."""
+    texts = {path.name: re.sub(r"/\*.*?\*/", " ", path.read_text(), flags=re.DOTALL) for path in folder.glob("*.h")}
+    defined = {}
+    made = r"^(?:static (?:inline )?[\w ]+[ *]+(\w+)\([^;{]*\)\s*\{|#define (\w+)|\} (\w+);)"
+    for name, text in texts.items():
+        for match in re.finditer(made, text, re.MULTILINE):
+            defined.setdefault(next(filter(None, match.groups())), set()).add(name)
+    owners = {word: next(iter(names)) for word, names in defined.items() if len(names) == 1}
+    return {
+        name: {owners[word] for word in re.findall(r"\b[A-Za-z_]\w*", text) if owners.get(word, name) != name}
+        for name, text in texts.items()
+    }
+
+
+def circle_in(uses):
+    """The names of a circle, else nothing: what uses nothing that is left is taken away until all is."""
+    left = dict(uses)
+    while free := [name for name in left if not left[name] & set(left) - {name}]:
+        left = {name: used for name, used in left.items() if name not in free}
+    return sorted(left)
+
+
+def test_headers_of_native_fmus_use_one_another_one_way(tmp_path):
+    uses = headers_in_use(ROOT / "orchestrator" / "building" / "native_fmu")
+    assert "slave_core.h" in uses["fmi3_modes.h"]
+    assert "fmi3_clock.h" in uses["fmi3_steps.h"]
+    assert circle_in(uses) == []
+    (tmp_path / "a.h").write_text("static int f(int x)\n{\n    return g(x);\n}\n")
+    (tmp_path / "b.h").write_text("static int g(int x)\n{\n    return f(x);\n}\n")
+    (tmp_path / "c.h").write_text("static int h(int x)\n{\n    return f(x);\n}\n")
+    assert circle_in(headers_in_use(tmp_path)) == ["a.h", "b.h", "c.h"]

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from orchestrator.building.arrays import arrays
-from orchestrator.building.fmi3_description import INDICATOR, is_sampled
+from orchestrator.building.fmi3_description import INDICATOR
 from orchestrator.building.sources import Recipe
 from orchestrator.building.starts import default_starts
 from orchestrator.building.translation.slave import has_states, translate_slave
@@ -23,7 +23,15 @@ RUNTIME = Path(__file__).parent / "native_fmu"
 HEADERS = ("translated.h", "pairs.h", "slave_types.h", "slave_core.h", "slave_states.h", "slave_exchange.h")
 _OF_VERSION = {
     2: ("fmi2_types.h", "fmi2_slave.h", "fmi2_model_exchange.h"),
-    3: ("fmi3_types.h", "fmi3_slave.h", "fmi3_clock.h", "fmi3_steps.h", "fmi3_updates.h", "fmi3_absent.h"),
+    3: (
+        "fmi3_types.h",
+        "fmi3_modes.h",
+        "fmi3_slave.h",
+        "fmi3_clock.h",
+        "fmi3_steps.h",
+        "fmi3_updates.h",
+        "fmi3_absent.h",
+    ),
 }
 OF_FMI3 = (*HEADERS, *_OF_VERSION[3])
 _FILE = """/* {name}: {title}
@@ -126,8 +134,6 @@ def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, by
 def _is_needed(header: str, cls: Any, types: str) -> bool:
     if header in ("slave_exchange.h", "fmi2_model_exchange.h", "fmi3_updates.h"):
         return has_states(cls)
-    if header == "fmi3_clock.h":
-        return is_sampled(cls)
     return header != "pairs.h" or '"pairs.h"' in types
 
 

@@ -1,5 +1,7 @@
 /* Calls of FMI 3.0 that these FMUs must have and do not support; a part of fmi3_slave.h. */
 
+#include "fmi3_modes.h"
+
 #define UNSUPPORTED(call, parameters) \
     EXPORT Status FMI(call) parameters \
     { \

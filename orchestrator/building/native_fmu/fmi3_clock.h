@@ -3,11 +3,14 @@
  * In event mode the host ticks it. A tick takes the sample: outputs that are read in that instant follow inputs that are
  * set in it, and the end of the instant moves the hidden state on towards the next tick. Without event mode the slave
  * samples by itself, as in FMI 2.0. The interval is the value of `sample_time`. */
+#ifndef FMI3_CLOCK_H
+#define FMI3_CLOCK_H
 
+#include "fmi3_modes.h"
+
+#ifdef SAMPLE_TIME
 #define CLOCK (VARIABLES + 1) /* value reference */
 #define INTERVAL(s) ((s)->slave.real[SAMPLE_TIME])
-
-static bool in_mode(Instance *s, bool event_mode);
 
 static double told_interval(const Instance *s)
 {
@@ -160,3 +163,12 @@ EXPORT Status FMI(fmi3SetShiftDecimal)(Component c, const Reference r[], size_t 
             say(s, ERROR, "the shift of the clock `sample` must be finite and not negative, but is %r s", v[k]);
     return s->worst;
 }
+#else /* a slave without a clock */
+#define misses_tick(s, time, sign) false
+#define agrees_with_clock(s) true
+#define await_first_tick(s) ((void)0)
+#define may_set_clocked(s, r, n) true
+#define end_tick(s) ((void)0)
+#endif
+
+#endif

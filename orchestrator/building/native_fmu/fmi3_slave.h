@@ -2,28 +2,14 @@
  * values there are at each value reference, 0 for the elements of an array behind its first; and `scalars`: for each that
  * is a single Float64 READABLE unless it is a local variable, and IS_INPUT or IS_PARAMETER. */
 
-#include "fmi3_types.h"
-#include "slave_core.h"
+#include "fmi3_absent.h"
+#include "fmi3_clock.h"
+#include "fmi3_modes.h"
+#include "fmi3_steps.h"
 
 enum { READABLE = 1, IS_INPUT = 2, IS_PARAMETER = 4 };
 
 #define TIME VARIABLES /* value reference of the independent variable */
-
-static void deliver(const Instance *s, Status status, const char *category, const char *text)
-{
-    if (s->host.log)
-        s->host.log(s->host.environment, status, category, text);
-}
-
-#ifdef SAMPLE_TIME
-#include "fmi3_clock.h"
-#else
-#define misses_tick(s, time, sign) false
-#define agrees_with_clock(s) true
-#define await_first_tick(s) ((void)0)
-#define may_set_clocked(s, r, n) true
-#define end_tick(s) ((void)0)
-#endif
 
 /* --- Instances ------------------------------------------------------------------------------------------------------- */
 
@@ -140,16 +126,6 @@ static bool fit(Instance *s, const Reference r[], size_t n, size_t total, ValueT
     if (needed != total)
         say(s, ERROR, "nValues of %s must be %i, but is %i", s->function, (int64_t)needed, (int64_t)total);
     return needed == total;
-}
-
-static bool bring_up_to_date(Instance *s)
-{
-    Fault fault;
-    fault.kind = NO_FAULT;
-    recompute(s, &fault);
-    if (fault.kind)
-        say_fault(s, &fault);
-    return !fault.kind;
 }
 
 static Status get_reals(Instance *s, const Reference r[], size_t n, double v[], size_t total)
@@ -302,6 +278,3 @@ EXPORT Status FMI(fmi3GetDirectionalDerivative)(Component c, const Reference unk
     return directional_derivative(s, unknown, n, known, m, seed, sensitivity);
 }
 #endif
-
-#include "fmi3_steps.h"
-#include "fmi3_absent.h"

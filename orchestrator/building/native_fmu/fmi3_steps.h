@@ -1,25 +1,10 @@
 /* Steps, events and model exchange of FMI 3.0; a part of fmi3_slave.h. */
 
+#include "fmi3_clock.h"
+#include "fmi3_modes.h"
 #ifdef CONTINUOUS_STATES
-#include "slave_exchange.h"
+#include "fmi3_updates.h"
 #endif
-
-/* Tell whether an instance is in event mode, or in step or continuous-time mode; say so if it is not. */
-static bool in_mode(Instance *s, bool event_mode)
-{
-    if (s->course.phase != STEPPING)
-        say(s, ERROR, "%s must not be called %s", s->function, mode_name(s));
-    else if (!s->course.in_event_mode == event_mode)
-        say(s, ERROR, "%s must %sbe called in event mode", s->function, event_mode ? "" : "not ");
-    return s->worst == OK;
-}
-
-static bool is_type(Instance *s, Type type)
-{
-    if (s->course.type != (int32_t)type)
-        say(s, ERROR, "%s must not be called in %s", s->function, type == CO_SIMULATION ? "model exchange" : "co-simulation");
-    return s->worst == OK;
-}
 
 EXPORT Status FMI(fmi3EnterEventMode)(Component c)
 {
@@ -68,32 +53,6 @@ EXPORT Status FMI(fmi3EnterContinuousTimeMode)(Component c)
 }
 
 /* --- Steps ------------------------------------------------------------------------------------------------------------- */
-
-#ifdef CONTINUOUS_STATES
-static bool takes_events(const Instance *s) { return s->host.events && s->host.early_return; }
-#endif
-
-/* Advance over a piece of a step, or to the first event in it where the host takes events; return how far. */
-static double advance_piece(Instance *s, double time, double step, Fault *fault)
-{
-#ifdef CONTINUOUS_STATES
-    if (takes_events(s)) {
-        const double taken = slave_advance_to_event(&s->slave, time, step, fault);
-        s->course.event_due = !fault->kind && HAS_EVENT(&s->slave);
-        return taken;
-    }
-#endif
-#ifdef SAMPLE_TIME
-    if (s->host.events)
-        return step;
-#endif
-    advance_slave(s, time, step, fault);
-    return step;
-}
-
-#ifdef CONTINUOUS_STATES
-#include "fmi3_updates.h"
-#endif
 
 EXPORT Status FMI(fmi3DoStep)(Component c, double time, double step, bool no_return, bool *event, bool *end,
                               bool *early_return, double *reached)

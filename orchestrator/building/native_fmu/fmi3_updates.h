@@ -5,6 +5,8 @@
  * is of order four in the step. At the end of each half the host may read, and ask to return. A slave that follows its
  * inputs (FOLLOWS_INPUTS: slave_take_node, slave_advance_along) is given the three values instead. */
 
+#include "fmi3_modes.h"
+
 /* Ask the host for inputs at a time, or let it read; return whether it wants to return there. */
 static bool call_host(Instance *s, double time, bool set)
 {

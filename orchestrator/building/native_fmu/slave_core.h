@@ -419,15 +419,15 @@ static bool settable(const Instance *s, Reference r)
 }
 
 /* Tell whether a variable of that type can be set now; say so if it cannot. */
-static bool may_set(Instance *s, Reference r, bool is_type)
+static bool may_set(Instance *s, Reference r, bool of_type)
 {
     static const char *const causalities[] = {"is an input, read-only", "is an FMU output, read-only",
                                               "is an FMU parameter, read-only", "is an FMU local, read-only"};
     char text[64];
-    if (is_type && settable(s, r))
+    if (of_type && settable(s, r))
         return true;
     say(s, ERROR, "%s must not set %s, which %s %s", s->function, name_of(r, text),
-        is_type ? causalities[variables[r].causality] : "has another type", mode_name(s));
+        of_type ? causalities[variables[r].causality] : "has another type", mode_name(s));
     return false;
 }
 
