@@ -82,9 +82,9 @@ FORMS: dict[str, CommandForm] = {
         },
     ),
     "calibrate": CommandForm((1, 1), {"fmu": _file, "map": _file}),
-    "check": CommandForm((1, MOST_INPUTS), {"static": _flag}),
-    "simulate": CommandForm((0, 0), {"scenario": _file}),
-    "ssp": CommandForm((1, 1), {}, ("run",)),
+    "check": CommandForm((1, MOST_INPUTS), {"static": _flag, "time_limit": _number}),
+    "simulate": CommandForm((0, 0), {"scenario": _file, "time_limit": _number}),
+    "ssp": CommandForm((1, 1), {"time_limit": _number}, ("run",)),
 }  # fmt: skip
 
 

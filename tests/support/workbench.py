@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,12 +78,13 @@ class Served:
 
 
 @contextmanager
-def workbench(folder: Path, *words: str) -> Iterator[Served]:
-    """Serve a directory; the server ends with the ``with`` statement."""
+def workbench(folder: Path, *words: str, environment: Mapping[str, str] | None = None) -> Iterator[Served]:
+    """Serve a directory; the server ends with the ``with`` statement. ``environment``: further variables."""
     command = [sys.executable, "-m", "orchestrator", "workbench", "--no-browser", "--out", str(folder), *words]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    variables = {**os.environ, **(environment or {}), "PYTHONPATH": paths}
     process = subprocess.Popen(
-        command, cwd=folder.parent, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command, cwd=folder.parent, env=variables, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     try:
         assert process.stdout is not None

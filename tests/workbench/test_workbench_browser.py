@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from orchestrator.building.build import ensure_built
+from orchestrator.scenarios.scenario import load_scenario
 from tests.support.browser import browser, missing, set_screen
 from tests.support.workbench import HANGS, Served, drive_log, workbench
 
@@ -128,6 +130,40 @@ def test_a_diagnosis_is_stopped_from_the_page(inspected: Any, served: Served) ->
     wait(inspected, lambda d: "stopped" in d.find_element("id", "panel-diagnosis").text)
     job = served.job("diagnose-1")
     assert (job["state"], job["exit_code"]) == ("stopped", 130)
+
+
+def test_outputs_are_dragged_to_inputs_of_the_same_quantity(inspected: Any, served: Served) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    choose_tab(inspected, "fmus")
+    fmus = ensure_built()
+    for name in ("Drivetrain", "KalmanEstimator"):
+        file = find(inspected, "#panel-fmus input[type=file]")
+        file.send_keys(str(fmus[name]))
+        wait(inspected, lambda d, name=name: f"{name}.fmu is here" in d.find_element("id", "panel-fmus").text)
+        wait(inspected, lambda d, n=name: find(d, "#panel-fmus select").get_attribute("value") == f"files/{n}.fmu")
+        press(inspected, "Add it to the scenario")
+        find(inspected, f"[data-port^='{name.lower()}.']")
+    set_screen(inspected, 1280, 3000, "light")
+
+    def drag(first: str, second: str) -> None:
+        ends = [find(inspected, f"[data-port='{name}'] circle") for name in (first, second)]
+        ActionChains(inspected).click_and_hold(ends[0]).move_to_element(ends[1]).release().perform()
+
+    drag("drivetrain.theta_m", "kalmanestimator.theta_m")
+    wait(inspected, lambda d: "drivetrain.theta_m → kalmanestimator.theta_m" in d.find_element("id", "panel-fmus").text)
+    drag("drivetrain.omega_m", "kalmanestimator.u")
+    wait(inspected, lambda d: "do not measure the same" in d.find_element("id", "panel-fmus").text)
+    press(inspected, "Write it as TOML")
+    written = served.folder / "files" / "scenario.toml"
+    wait(inspected, lambda d: written.exists() and "scenario.toml" in d.find_element("id", "panel-fmus").text)
+    scenario = load_scenario(written)
+    assert [str(one.source) for one in scenario.system.connections] == ["drivetrain.theta_m"]
+    press(inspected, "Run the scenario")
+    find(inspected, "#panel-fmus iframe")
+    assert served.job("simulate-1")["state"] == "done"
+    assert severe(inspected) == []
+    set_screen(inspected, 1280, 900, "light")
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (390, "light"), (1280, "dark")])

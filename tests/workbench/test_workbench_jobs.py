@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.shared.isolation.walls import support
 from tests.support.broken_archives import ARCHIVES
 from tests.support.c_fmu import have_compiler
 from tests.support.engine_process import children, wait_until_gone
+from tests.support.hostile_fmus import World
 from tests.support.workbench import HANGS, drive_log, workbench
 
 pytest.importorskip("starlette")
@@ -98,6 +100,33 @@ def test_damaged_archives_are_told_and_contained(served, tmp_path: Path) -> None
         rules = {rule for _, rule, _ in ARCHIVES[first : first + 20]}
         assert rules <= set(re.findall(r"archive\.[a-z-]+", json.dumps(found)))
     assert not Path("/tmp/outside.txt").exists()
+
+
+HOSTILE = [
+    ("step", "segv"),
+    ("step", "hang"),
+    ("step", "kill_parent"),
+    ("step", "write"),
+    ("load", "exit"),
+    ("step", "fifo"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not have_compiler() or bool(support().not_enforced), reason="no C compiler, or no walls")
+def test_hostile_fmus_are_contained(tmp_path: Path) -> None:
+    world = World(tmp_path / "world")
+    try:
+        with workbench(world.folder / "session", environment=world.environment()) as served:
+            inputs = [served.upload(world.fmu(*does), f"{'-'.join(does)}.fmu") for does in HOSTILE]
+            for reference in inputs:  # the tree of variables loads nothing of an FMU
+                assert served.ask("GET", f"variables?file={reference}")[0] == 200
+            job = served.wait(served.start("check", inputs, time_limit=3))
+            assert (job["state"], job["exit_code"]) == ("done", 1)
+            assert served.ask("GET", "state")[0] == 200
+        assert world.harm() == []
+    finally:
+        world.close()
 
 
 @pytest.mark.slow

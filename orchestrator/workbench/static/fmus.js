@@ -230,14 +230,16 @@ export function build(panel) {
     return made;
   }
 
+  const limit = make("input", { class: "number", inputmode: "decimal", placeholder: "the usual one" });
+  const limited = () => ({ time_limit: limit.value.trim() === "" ? null : Number(limit.value.replace(",", ".")) });
   const written = make("p", { class: "note", role: "status" });
   panel.append(
     dropZone("Drop FMUs, SSP files or tables here", (file) => (isFmu(file) ? pick(file) : undefined), true),
-    make("div", { class: "row" }, fileChoice("FMU or SSP file", isFmu, () => fmu, pick)),
+    make("div", { class: "row" }, fileChoice("FMU or SSP file", isFmu, () => fmu, pick), field("Time limit [s]", limit)),
     said.element,
     make("div", { class: "row" },
-      action("Check this FMU", said, async () => { if (!fmu) throw new Error("choose an FMU first"); view.show(await start("check", [fmu])); }),
-      action("Run this SSP file", said, async () => { if (!/\.ssp$/i.test(fmu)) throw new Error("choose an SSP file first"); view.show(await start("ssp", [fmu])); }),
+      action("Check this FMU", said, async () => { if (!fmu) throw new Error("choose an FMU first"); view.show(await start("check", [fmu], limited())); }),
+      action("Run this SSP file", said, async () => { if (!/\.ssp$/i.test(fmu)) throw new Error("choose an SSP file first"); view.show(await start("ssp", [fmu], limited())); }),
       action("Add it to the scenario", said, add, "main")),
     tree, make("h2", {}, "Scenario"), make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Graph of the scenario" }, graph.svg), graphSaid.element, editor,
     make("div", { class: "row" },
@@ -248,7 +250,7 @@ export function build(panel) {
       action("Run the scenario", said, async () => {
         const made = await write();
         fill(written, "Written: ", make("a", { href: fileAddress(made.file), download: made.name }, made.name));
-        view.show(await start("simulate", [], { scenario: made.file }));
+        view.show(await start("simulate", [], { scenario: made.file, ...limited() }));
       }, "main")),
     written, view.element);
   draw();

@@ -60,7 +60,7 @@ export function build(panel, go) {
         make("td", {}, tag, make("br"), make("span", { class: "note" }, one.said.replace(/^[^:]*: (?:[^;]*; )?(?=.)/, ""))));
     }
 
-    const table = (rows) => make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Parameters" }, make("table", { class: "stack" },
+    const table = (rows, name) => make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": name }, make("table", { class: "stack" },
       make("thead", {}, make("tr", {}, ["parameter", "value", "off by at most", "where it is from"].map((text) => make("th", { scope: "col" }, text)))),
       make("tbody", {}, rows.map(row))));
     const encoderFields = ["theta_m", "theta_l"].map((name) => make("div", { class: "card" }, make("h3", {}, name === "theta_m" ? "Motor encoder" : "Load encoder"),
@@ -80,8 +80,8 @@ export function build(panel, go) {
       make("p", { class: "note" }, choices.model
         ? ["Model file: ", make("a", { href: fileAddress(choices.model), download: choices.model.split("/").at(-1) }, choices.model)].map((part) => part)
         : "No model file is chosen: these are the values of the default machine, each known to 5 %."),
-      table([...main, ...rest.filter((one) => named.has(one.name))]),
-      make("details", {}, make("summary", {}, `What the machine may have besides (${rest.filter((one) => !named.has(one.name)).length} values)`), table(rest.filter((one) => !named.has(one.name)))),
+      table([...main, ...rest.filter((one) => named.has(one.name))], "Parameters"),
+      make("details", {}, make("summary", {}, `What the machine may have besides (${rest.filter((one) => !named.has(one.name)).length} values)`), table(rest.filter((one) => !named.has(one.name)), "Further parameters")),
       make("details", {}, make("summary", {}, "Encoders"), make("div", { class: "cards" }, encoderFields)),
       make("details", {}, make("summary", {}, "Columns that it reads a log by"), Object.keys(model.columns).length
         ? make("dl", { class: "facts" }, Object.entries(model.columns).map(([name, entry]) => make("div", {}, make("dt", {}, name), make("dd", {}, Object.entries(entry).map(([key, text]) => `${key} = ${text}`).join(", ")))))

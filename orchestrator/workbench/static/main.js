@@ -29,6 +29,7 @@ for (const [name, title, part] of TABS) {
   tabs.append(make("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, onclick: () => go(name) }, title));
   const panel = make("section", { role: "tabpanel", id: `panel-${name}`, "aria-labelledby": `tab-${name}` });
   panels.append(panel);
+  panel.append(make("h2", { class: "visually-hidden" }, title));
   part.build(panel, go);
 }
 

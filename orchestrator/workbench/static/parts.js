@@ -137,6 +137,7 @@ export function action(text, said, act, kind = "") {
 }
 
 export async function resultOf(job) {
+  if (!job.files.includes(`${job.command}.json`)) return null;
   const response = await fetch(fileAddress(`results/${job.name}/${job.command}.json`));
   return response.ok ? (await response.json()).results : null;
 }
