@@ -199,6 +199,8 @@ _TABLE = """
 2 3 | CS | own_sampled       | steps.internal | step=0.02
 2 3 | CS | own_slow          | steps.internal | step=0.02
 2 3 | CS | own_behind        | steps.internal | step=0.015
+2 3 | CS | own_drift         | steps.internal | step=0.015
+2 3 | CS | own_round         | steps.internal | step=0.015
 2 3 | CS | time_runs         | steps.time
 """  # noqa: E501
 _SHORT = {

@@ -17,6 +17,9 @@ _MULTIPLE = 0.02  # of an inner step: nearer to a multiple is one
 _STEP_TOLERANCE = 0.1
 _FEWEST_PAIRS = 10
 _TIME = 1e-3  # of a communication step
+_NEAR = 0.01  # of the range of an output
+_FEWEST_EQUAL = 4  # points at which an output must be equal, bit for bit
+_RATIOS = [(p, q) for q in (1, 2, 3) for p in range(1, 17) if math.gcd(p, q) == 1]
 
 
 def own_time(context: Context) -> None:
@@ -47,8 +50,13 @@ def inner_steps(context: Context) -> None:
     outputs = [v for v in job.outputs() if v.real and v.size == 1 and not v.clocks and v.variability == "continuous"]
     if not outputs or context.trace is None:
         raise SkippedError("the FMU has no continuous outputs, or runs cannot be repeated")
-    period, error = _inner_step(context, outputs) or (0.0, 0.0)
+    fine = _rows(context, outputs, job.step / _FINE, min(_LENGTH, job.steps) * _FINE)
+    usual = _rows(context, outputs, job.step, job.steps)
+    period, error = _period(fine, job.step / _FINE) or _period(usual, job.step) or (0.0, 0.0)
     if not period:
+        if not _report_count(context, outputs, (usual, fine), job.step, _FINE):
+            double = _rows(context, outputs, 2.0 * job.step, job.steps // 2)
+            _report_count(context, outputs, (double, usual), 2.0 * job.step, 2)
         return
     fewest, most = job.step / (period + error) - _MULTIPLE, job.step / (period - error) + _MULTIPLE
     if math.floor(most) < max(math.ceil(fewest), 1):
@@ -58,16 +66,44 @@ def inner_steps(context: Context) -> None:
         context.report("steps.internal", f"{text}, at which all continuous outputs change")
 
 
-def _inner_step(context: Context, outputs: list[ProbedVariable]) -> tuple[float, float] | None:
-    """The period at which all continuous outputs change and between which none does, and its error [s], or None."""
-    job = context.bench.job
-    length = min(_LENGTH, job.steps)
-    for parts, steps in ((_FINE, length * _FINE), (1, job.steps)):
-        rows = _rows(context, outputs, job.step / parts, steps)
-        period = _period(rows, job.step / parts)
-        if period is not None:
-            return period
-    return None
+def _report_count(
+    context: Context, outputs: Sequence[ProbedVariable], rows: tuple[list[list[Any]], ...], size: float, parts: int
+) -> bool:
+    """Report an output that goes by the number of steps, whatever their size, and one that stands in short ones.
+
+    Args:
+        rows: outputs in long and in short steps, from the same start.
+        size: of a long step [s].
+        parts: how many short steps are as long as a long one.
+
+    Returns:
+        Whether one was reported.
+    """
+    for i, v in enumerate(outputs):
+        a, b = ([row[i] for row in found] for found in rows)
+        if len(set(a[:_FEWEST_EQUAL])) < _FEWEST_EQUAL or len(b) < parts or _keep_time(a, b, parts):
+            continue
+        if context.bench.job.varies and len(set(b)) == 1:
+            text = (
+                f"`{v.name}` must follow the size of communication steps, but stands in steps of {size / parts:.3g} s"
+            )
+            context.report("steps.internal", f"{text}, and moves in those of {size:.3g} s", v.name)
+            return True
+        for p, q in _RATIOS:
+            pairs = [(a[q * n - 1], b[p * n - 1]) for n in range(1, min(len(a) // q, len(b) // p) + 1)]
+            if p != q * parts and len(pairs) >= _FEWEST_EQUAL and all(x == y for x, y in pairs):
+                sizes = f"{q} of {size:.3g} s do what {p} of {size / parts:.3g} s do"
+                text = f"`{v.name}` must follow the size of communication steps, but goes by their number: {sizes}"
+                context.report("steps.internal", text, v.name)
+                return True
+    return False
+
+
+def _keep_time(a: Sequence[float], b: Sequence[float], parts: int) -> bool:
+    """Whether values in long and in short steps are near each other at the same times."""
+    pairs = list(zip(a, b[parts - 1 :: parts], strict=False))
+    size = max(max(x for x, _ in pairs) - min(x for x, _ in pairs), 1e-300)
+    return all(abs(x - y) <= _NEAR * size for x, y in pairs)
 
 
 def _rows(context: Context, outputs: list[ProbedVariable], size: float, steps: int) -> list[list[Any]]:
