@@ -12,12 +12,14 @@ class Process:
     Attributes:
         jail: the present one; it must be closed by ``close``.
         left: whether a process outlived one of those before.
+        most: seconds that a call may take; None: as the limits say.
     """
 
     def __init__(self, start: Callable[[], Jail]) -> None:
         self._start = start
         self.jail = start()
         self.left = False
+        self.most: float | None = None
 
     def __enter__(self) -> "Process":
         return self
@@ -27,7 +29,7 @@ class Process:
 
     def call(self, request: Any) -> Any:
         """Return what ``checking.host.Host`` returns."""
-        return self.jail.call(request)
+        return self.jail.call(request, self.most)
 
     def resident(self) -> int:
         """Resident memory of the child in bytes; 0 where the system does not tell."""

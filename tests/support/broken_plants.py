@@ -36,6 +36,15 @@ _TABLE = """
 2 3 | CS | output_stale      | value.stale
 2 3 | CS | dead_parameter    | dependency.superfluous
 2 3 | CS | dead_input        | dependency.superfluous
+2 3 | CS | single            | value.kept
+2 3 | CS | saturated         | value.lags
+2 3 | CS | late_only         | value.kept
+2 3 | CS | once_set          | value.lags
+2 3 | CS | shared_value      | instances.interference
+2 3 | CS | next_to           | value.kept
+2 3 | CS | truth_sticks      | value.lags
+2 3 | CS | inputs_cleared    | value.kept
+2 3 | CS | start_blended     | value.kept
 
 [reset after nothing was changed]
 2 3 | CS | keep_parameter    | run.reset
@@ -55,6 +64,9 @@ _TABLE = """
 3   | CS | keep_size         | run.reset
 3   | CS | keep_ticks        | run.reset | clock=decimal
 2 3 | CS | keep_start        | run.reset
+2 3 | CS | reset_once        | run.reset
+2 3 | CS | keep_speed        | run.reset
+2 3 | ME | keep_when_switched | run.reset
 
 [state restored, not looked at]
 2 3 | CS | restored_output   | state.restore
@@ -73,6 +85,10 @@ _TABLE = """
 2 3 | CS | bytes_text        | state.serialise
 2 3 | CS | bytes_whole       | state.serialise
 2 3 | CS | bytes_parameter   | state.serialise
+2 3 | CS | clear_inputs      | state.restore
+2 3 | ME | lose_speed        | state.restore
+2 3 | CS | add_count         | state.restore
+2 3 | CS | start_anew        | state.restore
 
 [dependencies declared, never perturbed]
 2 3 | CS | -                 | dependency.missing | Output y=x
@@ -93,6 +109,9 @@ _TABLE = """
 2 3 | ME | -                 | dependency.kind    | Output kinds z=constant dependent
 2 3 | ME | -                 | dependency.kind    | Derivative kinds der(v)=constant dependent dependent fixed dependent dependent
 2 3 | ME | -                 | dependency.kind    | Derivative kinds der(v)=constant constant dependent dependent dependent dependent
+2 3 | ME | feeds_at_times    | dependency.missing
+2 3 | CS | feeds_switched    | dependency.missing
+2 3 | ME | rate_of_integral  | dependency.missing
 
 [derivatives]
 2 3 | ME | at_start          | derivative.value | directional
@@ -127,6 +146,8 @@ _TABLE = """
 2 3 | ME | event_jump        | event.states-changed
 2 3 | ME | -                 | event.reinit    | attributes v=start="0" nominal="2"
 2 3 | CS ME | interfaces     | interfaces.differ
+2 3 | ME | small_ignored     | states.order
+2 3 | ME | rates_late        | states.rates
 
 [promised, never called]
 2   | CS | interpolation_refused | promise.refused | step flags=canInterpolateInputs="true"
@@ -163,6 +184,7 @@ _TABLE = """
 3   | ME | binary_later      | value.binary-size
 2 3 | CS | text_latin        | value.text
 2 3 | CS | text_later        | value.text
+2 3 | CS | truth_minus       | value.boolean
 
 [life cycle]
 2 3 | CS | ended_get         | ended.get

@@ -30,7 +30,7 @@ typedef struct {
 typedef struct {
     State s;
     int phase, exchange, logging, events, held, tick, before;
-    double shown[2], dead, dead_w, param, tuned;
+    double shown[2], dead, dead_w, param, tuned, last[3];
     int dead_b;
     char text[64];
     void *environment, *log;
@@ -41,9 +41,12 @@ static State initial(void) {
     return s;
 }
 
+static double common;
+
 static double force(const Plant *self, const State *s, double x, double v) {
-    double k = IS(dead_parameter) ? 4.0 : s->k, d = IS(interfaces) && !self->exchange ? 3.0 * s->d : s->d, w = IS(dead_input) ? 0.0 : s->w;
-    return s->u + w * x - k * x - d * v - 0.1 * v * v * v + 0.2 * s->sw + 0.1 * s->j + 0.3 * s->on + 0.05 * s->i
+    double k = IS(dead_parameter) ? 4.0 : IS(shared_value) && common != 0.0 ? common : s->k, d = IS(interfaces) && !self->exchange ? 3.0 * s->d : s->d, w = IS(dead_input) ? 0.0 : s->w;
+    double more = IS(rate_of_integral) && s->q > 0.02 ? s->q : 0.0;
+    return more + s->u + w * x - k * x - d * v - 0.1 * v * v * v + 0.2 * s->sw + 0.1 * s->j + 0.3 * s->on + 0.05 * s->i
         + 0.02 * s->m - (s->b ? 0.0 : 0.4);
 }
 
@@ -73,6 +76,8 @@ static bool number(Plant *self, unsigned r, double *out) {
         case DQ: *out = s->u; return true;
         case Y:
             *out = s->x + 0.3 * s->u * s->u;
+            if (IS(feeds_at_times) && s->u > 0.05) *out += 0.4 * s->w;
+            if (IS(feeds_switched) && s->on) *out += 0.4 * s->w;
             if (IS(output_stale) && self->phase == INITIALISATION) {
                 if (!self->held) self->shown[0] = *out;
                 self->held = 1;
@@ -121,6 +126,12 @@ static bool put(Plant *self, unsigned r, double value) {
     if (IS(drop_input) && r == W) return true;
     if (IS(tunable_ignored) && r == D && self->phase == STEP) return true;
     if (IS(rounded) && r == K) value = floor(value);
+    if (IS(single) && r == K) value = (float)value;
+    if (IS(saturated) && r == U) value = fmax(-1.0, fmin(1.0, value));
+    if (IS(late_only) && r == K && self->phase == INSTANTIATED) return true;
+    if (IS(once_set) && r == U && self->s.u != 0.0) return true;
+    if (IS(shared_value) && r == K) common = value;
+    if (IS(next_to) && r == W) self->s.u = value;
     if (IS(negated) && r == V) value = -value;
     *where = value;
     return true;
@@ -140,7 +151,7 @@ static bool put_whole(Plant *self, unsigned r, int value) {
 
 static bool put_truth(Plant *self, unsigned r, int value) {
     bool early = self->phase == INSTANTIATED || self->phase == INITIALISATION;
-    if (r == ON) self->s.on = IS(drop_truth_input) ? self->s.on : value;
+    if (r == ON) self->s.on = IS(drop_truth_input) ? self->s.on : IS(truth_sticks) ? self->s.on || value : value;
     else if (r == B && (early || IS(fixed_truth_accepted))) self->s.b = IS(drop_truth) ? self->s.b : value;
     else return false;
     return true;
@@ -169,7 +180,7 @@ static bool truth(Plant *self, unsigned r, int *out) {
         case B: *out = IS(truth_of_parameter) ? -1 : s->b; return true;
         case ON: *out = s->on; return true;
         case SW:
-            *out = IS(truth_seven) ? 7 * s->sw : IS(truth_bits) ? 2 + s->sw : IS(truth_later) && s->steps > 40 ? 5 : s->sw;
+            *out = IS(truth_minus) ? -s->sw : IS(truth_seven) ? 7 * s->sw : IS(truth_bits) ? 2 + s->sw : IS(truth_later) && s->steps > 40 ? 5 : s->sw;
             if (IS(restored_switch) && self->phase == STEP) *out = self->dead_b;
             return true;
         default: return false;
@@ -236,6 +247,7 @@ static void begin(Plant *self) {
 
 static void reset(Plant *self) {
     State old = self->s;
+    if (IS(reset_once) && self->before++) { self->phase = INSTANTIATED; self->s.time = 0.0; return; }
     begin(self);
     State *s = &self->s;
     if (IS(keep_parameter)) s->k = old.k;
@@ -254,12 +266,16 @@ static void reset(Plant *self) {
     if (IS(keep_array)) memcpy(s->p + 1, old.p + 1, sizeof s->p - sizeof *s->p);
     if (IS(keep_size)) s->n = old.n;
     if (IS(keep_ticks)) s->cc = old.cc;
+    if (IS(keep_speed)) s->v = 0.5 * old.v;
+    if (IS(keep_when_switched) && old.sw) s->k = old.k;
     if (IS(keep_start)) s->x = old.steps ? 0.9 * s->x + 0.1 * old.x : s->x;
 }
 
 static void leave_initialisation(Plant *self) {
     if (IS(start_lost)) self->s.x = 0.3;
     if (IS(parameter_lost)) self->s.k = 4.0;
+    if (IS(inputs_cleared)) self->s.u = 0.0;
+    if (IS(start_blended)) self->s.x = 0.5 * (self->s.x + 0.3);
     self->tuned = self->s.d;
     self->s.start = self->s.time + 1e-300;
     show(self);
@@ -270,6 +286,10 @@ static void restore(Plant *self, const State *saved) {
     self->s = *saved;
     State *s = &self->s;
     if (IS(lose_input)) s->u = now.u;
+    if (IS(clear_inputs)) s->u = s->w = 0.0;
+    if (IS(lose_speed)) s->v = now.v;
+    if (IS(add_count)) s->o = now.o + 1;
+    if (IS(start_anew) && s->steps == 0) { double u = s->u; *s = initial(); s->u = u; }
     if (IS(lose_tunable)) s->d = now.d;
     if (IS(lose_text)) memcpy(s->label, now.label, sizeof s->label);
     if (IS(lose_whole_input)) s->j = now.j;
@@ -323,10 +343,16 @@ static void states(Plant *self, double out[]) {
 }
 static void set_states(Plant *self, const double in[]) {
     bool swap = IS(states_order) || IS(states_order_in);
+    if (IS(small_ignored) && fabs(self->s.v - in[1]) < 0.05) { self->s.x = in[0]; self->s.q = in[2]; return; }
     self->s.x = in[swap]; self->s.v = in[!swap];
     if (!IS(state_not_set)) self->s.q = in[2];
 }
 static void rates(Plant *self, double out[]) {
+    if (IS(rates_late)) {
+        double now[3] = {self->s.v, force(self, &self->s, self->s.x, self->s.v), self->s.u};
+        memcpy(out, self->last, sizeof now); memcpy(self->last, now, sizeof now);
+        return;
+    }
     bool swap = IS(rates_order);
     out[swap] = self->s.v; out[!swap] = force(self, &self->s, self->s.x, self->s.v); out[2] = IS(rate_wrong) ? 2.0 * self->s.u : self->s.u;
 }

@@ -204,7 +204,7 @@ def look(context: Context, variables: list[ProbedVariable], values: list[Any], w
         fault = _fault(v, value)
         if fault is not None:
             complaints.add(v.name)
-            context.report(fault[0], f"`{v.name}` {fault[1]} {when}", v.name)
+            context.report(fault[0], f"`{v.name}` {fault[1]}", v.name, when)
         _string(context, v, value)
 
 

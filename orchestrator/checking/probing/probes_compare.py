@@ -1,8 +1,12 @@
 """Probes that compare two runs: determinism and instances."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.movement import moved
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
 from orchestrator.checking.probing.statuses import StatusError
 
@@ -45,6 +49,28 @@ def _silent_run(context: Context, driver: Driver) -> list[list[Any]]:
     return rows
 
 
+@contextmanager
+def _other_instance(context: Context) -> Iterator[Driver]:
+    """A second instance, with other parameters and start values than the first where the FMU takes them."""
+    bench, movement = context.bench, context.bench.movement
+    others = {v: x for v in movement.values if (x := moved(v, v.start or (), 1)) is not None}
+    with bench.instance(name="second", initialised=False) as other:
+        bench.movement = replace(movement, values=others)
+        try:
+            bench.begin(other)
+        except StatusError:
+            refused = True
+        else:
+            refused = False
+        finally:
+            bench.movement = movement
+        if not refused:
+            yield other
+    if refused:
+        with bench.instance(name="second") as other:
+            yield other
+
+
 def instances(context: Context) -> None:
     """Two instances at once: the one under test must not notice the other."""
     bench, job = context.bench, context.bench.job
@@ -54,7 +80,7 @@ def instances(context: Context) -> None:
         raise SkippedError("canBeInstantiatedOnlyOncePerProcess is true")
     with bench.instance(name="first") as one:
         try:
-            with bench.instance(name="second") as other:
+            with _other_instance(context) as other:
                 rows = []
                 outputs = job.outputs()
                 for n in range(job.steps):

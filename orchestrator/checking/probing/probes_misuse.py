@@ -8,6 +8,7 @@ from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import OK, WARNING, StatusError
 
 _NOT_REFUSED = (OK, WARNING)
+_SOON = 3.0  # s
 
 
 def misuse(context: Context) -> None:
@@ -84,11 +85,17 @@ def _steps(context: Context) -> None:
     bench, job = context.bench, context.bench.job
     name = f"{bench.library.names.prefix}DoStep"
     with bench.instance(initialised=False) as driver:
-        if driver.raw("DoStep", *_step(job.version, job.start, job.step))[0] in _NOT_REFUSED:
+        if _try_step(driver, job.step) in _NOT_REFUSED:
             context.report("misuse.step-before-init", f"{name} must be refused before initialisation, but is not")
     with bench.instance() as driver:
-        if driver.raw("DoStep", *_step(job.version, job.start, -job.step))[0] in _NOT_REFUSED:
+        if _try_step(driver, -job.step) in _NOT_REFUSED:
             context.report("misuse.negative-step", f"{name} must refuse a negative step, but does not")
+
+
+def _try_step(driver: Driver, size: float) -> int:
+    """The status of a step that is to be refused, which takes no time."""
+    with driver.library.limit_calls(_SOON):
+        return driver.raw("DoStep", *_step(driver.job.version, driver.job.start, size))[0]
 
 
 def _step(version: str, t: float, size: float) -> list[tuple[Any, ...]]:

@@ -30,6 +30,7 @@ def values(context: Context) -> None:
         return
     try:
         _kept_between(context, movement)
+        _kept_at_limits(context)
         _follow_inputs(context, movement)
     except StatusError:
         return  # not every FMU takes values at every point; what must be taken has been set before
@@ -98,6 +99,23 @@ def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -
     parameters = {v: x for v, x in wanted.items() if v.causality == "parameter"}
     if followers and parameters and not lost:
         _follow_tunable(context, parameters, later)
+
+
+def _kept_at_limits(context: Context) -> None:
+    """Continuous inputs that are set to their min and max are there; no step is done with them."""
+    bench, job = context.bench, context.bench.job
+    inputs = [v for v in distinct(job.inputs()) if v.variability == "continuous"] if bench.excited else []
+    chosen = [v for v in inputs if v.minimum is not None and v.maximum is not None and v.minimum < v.maximum]
+    if not chosen:
+        return
+    with bench.instance() as driver:
+        for limit in ("minimum", "maximum"):
+            wanted = {v: (float(getattr(v, limit)),) * v.size for v in chosen}
+            for v, x in wanted.items():
+                driver.set([v], x)
+            found = _by_variable(chosen, driver.read(chosen))
+            if _judge(context, wanted, found, f"at their {limit}, between steps", "value.lags"):
+                return
 
 
 def _follow_tunable(
