@@ -200,7 +200,9 @@ class _Watcher:
                 return
             self.stages[self.probe] = ""
             bench = context.bench
-            self.run_seen = InterfaceRun(bench.job, context.quiet, context.trace or [], bench.movement)
+            loses = any(f.rule == "value.kept" for f in self.findings)  # what it began from is not known then
+            driven = [] if loses else context.trace or []
+            self.run_seen = InterfaceRun(bench.job, context.quiet, driven, bench.movement)
 
     def _report_late(self, names: tuple[str, ...]) -> None:
         """Say what the total time did not suffice for."""
