@@ -38,6 +38,19 @@ def test_noise_of_encoders_and_torque_comes_out_white(torque_noise):
     assert np.std(raw[0]) > 5.0 * np.std(inner[0]) or np.std(raw[1]) > 5.0 * np.std(inner[1])
 
 
+def test_the_kept_rows_are_those_of_the_whole_filter():
+    balance = exact_balance()
+    (residuals,) = balance.residuals([ModelPoint.nominal(balance.parameters)])
+    whitening = estimate_whitening(balance, residuals, SETTINGS.fit)
+    spectra = np.fft.rfft(residuals * whitening.taper, whitening.length, axis=1)
+    spectra[:, len(whitening.weights) :] = 0.0
+    weights = np.zeros((spectra.shape[1], 2, 2), dtype=complex)
+    weights[: len(whitening.weights)] = whitening.weights
+    whole = np.fft.irfft((weights @ spectra.T[:, :, None])[:, :, 0].T, whitening.length, axis=1)
+    expected = whole[:, whitening.rows] * whitening.active
+    np.testing.assert_allclose(whitening.apply(residuals), expected.ravel(), rtol=1e-9, atol=1e-9)
+
+
 def test_back_filter_is_the_adjoint_of_the_filter():
     balance = exact_balance()
     (residuals,) = balance.residuals([ModelPoint.nominal(balance.parameters)])

@@ -89,9 +89,9 @@ def fit_model(problem: FitProblem, point: ModelPoint, iterations: int = 0) -> Fi
         point, residual, cost = step
         prior, slopes = problem.prior(point, coordinates)
         damping /= 10.0
-        jacobian = problem.jacobian(point, coordinates, residual)
         if gain < 1e-3 * cost and gain < 0.5:
-            break
+            break  # so near, the derivatives are what they were
+        jacobian = problem.jacobian(point, coordinates, residual)
     return _score(problem, point, coordinates, residual, jacobian, cost)
 
 

@@ -11,6 +11,7 @@ motion.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -32,11 +33,11 @@ class Whitening:
     """Weights of one record's residuals, and the rows that are kept of what they give.
 
     Attributes:
-        weights: (f, channels, channels) lower triangular.
-        rows: (m,) rows that are kept, about independent of each other.
+        weights: (f, channels, channels) lower triangular, at the frequencies of the band, from zero on.
+        rows: (m,) rows that are kept, evenly apart, about independent of each other.
         taper: (n,) how the record fades in and out.
         active: (channels, m) weights of the kept rows.
-        length: of the Fourier transforms.
+        length: of the Fourier transforms, a multiple of how far rows are apart.
     """
 
     weights: Complex
@@ -51,19 +52,21 @@ class Whitening:
         return self.active.size
 
     def apply(self, residuals: Array) -> Array:
-        """Return whitened residuals (channels * m,) of residuals (channels, n)."""
-        return np.asarray((self.series(residuals)[:, self.rows] * self.active).ravel())
+        """Return whitened residuals (channels * m,) of residuals (channels, n).
 
-    def series(self, residuals: Array) -> Array:
-        """Return whitened residuals (channels, n) at every row, of those of the record (channels, n)."""
-        spectra = rfft(residuals * self.taper, self.length, axis=1)
-        weighted = np.stack(
-            [
-                sum(self.weights[:, row, column] * spectra[column] for column in range(row + 1))
-                for row in range(len(residuals))
-            ]
-        )
-        return np.asarray(irfft(weighted, self.length, axis=1)[:, : residuals.shape[1]])
+        What is cut off at the band's end is known by its kept rows: a short transform gives these alone.
+        """
+        spectra = rfft(residuals * self.taper, self.length, axis=1)[:, : len(self.weights)]
+        weighted = np.einsum("fab,bf->af", self.weights, spectra) * self._begin
+        apart = _apart(self.rows)
+        kept = irfft(weighted, self.length // apart, axis=1)[:, : self.rows.size] / apart
+        return np.asarray((kept * self.active).ravel())
+
+    @cached_property
+    def _begin(self) -> Complex:
+        """By what each frequency turns from the record's first row to the first one that is kept."""
+        first = self.rows[0] if self.rows.size else 0
+        return np.asarray(np.exp(2j * np.pi * np.arange(len(self.weights)) * first / self.length))
 
     def back_filter(self, whitened: Array, channel: int) -> Array:
         """Return (n,) the gradient of half the squared whitened residuals by the residuals of a channel.
@@ -74,7 +77,7 @@ class Whitening:
         count = len(self.active)
         spread = np.zeros((count, self.length))
         spread[:, self.rows] = whitened.reshape(count, -1) * self.active
-        spectra = rfft(spread, axis=1)
+        spectra = rfft(spread, axis=1)[:, : len(self.weights)]
         total = sum(spectra[row] * np.conj(self.weights[:, row, channel]) for row in range(channel, count))
         return np.asarray(irfft(total, self.length)[: self.taper.size] * self.taper)
 
@@ -87,18 +90,22 @@ def independent_rows(model: ResidualModel, settings: FitSettings) -> NDArray[np.
     return np.arange(edge, model.size - edge, apart)
 
 
+def _apart(rows: NDArray[np.int64]) -> int:
+    return int(rows[1] - rows[0]) if rows.size > 1 else 1
+
+
 def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
     """Return weights that only cut off each channel at its band's end."""
-    length = next_fast_len(2 * model.size)
+    rows = independent_rows(model, settings)
+    length = _apart(rows) * next_fast_len(-(-2 * model.size // _apart(rows)))
     frequencies = rfftfreq(length, model.step)
+    frequencies = frequencies[frequencies < max(model.cutoffs)]
     count = len(model.cutoffs)
     weights = np.zeros((frequencies.size, count, count), dtype=complex)
     for n, cutoff in enumerate(model.cutoffs):
         weights[:, n, n] = frequencies < cutoff
-    rows = independent_rows(model, settings)
-    apart = float(rows[1] - rows[0]) if rows.size > 1 else 1.0
     # Of a band that ends below the highest one, neighbouring rows repeat each other: they count by what is independent.
-    independent = np.minimum(2.0 * np.array(model.cutoffs) * apart * model.step, 1.0)
+    independent = np.minimum(2.0 * np.array(model.cutoffs) * _apart(rows) * model.step, 1.0)
     return Whitening(weights, rows, _taper(model), model.active[:, rows] * np.sqrt(independent)[:, None], length)
 
 
@@ -115,7 +122,7 @@ def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSett
     measurement, process = _most_likely_levels(model, frequencies, measured, inside, settings)
     if quiet:
         measurement, process = model.noise_sources(frequencies).levels, QUIET * process
-    fine = rfftfreq(plain.length, model.step)
+    fine = rfftfreq(plain.length, model.step)[: len(plain.weights)]
     matrix = spectral_matrix(model, fine, measurement, process)
     within = np.array([fine < cutoff for cutoff in model.cutoffs])
     both = within[:, None, :] & within[None, :, :] | np.eye(len(within), dtype=bool)[:, :, None]
