@@ -32,6 +32,7 @@ class SignalScales:
 
     Attributes:
         step: sample time of the analysis [s].
+        cycle: sample time of the log [s], of the torque's own rows where these are rarer.
         cutoff: highest frequency of the balances [Hz].
         requests: (n,) requested torque [N.m].
         torque: rms of the drive's torque [N.m].
@@ -48,6 +49,7 @@ class SignalScales:
     """
 
     step: float
+    cycle: float
     cutoff: float
     requests: Array
     torque: float

@@ -13,26 +13,40 @@ SAMPLED = Parameter(
 )
 
 
-def longest_time(scales: SignalScales) -> float:
-    """Return the longest time [s] by which a torque can be late and not be taken for its neighbour."""
+CYCLES = 8.0  # of the log by which a drive, or a stamp, may be late: what takes longer is no dead time but dynamics
+FRAME = 0.02  # s: cycle of the slowest servo buses, however fast the log
+
+
+def longest_lag(scales: SignalScales) -> float:
+    """Return the longest time constant [s] of a drive that is not taken for its neighbour."""
     return 1.2 / scales.cutoff
 
 
-def times(scales: SignalScales) -> tuple[float, ...]:
-    """Return times [s] to try of what is late or slow."""
-    top = longest_time(scales)
+def longest_time(scales: SignalScales) -> float:
+    """Return the longest dead time [s]: cycles of the log, and no longer than the motion tells it from dynamics."""
+    return min(max(CYCLES * scales.cycle, FRAME), longest_lag(scales))
+
+
+def times(scales: SignalScales, top: float) -> tuple[float, ...]:
+    """Return times [s] to try of what is late or slow, up to ``top``."""
     return tuple(float(t) for t in np.geomspace(max(0.3 * scales.step, top / 60.0), top, 9))
+
+
+def is_within(time: float, scales: SignalScales, top: float) -> bool:
+    """Tell whether a time [s] is no whim of the rows, and does not stand at its bound ``top``, where it is none."""
+    return bool(max(0.15 * scales.step, scales.torque_raster) < abs(time) < 0.95 * top)
 
 
 EARLY_TORQUE = Effect(
     "early_torque", "log", "timing", {"lead": LEAD.name}, "lead", lambda s: {"lead": 0.3 * s.step},
-    lambda s: {"lead": times(s)}, bounds=lambda s: {"lead": (0.0, longest_time(s))},
-    possible=lambda v, s: v["lead"] > s.torque_raster, measurement=True,
+    lambda s: {"lead": times(s, longest_time(s))}, bounds=lambda s: {"lead": (0.0, longest_time(s))},
+    possible=lambda v, s: is_within(v["lead"], s, longest_time(s)), measurement=True,
 )  # fmt: skip
 LATE_LOAD = Effect(
     "late_load", "log", "timing", {"shift": SHIFT.name}, "shift", lambda s: {"shift": 0.3 * s.step},
-    lambda s: {"shift": tuple(sign * t for t in times(s)[::2] for sign in (1.0, -1.0))},
-    bounds=lambda s: {"shift": (-longest_time(s), longest_time(s))}, both_encoders=True, measurement=True,
+    lambda s: {"shift": tuple(sign * t for t in times(s, longest_time(s))[::2] for sign in (1.0, -1.0))},
+    bounds=lambda s: {"shift": (-longest_time(s), longest_time(s))},
+    possible=lambda v, s: abs(v["shift"]) < 0.95 * longest_time(s), both_encoders=True, measurement=True,
 )  # fmt: skip
 SAMPLED_TORQUE = Effect(
     "sampled_torque", "log", "sampling", {"share": SAMPLED.name}, "share", lambda s: {"share": 0.5},

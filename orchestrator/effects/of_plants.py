@@ -5,12 +5,12 @@ parameters in the plant's table, and one row here; ``docs/extending.md`` walks t
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from orchestrator.effects.effect import Effect, SignalScales, rms
-from orchestrator.effects.of_logs import longest_time, times
+from orchestrator.effects.of_logs import is_within, longest_lag, longest_time, times
 from pyfmu_sources.parameter_rows import BIG, Parameter
 
 # Of the analysis alone: logarithm [rad] of the distance over which dry friction builds up, or of the penetration over
@@ -21,6 +21,7 @@ PRESLIDING = Parameter("presliding", "1", math.log(1e-5), math.log(1e-9), 0.0, "
 SHORTEST = 1e-7
 
 DEEPEST_STOP = 0.2  # of the travel that lies beyond an end stop: what begins further in is a spring
+MOST_BEHIND = 0.5  # of the rows in which a torque may be behind its request for a limit of its rate
 LEAST_COULOMB = 0.2  # of the breakaway torque that is left at speed: friction that vanishes there is no Stribeck curve
 ANY_DISTANCE = 3.0  # deviation of the logarithm of a build-up distance about the encoder's resolution: twenty times
 SMALL_LOGARITHM = 0.05  # step of its derivative
@@ -101,12 +102,11 @@ def _directional_friction(site: str) -> Effect:
     )  # fmt: skip
 
 
-def _timing(name: str, parameter: str) -> Effect:
+def _timing(name: str, parameter: str, top: Callable[[SignalScales], float]) -> Effect:
     return Effect(
         name, "actuator", "timing", group(name, parameter), parameter, lambda s: {parameter: 0.3 * s.step},
-        lambda s: {parameter: times(s)}, bounds=lambda s: {parameter: (0.0, longest_time(s))},
-        possible=lambda v, s: max(0.15 * s.step, s.torque_raster) < v[parameter] < 0.95 * longest_time(s),
-        takes_drive=True,
+        lambda s: {parameter: times(s, top(s))}, bounds=lambda s: {parameter: (0.0, top(s))},
+        possible=lambda v, s: is_within(v[parameter], s, top(s)), takes_drive=True,
     )  # fmt: skip
 
 
@@ -131,6 +131,15 @@ def _rates(scales: SignalScales) -> tuple[float, ...]:
     changes = _changes(scales)
     shares = (0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98)
     return tuple(float(q) for q in np.quantile(changes, shares)) if changes.size else ()
+
+
+def _is_reached(rate: float, scales: SignalScales) -> bool:
+    """Tell whether the request goes beyond a rate [N.m/s] at times: what holds it back always is a lag."""
+    step, torque, behind = rate * scales.step, float(scales.requests[0]), 0
+    for request in scales.requests.tolist():
+        torque += min(max(request - torque, -step), step)
+        behind += torque != request
+    return 0 < behind < MOST_BEHIND * scales.requests.size
 
 
 def _small_twist(scales: SignalScales) -> float:
@@ -197,8 +206,8 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     *_dry_friction("load"),
     _end_stop("lower"),
     _end_stop("upper"),
-    _timing("input_delay", "delay"),
-    _timing("drive_filter", "time_constant"),
+    _timing("input_delay", "delay", longest_time),
+    _timing("drive_filter", "time_constant", longest_lag),
     Effect(
         "torque_saturation", "actuator", "limit", group("torque_saturation", "limit"), "limit",
         lambda s: {"limit": 0.02 * _largest_request(s)}, lambda s: {"limit": _limits(s)},
@@ -209,8 +218,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         "rate_limit", "actuator", "timing", group("rate_limit", "rate"), "rate",
         lambda s: {"rate": 0.02 * float(np.max(np.abs(np.diff(s.requests)))) / s.step}, lambda s: {"rate": _rates(s)},
         bounds=lambda s: {"rate": (1e-3 * float(np.max(_changes(s), initial=1.0)), BIG)},
-        possible=lambda v, s: v["rate"] < 0.999 * float(np.max(_changes(s), initial=0.0)) and not s.torque_raster,
-        takes_drive=True,
+        possible=lambda v, s: _is_reached(v["rate"], s) and not s.torque_raster, takes_drive=True,
     ),
     Effect(
         "hardening_stiffness", "shaft", "gap", group("hardening_stiffness", "cubic", "sharpness"), "cubic",

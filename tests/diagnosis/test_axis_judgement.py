@@ -76,6 +76,26 @@ def test_friction_that_would_drive_the_axis_in_one_direction_is_no_law(model: Mo
         assert balance.is_possible(label, ModelPoint(tuple(parameters), {label: (difference,)})) is possible
 
 
+def test_a_dead_time_is_a_few_cycles_of_the_log_and_none_at_its_bound(model: Model) -> None:
+    slow = axis_record(values(model), 3, "axis")  # 200 Hz, and a cutoff at which 1.2 periods are far longer
+    balance = balance_of(slow, model, SETTINGS)
+    assert 1.2 / max(balance.cutoffs) > 0.06
+    for label, fits in (("input_delay@actuator", True), ("early_torque@log", True), ("drive_filter@actuator", False)):
+        effect = balance.effects[label]
+        assert (effect.upper[0] == pytest.approx(0.04)) is fits
+        point = ModelPoint.nominal(balance.parameters)
+        assert balance.is_possible(label, point.with_effect(label, (0.03,)))
+        assert not balance.is_possible(label, point.with_effect(label, (effect.upper[0],)))
+
+
+def test_a_rate_is_limited_where_the_request_goes_beyond_it_at_times(model: Model) -> None:
+    balance = balance_of(axis_record(values(model), 3, "axis"), model, SETTINGS)
+    label, point = "rate_limit@actuator", ModelPoint.nominal(balance.parameters)
+    fastest = float(np.max(np.abs(np.diff(balance.signals.torque)))) / balance.step
+    for share, possible in ((1.1, False), (0.3, True), (0.02, False)):
+        assert balance.is_possible(label, point.with_effect(label, (share * fastest,))) is possible
+
+
 def test_what_test_data_refute_is_not_in_the_corrected_model(tmp_path) -> None:
     (tmp_path / "known.toml").write_text(MODEL.replace("uncertainty = 0.1", "uncertainty = 0.001"))
     model = read_model(tmp_path / "known.toml")

@@ -125,7 +125,8 @@ class TorqueBalance(ResidualModel):
             resolutions.append(resolutions[0] / ratio)
         twist = angles[0] / ratio - angles[1] if len(angles) > 1 else np.empty(0)
         return SignalScales(
-            step=self.step, cutoff=max(self.cutoffs), requests=signals.torque, torque=rms(signals.torque),
+            step=self.step, cycle=max(self.step / signals.rows_each, signals.torque_raster),
+            cutoff=max(self.cutoffs), requests=signals.torque, torque=rms(signals.torque),
             angles={"motor": angles[0], "load": angles[-1]}, speeds={"motor": speeds[0], "load": speeds[-1]},
             resolutions={"motor": resolutions[0], "load": resolutions[-1]},
             acceleration=rms(triangle_average(accelerations[-1])),
