@@ -1,5 +1,7 @@
 """Fits, blocks left out and comparisons, on a model that is linear: what they must be is worked out by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,3 +73,15 @@ def test_blocks_after_a_share_are_of_the_rows_behind_it(fitted):
     assert 0 < places.size < 0.2 * whitening.size
     np.testing.assert_array_equal(np.unique(blocks), np.arange(blocks.max() + 1))
     assert blocks.max() >= 3
+
+
+def test_blocks_have_as_many_rows_that_say_something(fitted):
+    problem, _ = fitted
+    (whitening,) = problem.whitenings
+    active = whitening.active.copy()
+    active[:, : active.shape[1] // 2] = 0.0
+    blocks = replace(problem, whitenings=(replace(whitening, active=active),)).blocks
+    counts = np.bincount(blocks, active[0] > 0.0)
+    assert len(counts) == blocks.max() + 1 >= 10
+    assert counts.min() >= counts.max() - 1
+    assert np.all(np.diff(blocks) >= 0)

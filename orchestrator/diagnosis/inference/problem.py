@@ -72,19 +72,22 @@ class FitProblem:
         """Return the blocks of the whitened residuals after a share of each record, and their places (rows,) among all.
 
         Returns:
-            Block of each such residual, contiguous in time and within one record, and its place.
+            Block of each such residual, contiguous in time and within one record, and its place. All have about as many
+            rows that say something: by rows alone a block of a machine at rest would be empty.
         """
         late = [
             whitening.rows >= share * model.size
             for whitening, share, model in zip(self.whitenings, shares, self.models, strict=True)
         ]
+        active = [whitening.active.max(axis=0) > 0.0 for whitening in self.whitenings]
         total = sum(int(rows.sum()) for rows in late)
         wanted = min(self.settings.blocks, max(total // self.settings.rows_per_block, 4))
         blocks, places, first, offset = [], [], 0, 0
-        for whitening, rows in zip(self.whitenings, late, strict=True):
-            count, channels = int(rows.sum()), len(whitening.active)
-            number = max(round(wanted * count / total), 1) if count else 0
-            blocks.append(np.tile(first + np.arange(count) * number // max(count, 1), channels))
+        for whitening, rows, says in zip(self.whitenings, late, active, strict=True):
+            channels = len(whitening.active)
+            number = max(round(wanted * int(rows.sum()) / total), 1) if rows.any() else 0
+            before = np.maximum(np.cumsum(says[rows]) - 1, 0)
+            blocks.append(np.tile(first + before * number // max(int(says[rows].sum()), 1), channels))
             places.append(offset + np.flatnonzero(np.tile(rows, channels)))
             first, offset = first + number, offset + whitening.size
         return np.concatenate(blocks), np.concatenate(places)
