@@ -188,7 +188,7 @@ def _law(verdict: str, remaining: Sequence[Dependence], settings: DiagnosisSetti
     if verdict != "unknown" or not remaining:
         return None
     best = remaining[0]
-    strong = best.comparison.t >= settings.grades.likely_t and best.comparison.gain >= settings.report.law_gain
+    strong = best.comparison.t >= settings.grades.likely_t and best.comparison.gain >= settings.grades.likely_gain
     return best if strong and best.code else None
 
 

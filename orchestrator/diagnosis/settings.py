@@ -82,7 +82,7 @@ class GradeSettings(Settings, frozen=True):
     likely_t: Annotated[float, setting("paired errors of a likely one")] = 3.0
     certain_share: Annotated[float, share("of the missing torque that a certain effect explains")] = 0.08
     likely_share: Annotated[float, share("of the missing torque that a likely one explains")] = 0.03
-    likely_gain: Annotated[float, share("or of what is left without it")] = 0.2
+    likely_gain: Annotated[float, share("or of what is left without it; a learned law takes as much")] = 0.2
     certain_size_t: Annotated[float, setting("sizes over their errors of a certain effect")] = 4.0
     likely_size_t: Annotated[float, setting("sizes over their errors of a likely one")] = 3.0
     wave_share: Annotated[float, share("likely_share of waves, whose scanned cycles follow anything")] = 0.08
@@ -98,11 +98,14 @@ class GradeSettings(Settings, frozen=True):
     sure_size_t: Annotated[float, setting("sizes over their errors that count as much as likely_t")] = 6.0
     timing_left: Annotated[float, share("of the torque that may be left beside the name of a delay")] = 0.2
     confirmed_share: Annotated[
-        float, share("of the motion's misfit on test data that goes with a certain effect: chance takes less")
+        float, share("of the misfit on test data that goes with a certain effect, or may come: 5 % in rms are chance")
     ] = 0.1
-    refuted_share: Annotated[
-        float, share("by which that misfit may grow with a likely effect: 5 % in rms are chance")
-    ] = 0.1
+    test_t: Annotated[
+        float, setting("paired errors by which the torque of test data speaks for an effect or against it: asked once")
+    ] = 2.0
+    over_inertia: Annotated[
+        float, setting("torque over that of a wrong inertia from which an effect stands whatever the inertia is")
+    ] = 3.0
     inertia_error: Annotated[
         float, share("relative error of the inertia that the record must reach for a certain name")
     ] = 0.35
@@ -119,7 +122,6 @@ class ReportSettings(Settings, frozen=True):
     worse: Annotated[float, share("by which chance may make the misfit of test data larger")] = 0.05
     of_noise: Annotated[float, share("and share of the encoder's noise")] = 0.1
     level: Annotated[float, share("of reported intervals")] = 0.95
-    law_gain: Annotated[float, share("of what is left that a learned law takes on blocks left out")] = 0.2
 
 
 class FmuSettings(Settings, frozen=True):

@@ -22,7 +22,7 @@ BROKEN = {
     "sure size": ({"size_t": 3.5}, {}),
     "size": ({"size_t": 2.0}, {}),
     "inertia seen": ({}, {"inertia_error": 0.5}),
-    "same machine": ({}, {"inertia": 3.0}),
+    "same machine": ({"torque": 0.5}, {"inertia": 3.0, "inertia_torque": 0.1}),
     "alone of its kind": ({"foreign_family": True}, {}),
     "possible size": ({"possible": False}, {}),
     "confirmed": ({"motion_share": 0.02}, {}),
@@ -54,10 +54,32 @@ def test_thresholds_of_rules_are_settings():
     [
         (None, {"confirmed", "not refuted"}),
         (ScoreComparison(0.5, 8.0), set()),
-        (ScoreComparison(0.5, 2.0), {"confirmed", "not refuted"}),
+        (ScoreComparison(0.5, 1.2), {"confirmed", "not refuted"}),
         (ScoreComparison(0.05, 8.0), {"confirmed", "not refuted"}),
     ],
 )
 def test_the_torque_of_test_data_confirms_what_free_runs_lose(torque, lowered):
     effect = replace(EFFECT, motion_share=-0.5, test_torque=torque)
     assert set(grade_effect(effect, RECORD, SETTINGS)[1]) == lowered
+
+
+@pytest.mark.parametrize(
+    ("motion", "torque", "lowered"),
+    [
+        (-0.5, ScoreComparison(0.02, 0.8), {"confirmed"}),  # they drift: only the torque refutes
+        (-0.5, ScoreComparison(0.5, 2.0), set()),
+        (0.5, ScoreComparison(0.02, 0.8), set()),
+        (0.5, ScoreComparison(-0.1, -2.8), {"confirmed", "not refuted"}),
+        (-0.5, None, {"confirmed", "not refuted"}),
+    ],
+)
+def test_the_torque_decides_where_free_runs_drift(motion, torque, lowered):
+    effect = replace(EFFECT, motion_share=motion, test_torque=torque, runs_hold=False)
+    assert set(grade_effect(effect, RECORD, SETTINGS)[1]) == lowered
+
+
+def test_what_is_larger_than_the_torque_of_a_wrong_inertia_stands():
+    other = replace(RECORD, inertia=0.05, inertia_torque=0.01)
+    assert other.inertia_is_off(SETTINGS.selection.prior_deviations)
+    for torque, lowered in ((0.05, ("same machine",)), (1.0, ())):
+        assert grade_effect(replace(EFFECT, torque=torque), other, SETTINGS)[1] == lowered

@@ -52,7 +52,7 @@ def test_friction_that_is_not_named_is_left_and_follows_the_speed():
 def test_a_complete_model_leaves_nothing_that_follows():
     columns, _ = make_record({}, 5, 16.0, substeps=50)
     found = diagnose(record_from_columns(columns, "record"), MODEL)
-    assert all(one.comparison.gain < SETTINGS.report.law_gain for one in found.remaining)
+    assert all(one.comparison.gain < SETTINGS.grades.likely_gain for one in found.remaining)
     assert found.law is None
 
 

@@ -149,7 +149,8 @@ def add_test_evidence(
         missed: a model -> what its runs miss of the test data, in squares and in units of the noise.
         compared: a model -> how much less the final one leaves of the torque of test data.
     """
-    final = sum((one.final / one.noise) ** 2 for record in test for one in record.signals)
+    final = sum(one.miss**2 for record in test for one in record.signals)
+    hold = not any(one.is_missed for record in test for one in record.signals)
 
     def with_test_evidence(effect: EffectEvidence) -> EffectEvidence:
         if effect.label not in result.final.labels:
@@ -158,7 +159,8 @@ def add_test_evidence(
         misses = missed(without)
         astray = not math.isfinite(misses)  # which the final model is not: the effect explains all of it
         share = 1.0 if astray else 1.0 - final / max(misses, 1e-300)
-        return replace(effect, motion_share=share if math.isfinite(final) else math.nan, test_torque=compared(without))
+        share = share if math.isfinite(final) else math.nan
+        return replace(effect, motion_share=share, test_torque=compared(without), runs_hold=hold)
 
     return list(map(with_test_evidence, evidence))
 

@@ -28,7 +28,7 @@ def form_verdict(
         return "effects"
     takes = [(one.t, one.gain) for one in (effect.evidence for effect in effects)]
     takes += [(one.t, one.gain) for one in (curve.comparison for curve in dependences)]
-    strong = any(t >= settings.grades.likely_t and gain >= settings.report.law_gain for t, gain in takes)
+    strong = any(t >= settings.grades.likely_t and gain >= settings.grades.likely_gain for t, gain in takes)
     if strong or not search.complete or record.left > settings.grades.timing_left:
         return "unknown"
     return "none" if _nominal_explains(search) else "parameters"

@@ -23,10 +23,11 @@ def record_evidence(result: SearchResult) -> RecordEvidence:
     """Return what the record says of the final model as a whole."""
     problem = result.problem
     left = torque_shares(problem, result.final.point)
-    inertia, error, spread = inertia_of_record(problem, result.final)
+    inertia, error, spread, asked = inertia_of_record(problem, result.final)
     if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
         spread = np.inf
-    return RecordEvidence(float(left.max()), inertia, error, spread)
+    torque = missing_torque(problem, result.final.point, asked)
+    return RecordEvidence(float(left.max()), inertia, error, spread, torque)
 
 
 def effect_evidence(result: SearchResult) -> list[EffectEvidence]:
@@ -49,17 +50,22 @@ def _effect_evidence(result: SearchResult, label: str, base: float, left: float)
         max(leaving.comparison.gain, entry.comparison.gain), max(without - left, before - after) / base,
         size_over_error(problem, final, label), review.family, bool(kinds - {effect.kind}),
         problem.is_possible(label, final.point),
+        torque=missing_torque(problem, final.point.without_effects([label]), final.point),
     )  # fmt: skip
 
 
-def missing_torque(problem: FitProblem, point: ModelPoint) -> float:
-    """Return the power of what a model leaves within the band, white, in shares of the nominal one's, summed."""
+def missing_torque(problem: FitProblem, point: ModelPoint, other: ModelPoint | None = None) -> float:
+    """Return the power of what a model leaves within the band, white, in shares of the nominal one's, summed.
+
+    Args:
+        other: a model; what the first one leaves more than it is then meant.
+    """
     total = 0.0
-    for model, seen, start in zip(
-        problem.models, problem.record_points(point), problem.record_points(problem.start), strict=True
-    ):
+    points = (problem.record_points(one) for one in (point, problem.start, other or point))
+    for model, *seen in zip(problem.models, *points, strict=True):
         plain = band_only(model, problem.settings)
-        left, nominal = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals([seen, start]))
+        first, nominal, second = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen))
+        left = first - second if other else first
         total += float(np.sum(np.mean(left**2, axis=1) / (np.mean(nominal**2, axis=1) + 1e-300)))
     return total
 
@@ -91,18 +97,19 @@ def size_over_error(problem: FitProblem, fitted: FittedModel, label: str) -> flo
     return float(np.sqrt(max(square, 0.0) / len(places)))
 
 
-def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float]:
+def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float, ModelPoint]:
     """Return the inertia that the record asks for by itself, in units of the nominal one, its error and its spread.
 
     The priors are off, and torque is regressed on motion: an inertia far from the model file's tells that the record
     is of another machine.
 
     Returns:
-        Inertia, standard error, spread in the model file; (1, 0, 0) of a model without one.
+        Inertia, standard error, spread in the model file, (1, 0, 0) of a model without one; the point with it.
     """
-    shares = problem.models[0].inertia_shares()
+    shares, point = problem.models[0].inertia_shares(), fitted.point
     if not shares:
-        return 1.0, 0.0, 0.0
+        return 1.0, 0.0, 0.0, point
+    parameters = list(point.parameters)
     freed = replace(problem, models=tuple(model.without_priors(FREE_SPREAD) for model in problem.models))
     free = fit_model(freed, fitted.point, 3)
     weights, total = np.zeros(len(free.coordinates)), 0.0
@@ -111,11 +118,11 @@ def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, 
         if n is None:
             total += share
             continue
-        weights[n] = share
+        weights[n], parameters[n] = share, free.point.parameters[n]
         total += share * free.point.parameters[n] / problem.shared[n].nominal
     variance = max(float(weights @ covariance @ weights) for covariance in (free.jackknife, free.covariance))
     spread = max((entry.spread for entry in problem.shared if entry.name in shares), default=0.0)
-    return total, float(np.sqrt(variance)), spread
+    return total, float(np.sqrt(variance)), spread, replace(point, parameters=tuple(parameters))
 
 
 def possible_effects(

@@ -42,10 +42,22 @@ def _explains_much(effect: EffectEvidence, s: GradeSettings) -> bool:
     return effect.share >= s.certain_share or alone
 
 
-def _foretells_torque(effect: EffectEvidence, s: DiagnosisSettings) -> bool:
+def _foretells_torque(effect: EffectEvidence, s: GradeSettings) -> bool:
     """Tell whether the torque of test data asks for an effect: it does not drift, as free runs do."""
     test = effect.test_torque
-    return test is not None and test.t >= s.selection.least_t and test.gain >= s.grades.confirmed_share
+    return test is not None and test.t >= s.test_t and test.gain >= s.confirmed_share
+
+
+def _is_contradicted(effect: EffectEvidence, s: GradeSettings) -> bool:
+    """Tell whether test data speak against an effect: their torque does where free runs drift, else these do."""
+    if effect.test_torque is not None and not effect.runs_hold:
+        return effect.test_torque.t <= -s.test_t
+    return effect.motion_share < -s.confirmed_share and not _foretells_torque(effect, s)
+
+
+def _is_confirmed(effect: EffectEvidence, s: GradeSettings) -> bool:
+    speaks = effect.motion_share >= s.confirmed_share or _foretells_torque(effect, s)
+    return speaks and not _is_contradicted(effect, s)
 
 
 GRADE_RULES: tuple[GradeRule, ...] = (
@@ -82,8 +94,10 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "the record does not determine the inertia, so the scale of its torque is unknown",
     ),
     GradeRule(
-        "same machine", Grade.POSSIBLE, lambda e, r, s: not r.inertia_is_off(s.selection.prior_deviations),
-        "inertia that the record asks for", "selection.prior_deviations",
+        "same machine", Grade.POSSIBLE,
+        lambda e, r, s: not r.inertia_is_off(s.selection.prior_deviations)
+        or e.torque > s.grades.over_inertia**2 * r.inertia_torque,
+        "inertia that the record asks for, and the torque of its error", "grades.over_inertia",
         "the record asks for another inertia and may be of another machine",
     ),
     GradeRule(
@@ -96,14 +110,14 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "confirmed", Grade.LIKELY,
-        lambda e, r, s: e.motion_share >= s.grades.confirmed_share or _foretells_torque(e, s),
+        lambda e, r, s: _is_confirmed(e, s.grades),
         "share of the motion's misfit, or of the torque's, on test data", "grades.confirmed_share",
         "test data do not confirm it: what stands for another law fits a record and predicts nothing",
     ),
     GradeRule(
         "not refuted", Grade.POSSIBLE,
-        lambda e, r, s: not e.motion_share < -s.grades.refuted_share or _foretells_torque(e, s),
-        "share of the motion's misfit on test data", "grades.refuted_share",
+        lambda e, r, s: not _is_contradicted(e, s.grades),
+        "share of the motion's misfit on test data, or paired gain of the torque", "grades.test_t",
         "test data are predicted better without it",
     ),
     GradeRule(

@@ -83,12 +83,15 @@ class RecordEvidence:
         inertia: that the record asks for by itself, in units of the nominal one; 1.0: the model has none.
         inertia_error: its standard error, in the same unit.
         inertia_spread: how far the model file lets it be off, as a share.
+        inertia_torque: power of the torque by which it differs from that of the fit, in shares of what the nominal
+            model misses.
     """
 
     left: float
     inertia: float
     inertia_error: float
     inertia_spread: float
+    inertia_torque: float = np.inf
 
     def inertia_is_off(self, deviations: float) -> bool:
         """Tell whether the record asks for an inertia that the model file does not allow, twice its error considered.
@@ -118,6 +121,8 @@ class EffectEvidence:
         possible: a machine can have such values.
         motion_share: share of the misfit of free runs on test data that comes back without it; nan: not run.
         test_torque: the same of what the torque balance leaves of test data, block by block; None: not worked out.
+        runs_hold: free runs of the final model stay by the test data; else they drift, and the torque decides.
+        torque: power of its own torque, in shares of what the nominal model misses.
     """
 
     label: str
@@ -131,6 +136,8 @@ class EffectEvidence:
     possible: bool
     motion_share: float = np.nan
     test_torque: ScoreComparison | None = None
+    runs_hold: bool = True
+    torque: float = 0.0
 
 
 @dataclass(frozen=True)
