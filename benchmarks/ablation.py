@@ -1,6 +1,7 @@
 """What each rule of the diagnosis is worth: grades that would rise without it, of right names and of wrong ones.
 
     python -m benchmarks.ablation ROWS.jsonl ... [--docs docs/ablation.md]
+    python -m benchmarks.ablation AFTER.jsonl ... --before BEFORE.jsonl ...    # of two builds, on the same records
 
 The rows are those that ``benchmarks.diagnosis``, ``calibration``, ``outside_class`` and ``measured`` keep under
 ``--out``. Rules lower grades and choose nothing, so a row tells what its grades are without each of them. A Markdown
@@ -8,12 +9,14 @@ table, written to ``--docs`` where that is given.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from benchmarks.judging import Row
 from benchmarks.rows import read_rows
+from benchmarks.verdicts import GRADES, NAMED
 from orchestrator.diagnosis.selection.grading import GRADE_RULES, GradeRule, highest_grade
 
 HEADING = """# Ablation of the diagnosis's rules
@@ -88,19 +91,56 @@ def ablation_table(counts: Sequence[RuleCount], rules: Sequence[GradeRule], reco
     return "\n".join(lines)
 
 
+def paired_table(before: Sequence[Row], after: Sequence[Row]) -> str:
+    """Return a Markdown table of what two builds say of the records that both were given.
+
+    Args:
+        before, after: rows of each build.
+
+    Returns:
+        The table: expected effects that are named at least as likely, names by grade that are right or wrong, false
+        alarms.
+    """
+    known = {row.key: row for row in before}
+    pairs = [(known[row.key], row) for row in after if row.key in known]
+
+    def cells(count: Callable[[Row], int]) -> str:
+        both = [(count(old), count(new)) for old, new in pairs]
+        gained, lost = (sum(max(sign * (new - old), 0) for old, new in both) for sign in (1, -1))
+        return f"{sum(old for old, _ in both)} | {sum(new for _, new in both)} | {gained} | {lost}"
+
+    lines = [f"| {len(pairs)} records | before | after | more | fewer |", 5 * "|---" + "|"]
+    lines.append(f"| effects named | {cells(lambda row: sum(grade in NAMED for grade in row.judgement.found))} |")
+    for grade in GRADES:
+        for words, verdicts in (("right", ("right",)), ("wrong", ("wrong", "untested"))):
+            count = partial(_names, grade=grade, verdicts=verdicts)
+            lines.append(f"| *{grade}*, {words} | {cells(count)} |")
+    lines.append(f"| false alarms | {cells(lambda row: int(row.is_false_alarm()))} |")
+    return "\n".join(lines)
+
+
+def _names(row: Row, grade: str, verdicts: Sequence[str]) -> int:
+    return sum(row.judgement.verdicts[label] in verdicts for label in row.outcome.labels((grade,)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("rows", nargs="+", type=Path)
     parser.add_argument("--docs", type=Path)
+    parser.add_argument("--before", nargs="+", type=Path)
     args = parser.parse_args()
     rows = [row for path in args.rows for row in read_rows(path)]
+    if args.before:
+        print(paired_table([row for path in args.before for row in read_rows(path)], rows))
+        return
     counts = [count_rule(rule.name, rows) for rule in GRADE_RULES]
     table = ablation_table(counts, GRADE_RULES, len(rows))
     print(table)
     idle = [count.name for count in counts if count.records * RECORDS < LEAST * len(rows)]
     print(f"\nfewer than {LEAST} in {RECORDS}: {', '.join(idle) or 'none'}")
     if args.docs:
-        args.docs.write_text(f"{HEADING}\n\n{table}\n")
+        _, _, rest = args.docs.read_text().partition("\n## ")  # what is said of changes stays
+        args.docs.write_text(f"{HEADING}\n\n{table}\n" + (f"\n## {rest}" if rest else ""))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.ablation import RuleCount, count_rule
+from benchmarks.ablation import RuleCount, count_rule, paired_table
 from benchmarks.harm import SEEN, falsify, harmed, missed, seen_part, simulated_effects
 from benchmarks.judging import Row, Truth, grade_table, judge, size_line
 from benchmarks.measured import truth_of
@@ -147,3 +147,14 @@ def test_a_clean_record_that_is_said_to_lack_something_is_not_right() -> None:
     assert not clean("unknown", "red").is_right()
     assert not clean("effects", "red").is_right()
     assert not replace(clean("unknown", "red"), group="unknown").is_false_alarm()
+
+
+def test_two_builds_are_compared_on_the_records_of_both() -> None:
+    truth = Truth((("coulomb_friction@motor",),))
+    before = row_of(named(coulomb_friction__motor="possible", input_delay__actuator="likely"), truth)
+    after = row_of(named(coulomb_friction__motor="certain"), truth)
+    table = paired_table([before, replace(before, key="alone")], [after])
+    assert "| 1 records | before | after | more | fewer |" in table
+    assert "| effects named | 0 | 1 | 1 | 0 |" in table
+    assert "| *likely*, wrong | 1 | 0 | 0 | 1 |" in table
+    assert "| *certain*, right | 0 | 1 | 1 | 0 |" in table
