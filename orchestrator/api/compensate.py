@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.control.loops import FMUS, LAWS, ControlTask, make_loop
 from orchestrator.control.measures import LoopMeasures, bound_path, bound_time, first_path, measure_loop
@@ -36,7 +37,7 @@ _BOUND_SPEEDS = np.geomspace(0.02, 2.0, 30)  # of the curve beside the traversal
 
 
 @dataclass(frozen=True, repr=False)
-class CompensateResult(Result):
+class CompensateResult(PlottedResult):
     """Each law on the same plants, medians over these.
 
     Attributes:
@@ -91,7 +92,7 @@ class CompensateResult(Result):
             path=tuple(path.tolist()),
         )
 
-    def write_files(self, folder: Path) -> None:
+    def write_data(self, folder: Path) -> None:
         """Write ``traversals.csv``."""
         count = [len(law.times) for law in self.laws]
         write_columns(
