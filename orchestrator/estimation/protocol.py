@@ -17,7 +17,6 @@ from orchestrator.records.record import Record
 METHODS = {
     "maximum_likelihood": "joint fit of gap, parameters, initial state and noise; profile-likelihood interval",
     "ekf": "online estimator (Gaussian sum of extended Kalman filters), as in the FMU BacklashEstimator",
-    "paired_sum": "the thesis's sum of differences to a twin without backlash",
     "speed_difference": "integral of the speed difference over a traversal of the gap",
     "torque_pulse": "torque pulses, or the quasi-stationary twist against torque",
     "operating_data": "width of the twist's hysteresis in normal closed-loop data",
