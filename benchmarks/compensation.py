@@ -17,9 +17,9 @@ from types import MappingProxyType
 
 import numpy as np
 from numba import njit
+from orchestrator.plants.compiled import compile_module
 
 from orchestrator.building.native_build import ensure_native
-from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.design import DrivetrainValues, design_regulator, five_state_model
 from pyfmu_sources.backlash_compensator_slave import BacklashCompensator
 from pyfmu_sources.backlash_estimator import SIZE, NoiseSettings, covariance

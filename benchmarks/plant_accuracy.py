@@ -8,10 +8,10 @@ from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
-from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.reference import ReferencePlant
 from pyfmu_sources.backlash_models import BACKLASH_MODELS
 from pyfmu_sources.equations import parameters
+from tests.support.compiled_plants import compiled_plant
 from tests.support.reference_runs import linear_solution, reference_solution
 
 H, STEPS = 1e-3, 2000
@@ -30,7 +30,7 @@ def run_fmu(path, torque, **values):
 
 def run_compiled(torque, **values):
     """The same from the compiled source."""
-    plant, p = compile_module("drivetrain"), parameters(**values)
+    plant, p = compiled_plant("drivetrain"), parameters(**values)
     x = plant.consistent_start((0.0,) * 8, p)
     mode, table = plant.initial_mode(x, p), plant.prepare(p, H)
     states = [x[:5]]
@@ -45,7 +45,7 @@ def main():
     path = ensure_built(["Drivetrain"])["Drivetrain"]
     print(
         f"{'model':10s} {'alpha [rad]':>11s} {'crossings':>9s} "
-        f"{'theta_m [rad]':>14s} {'theta_l [rad]':>14s} {'numba':>9s}"
+        f"{'theta_m [rad]':>14s} {'theta_l [rad]':>14s} {'in C':>9s}"
     )
     for model in ("dead_zone", "nordin"):
         for k, alpha in enumerate((0.002, 0.02, 0.1)):

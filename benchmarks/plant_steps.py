@@ -12,10 +12,10 @@ from types import ModuleType
 
 import numpy as np
 
-from orchestrator.plants.compiled import compile_module
 from pyfmu_sources.backlash_models import BACKLASH_MODELS
 from pyfmu_sources.equations import DEFAULTS, NAMES, PARAMETERS, DrivetrainParameters
 from pyfmu_sources.parameter_rows import with_values
+from tests.support.compiled_plants import compiled_plant
 
 STEPS = (1e-5, 2e-4, 1e-3, 5e-3, 1e-2, 2e-2)
 
@@ -89,7 +89,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--extreme", action="store_true")
     arguments = parser.parse_args()
-    plant = compile_module("drivetrain")
+    plant = compiled_plant("drivetrain")
     warm_up(plant)
     rng = np.random.default_rng(arguments.seed)
     draw = draw_extreme if arguments.extreme else draw_machine

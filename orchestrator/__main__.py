@@ -1,6 +1,5 @@
 """``python -m orchestrator``, and the program ``backlash-cosim``."""
 
-import gc
 import importlib
 import os
 import sys
@@ -35,7 +34,6 @@ def run(module: str = "orchestrator.cli") -> None:
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else the interpreter complains once more when it ends
-    gc.freeze()  # else the interpreter takes a second to collect numba's objects before it ends
     sys.exit(code)
 
 

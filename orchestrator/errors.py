@@ -10,6 +10,7 @@
     │   ├── RecordError           a measured record
     │   ├── DesignError           a system for which no controller or estimator exists
     │   ├── CalibrationError      a size or an experiment outside a calibration
+    │   ├── KernelError           machine code that is needed and cannot be made
     │   └── OutputError           a place that cannot be written
     └── SimulationError           a run that went wrong: exit code 1
         ├── SlaveError            a slave refused or failed a call
@@ -66,6 +67,10 @@ class DesignError(InputError):
 
 class CalibrationError(InputError):
     """A size or an experiment lies outside what a calibration covers."""
+
+
+class KernelError(InputError):
+    """Machine code is needed, and this machine has nothing that makes it."""
 
 
 class OutputError(InputError):

@@ -6,6 +6,7 @@ In all functions: ``clock``: time of the record that it was learned from [s].
 """
 
 from math import sqrt
+from typing import Annotated
 
 KNOTS = 11
 
@@ -19,7 +20,7 @@ LAW_COUNT = L_VALUES + KNOTS
 
 # Motion of a plant as a law sees it: speeds of motor and load, angle of the load, twist, torque of the drive.
 Motion = tuple[float, float, float, float, float]
-Law = tuple[float, ...]
+Law = Annotated[tuple[float, ...], LAW_COUNT]
 
 # A law is held over pieces of a step: at most so long [s], and so large a share of the shortest time constant it makes.
 LONGEST_PIECE = 1e-3

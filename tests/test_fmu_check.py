@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.network, pytest.mark.slow]
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = Path("tools") / "fmu-check"
 MOST_MEBIBYTES = 60
-HEAVY = {"fmpy", "matplotlib", "numba", "numpy", "rich", "scipy"}
+HEAVY = {"fmpy", "matplotlib", "numpy", "rich", "scipy"}
 ACTION_SCHEMA = "https://json.schemastore.org/github-action.json"
 GITLAB_SCHEMA = "https://gitlab.com/gitlab-org/gitlab/-/raw/master/app/assets/javascripts/editor/schema/ci.json"
 

@@ -50,14 +50,11 @@ class Room:
     Attributes:
         modules: files, or folders with all that is in them.
         tests: the same.
-        compiled: numba compiles the modules. Its machine code of callers would outlive the change, so it is switched
-            off; elsewhere it makes the tests quick.
     """
 
     name: str
     modules: tuple[str, ...]
     tests: tuple[str, ...]
-    compiled: bool = False
 
 
 ROOMS = (
@@ -81,7 +78,6 @@ ROOMS = (
         "contact",
         ("pyfmu_sources/contact.py", "pyfmu_sources/equations.py"),
         ("tests/plants/test_contact.py", "tests/plants/test_effects_in_equations.py"),
-        compiled=True,
     ),
     Room("journal", ("orchestrator/engine/journal.py",), ("tests/engine/test_engine_journal.py",)),
     Room(
@@ -214,7 +210,7 @@ def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
     return [(m, changed((root / m.module).read_text(encoding="utf-8"), node, number)) for m, node, number in chosen]
 
 
-def outcome(root: Path, tests: tuple[str, ...], compiled: bool = False, place: str = "") -> tuple[str, str]:
+def outcome(root: Path, tests: tuple[str, ...], place: str = "") -> tuple[str, str]:
     """Run tests in a copy of the project.
 
     The limit of processor time holds for the tests' process alone: a child that it ended would be a failed test.
@@ -222,7 +218,6 @@ def outcome(root: Path, tests: tuple[str, ...], compiled: bool = False, place: s
     Args:
         root: of the copy.
         tests: files or folders, from there.
-        compiled: as in :class:`Room`.
         place: of the change, as ``module:line``; empty: there is none, and what the tests call is noted.
 
     Returns:
@@ -230,7 +225,6 @@ def outcome(root: Path, tests: tuple[str, ...], compiled: bool = False, place: s
         ended by its limit of time or by another signal: nothing is known then. And the test that failed.
     """
     environment = os.environ | {
-        "NUMBA_DISABLE_JIT": str(int(compiled)),
         "PYTHONPATH": str(root),
         "PYTHONDONTWRITEBYTECODE": "1",
         LIMIT: str(TIME_LIMIT),
@@ -278,7 +272,7 @@ def main() -> int:
         root = Path(folder) / "copy"
         shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".venv", ".git", "fmus"))
         for room in ROOMS:
-            if options.room in (None, room.name) and outcome(root, room.tests, room.compiled)[0] != "survived":
+            if options.room in (None, room.name) and outcome(root, room.tests)[0] != "survived":
                 sys.exit(f"the tests of {room.name} fail without any change")
         for mutant, source in sample(root, options.count, options.seed)[part - 1 :: parts]:
             key = (mutant.module, mutant.line, mutant.change, mutant.text)
@@ -289,7 +283,7 @@ def main() -> int:
             original = (root / mutant.module).read_text(encoding="utf-8")
             (root / mutant.module).write_text(source, encoding="utf-8")
             room, place = rooms[mutant.room], f"{mutant.module}:{mutant.line}"
-            found, by = outcome(root, room.tests, room.compiled, place)
+            found, by = outcome(root, room.tests, place)
             (root / mutant.module).write_text(original, encoding="utf-8")
             results.append(asdict(mutant) | {"outcome": found, "by": by})
             options.out.write_text(json.dumps(results, indent=1))

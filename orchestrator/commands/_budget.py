@@ -9,8 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from orchestrator.shared.processor_time import working_seconds
-
 PATIENCE = 2.0  # times what was told, at which work ends
 ONE_SIGNAL = 1.0  # s, within which signals are one: some programs send each twice
 
@@ -20,7 +18,7 @@ class Budget:
 
     def __init__(self) -> None:
         """Begin with nothing to end."""
-        self._expected, self._begun, self._stopped = math.inf, working_seconds(), 0.0
+        self._expected, self._begun, self._stopped = math.inf, time.process_time(), 0.0
         self.interrupted, self.at_once = False, False
 
     def begin(self, expected: float, at_once: bool = False) -> None:
@@ -29,13 +27,13 @@ class Budget:
         Args:
             at_once: Ctrl-C does not wait for the work to ask.
         """
-        self._expected, self._begun, self.at_once = expected, working_seconds(), at_once
+        self._expected, self._begun, self.at_once = expected, time.process_time(), at_once
 
     def why(self) -> str:
         """Return why the work is to end; nothing while it may go on."""
         if self.interrupted:
             return "interrupted"
-        used = working_seconds() - self._begun
+        used = time.process_time() - self._begun
         return f"{used:.0f} s of processor time, twice what was expected" if used > PATIENCE * self._expected else ""
 
     @contextmanager

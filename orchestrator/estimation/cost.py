@@ -1,5 +1,6 @@
 """How much processor time a fit will take, before it starts."""
 
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,7 +10,6 @@ from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-from orchestrator.shared.processor_time import working_seconds
 
 # Of the filter over a record: most fits take 800 to 2400, and a quarter more for all that is between them.
 RUNS = 3000.0
@@ -27,10 +27,10 @@ def fit_seconds(records: Sequence[Record], model: Model, settings: EstimationSet
     gap = problem.index("alpha")
     with np.errstate(all="ignore"):
         likelihood.run(theta)  # compiles
-        begun = working_seconds()
+        begun = time.process_time()
         for theta[gap] in PROBED_SIZES:
             likelihood.run(theta)
-    per_row = (working_seconds() - begun) / (len(PROBED_SIZES) * probe.size)
+    per_row = (time.process_time() - begun) / (len(PROBED_SIZES) * probe.size)
     rows = float(sum(record.size for record in records))
     if rows > settings.fit.long_record:
         rows = settings.fit.short_record + RUNS_OF_LONG * rows

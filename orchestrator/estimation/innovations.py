@@ -14,12 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.estimation.kernel import run_filter, run_free, transition
+from orchestrator.building.translation.kernels import Kernels
 from pyfmu_sources.backlash_models import DEAD_ZONE
 from pyfmu_sources.equations import DrivetrainParameters, State, rates
 from pyfmu_sources.parameter_rows import BIG
 
 Array = NDArray[np.float64]
+KERNEL = Kernels("orchestrator.estimation.kernel")
 STATES = 5
 FADING = 1e-3  # rad, half-gap below which the impulse of a contact fades
 
@@ -143,7 +144,7 @@ def innovations(
     errors, variances = np.empty(y.shape), np.empty(y.shape)
     states = np.empty((n if keep else 0, STATES))
     contacts = np.empty(n if keep else 0, dtype=np.int64)
-    run_filter(
+    KERNEL.run_filter(
         model.matrices, model.inputs, model.constants, model.normal, model.alpha, model.jump, phi, gain_u, gain_1, step,
         u, u_variance, y, variance, intensity, x0, errors, variances, states, contacts, soft,
     )  # fmt: skip
@@ -159,7 +160,7 @@ def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:
     """
     phi, gain_u, gain_1 = _discrete(model, step)
     states = np.empty((u.size, STATES))
-    run_free(
+    KERNEL.run_free(
         model.matrices, model.inputs, model.constants, model.normal, model.alpha, model.jump, phi, gain_u, gain_1,
         step, u, x0, states,
     )  # fmt: skip
@@ -172,5 +173,5 @@ def _discrete(model: AffineModel, step: float) -> tuple[Array, Array, Array]:
     gain_u = np.empty((3, STATES))
     gain_1 = np.empty((3, STATES))
     for m in range(3):
-        transition(model.matrices[m], model.inputs, model.constants[m], step, phi[m], gain_u[m], gain_1[m])
+        KERNEL.transition(model.matrices[m], model.inputs, model.constants[m], step, phi[m], gain_u[m], gain_1[m])
     return phi, gain_u, gain_1

@@ -14,7 +14,8 @@ from orchestrator.fmi.libraries import free_library, load_library
 from orchestrator.fmi.messages import ERROR, log_message_callback
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave
-from orchestrator.master.protocol import ENDED, RunEndedError
+from orchestrator.master.native_calls import ENDED
+from orchestrator.master.protocol import RunEndedError
 from orchestrator.master.result import RunRemark
 
 TERMINATES = "fmi3DoStep, terminateSimulation"

@@ -1,65 +1,58 @@
-"""Calls of a slave's functions by address, for loops that numba compiles; see ``NativeCalls``."""
+"""Calls of a slave's functions by address, for kernels; see ``NativeCalls``. In C they are those of ``kernel.h``.
 
+In all functions: ``address``: of the function; ``component``: of the slave's instance.
+"""
+
+import ctypes
 from typing import Any
 
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
+from orchestrator.building.translation.kernel_arrays import Reals
 
-_WHOLE, _REAL, _STATUS, _BYTE = ir.IntType(64), ir.DoubleType(), ir.IntType(32), ir.IntType(8)
+IN_C = ("call_reporting_step", "call_sized_transfer", "call_step", "call_transfer")
+"""Functions that kernels find in C under their own names."""
 
+ENDED, LEFT_EARLY = 16, 17
+"""Statuses of a native step that did not end as asked: the run is to end; the step returned early, or with an event."""
 
-def _emit_call(builder: Any, address: Any, arguments: Any, kinds: Any) -> Any:
-    kind = ir.FunctionType(_STATUS, kinds)
-    return builder.call(builder.inttoptr(address, kind.as_pointer()), arguments)
-
-
-def _transfer_code(typing: Any, address: Any, component: Any, references: Any, count: Any, values: Any) -> Any:
-    """Call ``status f(component, references, count, values)`` at ``address``."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _emit_call(builder, arguments[0], arguments[1:], [_WHOLE] * 4)
-
-    return types.int32(*[types.int64] * 5), generate
+_Address, _Count, _Real, _Status, _Truth = (
+    ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double, ctypes.c_int, ctypes.c_bool,
+)  # fmt: skip
 
 
-def _transfer_code_with_size(
-    typing: Any, address: Any, component: Any, references: Any, count: Any, values: Any
-) -> Any:
-    """Call ``status f(component, references, count, values, count)`` at ``address``."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _emit_call(builder, arguments[0], [*arguments[1:], arguments[3]], [_WHOLE] * 5)
-
-    return types.int32(*[types.int64] * 5), generate
+def _function(address: int, *kinds: Any) -> Any:
+    return ctypes.CFUNCTYPE(_Status, *kinds)(address)
 
 
-def _step_code(typing: Any, address: Any, component: Any, time: Any, length: Any) -> Any:
-    """Call ``status f(component, time, length, true)`` at ``address``."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        kinds = [_WHOLE, _REAL, _REAL, _STATUS]
-        return _emit_call(builder, arguments[0], [*arguments[1:], _STATUS(1)], kinds)
-
-    return types.int32(types.int64, types.int64, types.float64, types.float64), generate
+def call_transfer(address: int, component: int, references: int, count: int, values: int) -> int:
+    """Return the status of a getter or setter of FMI 2.0; ``references`` and ``values`` are addresses."""
+    return int(_function(address, _Address, _Address, _Count, _Address)(component, references, count, values))
 
 
-def _step_code_with_report(typing: Any, address: Any, component: Any, time: Any, length: Any, report: Any) -> Any:
-    """Call ``status f(component, time, length, true, event, end, early, reached)`` at ``address``.
+def call_sized_transfer(address: int, component: int, references: int, count: int, values: int) -> int:
+    """Return the status of a getter or setter of FMI 3.0; ``references`` and ``values`` are addresses."""
+    kinds = (_Address, _Address, _Count, _Address, _Count)
+    return int(_function(address, *kinds)(component, references, count, values, count))
 
-    The four pointers are to bytes 0, 1, 2 and 8 of ``report``.
+
+def call_step(address: int, component: int, time: float, length: float) -> int:
+    """Return the status of a step of FMI 2.0 from ``time`` over ``length`` [s]."""
+    return int(_function(address, _Address, _Real, _Real, _Status)(component, time, length, 1))
+
+
+def call_reporting_step(address: int, component: int, time: float, length: float, report: Reals) -> int:
+    """Return the status of a step of FMI 3.0 from ``time`` over ``length`` [s].
+
+    Args:
+        time: [s].
+        length: [s].
+        report: (4,) filled: event, end and early return (1: yes), time reached [s], which is set before.
     """
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        report = arguments[4]
-        pointers = [builder.add(report, _WHOLE(offset)) for offset in (0, 1, 2, 8)]
-        kinds = [_WHOLE, _REAL, _REAL, _BYTE, *[_WHOLE] * 4]
-        return _emit_call(builder, arguments[0], [*arguments[1:4], _BYTE(1), *pointers], kinds)
-
-    return types.int32(types.int64, types.int64, types.float64, types.float64, types.int64), generate
-
-
-call_transfer: Any = intrinsic(_transfer_code)
-call_sized_transfer: Any = intrinsic(_transfer_code_with_size)
-call_step: Any = intrinsic(_step_code)
-call_reporting_step: Any = intrinsic(_step_code_with_report)
+    flags = [_Truth() for _ in range(3)]
+    reached = _Real(report[3])
+    function = _function(address, _Address, _Real, _Real, _Truth, *[_Address] * 4)
+    places = (*map(ctypes.byref, flags), ctypes.byref(reached))
+    status = int(function(component, time, length, True, *places))
+    for n in range(3):
+        report[n] = float(flags[n].value)
+    report[3] = reached.value
+    return status

@@ -233,10 +233,6 @@ class NativeTransfer:
     count: int
 
 
-ENDED, LEFT_EARLY = 16, 17
-"""Statuses of a native step that did not end as asked: the run is to end; the step returned early, or with an event."""
-
-
 @dataclass(frozen=True)
 class NativeCalls:
     """What machine code needs to step a slave without the interpreter: C functions, which return 0, 1 or worse.

@@ -4,18 +4,19 @@ Calibration needs thousands of runs. A test holds this loop to the co-simulated 
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.building.translation.kernels import Kernels
 from orchestrator.paired.experiment import Experiment
-from orchestrator.plants.compiled import compile_module
+from orchestrator.plants.design import KalmanFilter
 from pyfmu_sources.backlash_models import BACKLASH_MODELS
 from pyfmu_sources.equations import parameters
 
 Array = NDArray[np.float64]
 COLUMNS = ("theta_m", "theta_l", "theta_l_hat", "u", "contact", "T_m", "T_l_hat")
+LOOP = Kernels("orchestrator.paired.loop_kernel", checked=True)
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class CompiledLoop:
     reference: Array
     reference_speed: Array
     gains: tuple[float, ...]
-    estimator: tuple[Any, ...]
+    estimator: KalmanFilter
 
     def run(self, alpha: float, errors: tuple[Array, Array]) -> Array:
         """Return the signals ``COLUMNS``, shape (steps + 1, 7), of a loop whose half-gap is ``alpha`` [rad].
@@ -35,24 +36,13 @@ class CompiledLoop:
             alpha: half-gap [rad].
             errors: errors [rad] of both encoders, each of shape (steps + 1,).
         """
-        e = self.experiment
-        p = _plant_parameters(e, alpha)
-        drivetrain = compile_module("drivetrain")
-        x = drivetrain.consistent_start((0.0,) * 8, p)
-        table = drivetrain.prepare(p, e.sample_time)
-        mode = drivetrain.initial_mode(x, p)
-        limits = (e.values.i, 1.0 / e.values.k, e.torque_limit)
+        e, S = self.experiment, self.estimator.S_inverse
         out = np.empty((len(self.reference), len(COLUMNS)))
-        compile_module("closed_loop").run_loop(
-            (x, mode, p, table, e.sample_time),
-            self.reference,
-            self.reference_speed,
-            *errors,
-            self.gains,
-            self.estimator,
-            limits,
-            out,
-        )
+        LOOP.run_loop(
+            _plant_parameters(e, alpha), e.sample_time, self.reference, self.reference_speed, *errors, self.gains,
+            self.estimator.A, np.ravel(self.estimator.B), self.estimator.L, (S[0, 0], S[0, 1], S[1, 1]), e.values.i,
+            1.0 / e.values.k, e.torque_limit, out,
+        )  # fmt: skip
         return out
 
 
@@ -75,22 +65,5 @@ def _plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]
 
 def make_loop(experiment: Experiment) -> CompiledLoop:
     """Return the loop of ``experiment``, designed and ready to run."""
-    estimator = experiment.estimator()
-    S = estimator.S_inverse
     reference, speed = experiment.reference()
-    return CompiledLoop(
-        experiment,
-        reference,
-        speed,
-        experiment.regulator().gains,
-        (
-            _as_tuples(estimator.A),
-            tuple(float(b) for b in estimator.B),
-            _as_tuples(estimator.L),
-            (float(S[0, 0]), float(S[0, 1]), float(S[1, 1])),
-        ),
-    )
-
-
-def _as_tuples(matrix: Array) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(float(v) for v in row) for row in matrix)
+    return CompiledLoop(experiment, reference, speed, experiment.regulator().gains, experiment.estimator())

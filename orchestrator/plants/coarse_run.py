@@ -1,57 +1,18 @@
-"""Free runs of a plant in steps of its own: the equations that run inside the FMU, one sample after the other.
-
-They are compiled once per plant (:mod:`orchestrator.plants.compiled`, :mod:`orchestrator.plants.sample`). No event is
-located: a sample in which friction may turn round or teeth meet is run in shorter steps.
-"""
+"""When free runs of a plant may go in steps of its own, and in how many (:mod:`orchestrator.plants.kernels.motion`)."""
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
-from orchestrator.plants.sample import is_usual, parameters_of, sample_of
-from orchestrator.shared.cores import cache_once
-from orchestrator.shared.numba_cache import ALGEBRA, njit_on_disk
 
 Array = NDArray[np.float64]
 
 FINER = 8  # times more steps of a free run in a sample in which friction may turn round or teeth meet, as in fits
 MOST_STEPS = 1000  # of a free run in a sample: with values that ask for more a model is lost, and not waited for
 WAVE = 0.05  # of a wave's period: the farthest that a Runge-Kutta step of a free run goes
-
-
-def coarse_runner_of(plant: Plant, p: Any) -> Any:
-    """Return ``run(start, p, early, late, first, h, substeps, out)``, compiled.
-
-    In each sample the torque ``early`` acts for ``first`` [s], then ``late`` (a dead time is no multiple of ``h``).
-    ``substeps`` are the Runge-Kutta steps of a sample, and of one in which friction may turn round or teeth meet.
-    ``p`` is the plant's tuple followed by its nuisance parameters.
-
-    Returns:
-        The function, of machine code; start (8,), early and late (n,), out (n, 2): the angles.
-    """
-    return _coarse_runner(plant, is_usual(plant, p))
-
-
-@cache_once
-def _coarse_runner(plant: Plant, usual: bool) -> Any:
-    prepared, sample = sample_of(plant)
-    parameters = parameters_of(plant, usual)
-
-    @njit_on_disk(error_model="numpy", nogil=True, **ALGEBRA)
-    def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, substeps: Any, out: Array) -> None:
-        x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7])
-        values = parameters(p)
-        common = prepared(values, first, h, substeps)
-        memory = (0.0, 0.0, 0.0, 0.0)
-        for n in range(late.size):
-            out[n, 0], out[n, 1] = x[0], x[2]
-            x, memory = sample(x, memory, values, common, (early[n], late[n]))
-
-    return run
 
 
 def runs_coarsely(plant: Plant, p: Array) -> bool:

@@ -7,11 +7,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.building.translation.kernels import Kernels
 from orchestrator.effects.effect import Effect
 from pyfmu_sources.parameter_rows import BIG, Parameter
 
@@ -19,28 +19,11 @@ Array = NDArray[np.float64]
 
 STATES = 8  # places of the state, as in ``pyfmu_sources.equations``
 STEP = 0.35  # of the fastest oscillation: a Runge-Kutta step, whose error then lies far below an encoder's count
+MOTION = "orchestrator.plants.kernels.motion"
+LEARNED_STEPS = (4, 16)
+"""Runge-Kutta steps of a sample with a learned law, and of one in which friction may turn round."""
+REQUESTS = Kernels("orchestrator.plants.kernels.requests")
 FADING = 1.0  # of the fastest time constant of what only fades, where an error of a step fades too
-
-
-class CompiledEquations(NamedTuple):
-    """The compiled equations of a plant, as the analysis takes them.
-
-    Attributes:
-        friction: ``friction(x, p)``: levels of dry friction [N.m] of the first and the second body.
-        rates: ``rates(x, signs, p, u)``: derivatives of the eight states; ``signs`` are friction's mean directions.
-        presliding: places in ``p`` of the logarithm of friction's build-up distance of either body.
-        rest: ``rest(p)``: the levels that these distances belong to (zero: the body has no dry friction), and whether
-            each depends on more than the body's speed; None: the larger of those at rest and at a high speed.
-        flanks: ``flanks(p)``: whether there are teeth or end stops that can meet and part; None: there are none.
-        meets: ``meets(x, rates, p, h)``: whether any may do so within ``h`` [s]; None as well.
-    """
-
-    friction: Any
-    rates: Any
-    presliding: tuple[int, int]
-    rest: Any = None
-    flanks: Any = None
-    meets: Any = None
 
 
 @dataclass(frozen=True)
@@ -115,10 +98,7 @@ class Plant:
         starts: place of a state -> name of its start value in the FMU.
         offsets: names of the encoder offsets, in the order of the bodies.
         bank: the effects that it may lack.
-        stage: returns the compiled equations.
-        runner: returns the compiled, event-located simulation
-            ``run(start, p, early, late, first, h, out)``; see :mod:`orchestrator.diagnosis.report.simulation`. The
-            start has the eight states and a ninth entry, the request [N.m] behind a second lag and a limited rate.
+        kernel: name of the module of its equations; see :mod:`orchestrator.plants.kernels`.
         shaft: between the two bodies; None: a single body.
         resonance: an added inertia; None: the plant has none.
         followers: (place, followed place): states that are shifted with another when that is corrected.
@@ -128,8 +108,7 @@ class Plant:
         refused: values by name -> why records cannot be diagnosed against such a plant; "": they can.
         realised: parameters of the analysis -> those of the FMU (n,), with what it alone has fitted put in.
         learned: a law that was learned is part of its equations.
-        seldom: names of parameters that few models have off their defaults, and that cost time in all: where none is,
-            equations run in which they are constants.
+        presliding: of each body with dry friction, name of the logarithm of the distance over which it builds up.
     """
 
     name: str
@@ -141,8 +120,7 @@ class Plant:
     starts: Mapping[int, str]
     offsets: tuple[str, ...]
     bank: tuple[Effect, ...]
-    stage: Callable[[], CompiledEquations]
-    runner: Callable[[], Any]
+    kernel: str
     shaft: Shaft | None = None
     resonance: Resonance | None = None
     followers: tuple[tuple[int, int], ...] = ()
@@ -152,7 +130,7 @@ class Plant:
     refused: Callable[[Mapping[str, float]], str] = _accept_all
     realised: Callable[[Array], Array] | None = None
     learned: bool = False
-    seldom: tuple[str, ...] = ()
+    presliding: tuple[str, ...] = ()
     _index: dict[str, int] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -211,14 +189,35 @@ class Plant:
         if lag == 0.0 and rate >= BIG:
             return u, u
         means, begins = np.empty_like(u), np.empty_like(u)
-        request = float(u[0])
-        from orchestrator.plants.compiled import compile_module  # numba takes its time to import
-
-        follow = compile_module("laws.drive").followed_request
-        for n, asked in enumerate(u.tolist()):
-            begins[n] = request
-            request, means[n] = follow(request, asked, lag, rate, h)
+        REQUESTS.follow(u, lag, rate, h, means, begins)
         return means, begins
+
+    @cached_property
+    def motion(self) -> Kernels:
+        """Return the kernels of its motion; see :mod:`orchestrator.plants.kernels.motion`."""
+        return Kernels(f"{MOTION}[{self.kernel}]")
+
+    def run_exactly(
+        self, start: Array, parameters: Array, early: Array, late: Array, first: float, h: float, out: Array
+    ) -> None:
+        """Fill ``out`` (n, 2), the angles [rad], by the event-located simulation.
+
+        Args:
+            start: (9,) states, and the request [N.m] behind a second lag and a limited rate.
+            parameters: of the FMU, (n,).
+            early: torque (n,) that acts in each sample for ``first`` [s].
+            late: (n,) that acts then.
+            h: sample time [s].
+        """
+        if self.learned:
+            state = np.append(start[:7], 0.0)
+            self.motion.run_coarsely(state, parameters, early, late, first, h, *LEARNED_STEPS, out)
+        else:
+            self._exact.run(start, parameters, early, late, first, h, out)
+
+    @cached_property
+    def _exact(self) -> Kernels:
+        return Kernels(self.kernel, checked=True)
 
     def jacobian(self, p: Array) -> Array:
         """Return the matrix of the linear plant, by differences of its own (linear) rates.
@@ -226,19 +225,22 @@ class Plant:
         Returns:
             Shape (states, states), in the order of ``states``.
         """
-        rates, plain = self.stage().rates, self._plain(p)
+        plain = self._plain(p)
         columns = []
         for place in self.states:
-            x = [0.0] * STATES
+            x = np.zeros(STATES)
             x[place] = 1.0
-            rate = rates(tuple(x), (0.0, 0.0), plain, 0.0)
-            columns.append([rate[s] for s in self.states])
+            columns.append(self._rates(x, plain, 0.0))
         return np.array(columns).T
 
     def request_column(self, p: Array) -> Array:
         """Return (states,): what a unit request of the drive does to the rates of the linear plant."""
-        rate = self.stage().rates((0.0,) * STATES, (0.0, 0.0), self._plain(p), 1.0)
-        return np.array([rate[s] for s in self.states])
+        return self._rates(np.zeros(STATES), self._plain(p), 1.0)
+
+    def _rates(self, x: Array, p: Array, u: float) -> Array:
+        found = np.empty(STATES)
+        self.motion.rate_at(x, p, u, found)
+        return found[list(self.states)]
 
     def _plain(self, p: Array) -> Array:
         """Return the parameters of the analysis with every effect off."""

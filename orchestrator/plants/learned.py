@@ -5,19 +5,17 @@ values are parameters of the analysis alone.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.compiled import compile_module
-from orchestrator.plants.description import CompiledEquations, Plant
-from orchestrator.plants.sample import complete_equations, sample_of
+from orchestrator.plants.description import Plant
 from orchestrator.shared.cores import cache_once
 from pyfmu_sources.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
 from pyfmu_sources.parameter_rows import BIG, Parameter
 
 Array = NDArray[np.float64]
+LEARNED = "orchestrator.plants.kernels.learned"
 
 
 @dataclass(frozen=True)
@@ -63,70 +61,7 @@ def with_law(plant: Plant) -> Plant:
         *(Parameter(name, "1", float(n), -BIG, BIG, "Knot of the learned law") for n, name in enumerate(knots)),
         *(Parameter(name, "N.m", 0.0, -BIG, BIG, "Value of the learned law") for name in values),
     )
-    first = len(plant.names)
-    extended = replace(plant, nuisances=(*plant.nuisances, *added), realised=np.asarray, learned=True, _index={})
-    extended = replace(extended, stage=cache_once(lambda: _stage(plant, first)), _index={})
-    return replace(extended, runner=cache_once(lambda: _runner(extended)), _index={})
-
-
-def _stage(plant: Plant, first: int) -> CompiledEquations:
-    from orchestrator.shared.numba_cache import njit_on_disk
-
-    equations = complete_equations(plant.stage())
-    rates = equations.rates
-    motor, last = plant.bodies[0], plant.bodies[-1]
-    J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)
-    ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
-    speed_m, speed_l, angle_m, angle_l = motor.speed, last.speed, motor.angle, last.angle
-    drive = plant.drive.torque
-    knot_at, value_at = first + 1, first + 1 + KNOTS
-
-    straight = compile_module("learned_law").straight
-
-    @njit_on_disk(error_model="numpy")
-    def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
-        r = rates(x, signs, p, u)
-        code = int(p[first])
-        if code == 0:
-            return r
-        ratio = p[ratio_at] if ratio_at >= 0 else 1.0
-        if code == MOTOR_SPEED:
-            s = x[speed_m]
-        elif code == LOAD_SPEED:
-            s = x[speed_l]
-        elif code == LOAD_ANGLE:
-            s = x[angle_l]
-        elif code == TWIST:
-            s = x[angle_m] / ratio - x[angle_l]
-        else:
-            s = x[drive]
-        torque = straight(s, p, knot_at, value_at)
-        on_motor, on_load = 0.0, 0.0
-        if code in (MOTOR_SPEED, DRIVE) or ratio_at < 0:
-            on_motor = -torque / p[J_m]
-        elif code == TWIST:
-            on_motor, on_load = -torque / ratio / p[J_m], torque / p[J_l]
-        else:
-            on_load = -torque / p[J_l]
-        if ratio_at < 0:
-            return (r[0], r[1] + on_motor, r[2], r[3], r[4], r[5], r[6], r[7])
-        return (r[0], r[1] + on_motor, r[2], r[3] + on_load, r[4], r[5], r[6], r[7])
-
-    return equations._replace(rates=with_torque)
-
-
-def _runner(plant: Plant) -> Any:
-    from orchestrator.shared.numba_cache import njit_on_disk
-
-    prepared, sample = sample_of(plant)
-
-    @njit_on_disk(error_model="numpy", nogil=True)
-    def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
-        x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
-        common = prepared(p, first, h, (4, 16))
-        memory = (0.0, 0.0, 0.0, 0.0)
-        for n in range(late.size):
-            out[n, 0], out[n, 1] = x[0], x[2]
-            x, memory = sample(x, memory, p, common, (early[n], late[n]))
-
-    return run
+    nuisances = (*plant.nuisances, *added)
+    return replace(
+        plant, nuisances=nuisances, realised=np.asarray, learned=True, kernel=f"{LEARNED}[{plant.kernel}]", _index={}
+    )

@@ -5,11 +5,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.building.translation.kernels import Kernels
 from orchestrator.plants.description import Plant
 from orchestrator.plants.design import LinearModel, discretise
-from orchestrator.shared.numba_cache import njit_on_disk
 
 Array = NDArray[np.float64]
+LINEAR = Kernels("orchestrator.plants.kernels.linear")
 Run = Callable[[Array, Array, Array, Array], None]
 
 
@@ -47,7 +48,7 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
     shown = np.array([places.index(place) if place in places else -1 for place in (0, 2)])
 
     def run(start: Array, early: Array, late: Array, out: Array) -> None:
-        _repeat(start[places], phi, by_early, by_late, early, late, shown, out)
+        LINEAR.repeat(start[places], phi, by_early, by_late, early, late, shown, np.empty(len(places)), out)
 
     return run
 
@@ -56,21 +57,3 @@ def state_places(plant: Plant, p: Array) -> tuple[int, ...]:
     """Return the places of the states that the linear plant has: without a lag the drive has none."""
     lagged = plant.value(p, plant.drive.lag) > 0.0
     return tuple(place for place in plant.states if place != plant.drive.torque or lagged)
-
-
-@njit_on_disk(error_model="numpy", nogil=True)
-def _repeat(
-    x: Array, phi: Array, by_early: Array, by_late: Array, early: Array, late: Array, shown: Array, out: Array
-) -> None:  # fmt: skip
-    k = x.size
-    moved = np.empty(k)
-    for n in range(late.size):
-        for c in range(2):
-            out[n, c] = x[shown[c]] if shown[c] >= 0 else 0.0
-        for i in range(k):
-            total = by_early[i] * early[n] + by_late[i] * late[n]
-            for j in range(k):
-                total += phi[i, j] * x[j]
-            moved[i] = total
-        for i in range(k):
-            x[i] = moved[i]

@@ -68,7 +68,7 @@ def test_stubs_name_what_is_public():
 
 
 def test_importing_loads_no_workflow(tmp_path):
-    heavy = "numpy", "scipy", "numba", "fmpy", "matplotlib", "rich", "msgspec"
+    heavy = "numpy", "scipy", "fmpy", "matplotlib", "rich", "msgspec"
     code = f"import sys, orchestrator; print([n for n in {heavy!r} if n in sys.modules])"
     done = run(code, tmp_path)
     assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr

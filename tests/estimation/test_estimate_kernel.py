@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from orchestrator.estimation.innovations import _discrete, affine_model
-from orchestrator.estimation.kernel import BLUR, advance_blurred, propagate
+from orchestrator.estimation.innovations import KERNEL, _discrete, affine_model
+from orchestrator.estimation.kernel import BLUR
 from pyfmu_sources.equations import parameters
 
 STEP, TORQUE = 0.005, 40.0
@@ -15,7 +15,7 @@ def advanced(model, x):
     """Return the state after a sample, and the Jacobian that ``propagate`` leaves."""
     phi, gain_u, gain_1 = _discrete(model, STEP)
     x, total, scratch = x.copy(), np.empty((5, 5)), np.empty(5)
-    propagate(
+    KERNEL.propagate(
         model.matrices, model.inputs, model.constants, model.normal, model.alpha, model.jump, phi, gain_u, gain_1,
         STEP, TORQUE, x, total, scratch,
     )  # fmt: skip
@@ -55,7 +55,7 @@ def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
     wound = weights @ (np.sign(twists) * np.maximum(np.abs(twists) - 0.01, 0.0))
     touching = weights @ (np.abs(twists) > 0.01)
     h, after, total = 1e-6, x.copy(), np.empty((5, 5))
-    advance_blurred(
+    KERNEL.advance_blurred(
         model.matrices, model.inputs, model.constants, model.normal, 0.01, covariance, h, TORQUE, after, total
     )  # fmt: skip
     free, tight = model.matrices[1], model.matrices[2]

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.plants.compiled import compile_module
 from orchestrator.plants.reference import ReferencePlant
 from pyfmu_sources import drivetrain, linear_mode
 from pyfmu_sources.backlash_models import BACKLASH_MODELS
 from pyfmu_sources.equations import NAMES, parameters
 from pyfmu_sources.parameter_rows import with_values
+from tests.support.compiled_plants import compiled_plant
 from tests.support.reference_runs import linear_solution, reference_solution
 
 H = 1e-3
@@ -85,7 +85,7 @@ def test_compiled_and_plain_source_agree(model):
     torque = random_torque(seed=14, steps=400)
     p = parameters(alpha=0.01, backlash_model=float(BACKLASH_MODELS.index(model)))
     plain, _ = simulate(p, torque)
-    fast, _ = simulate(p, torque, source=compile_module("drivetrain"))
+    fast, _ = simulate(p, torque, source=compiled_plant("drivetrain"))
     assert np.abs(plain - fast).max() <= 1e-12
 
 
@@ -93,7 +93,7 @@ def test_compiled_and_plain_source_agree_with_every_effect():
     torque = random_torque(seed=15, steps=300)
     p = with_values(parameters(alpha=0.01), EFFECTS)
     plain, _ = simulate(p, torque)
-    fast, _ = simulate(p, torque, source=compile_module("drivetrain"))
+    fast, _ = simulate(p, torque, source=compiled_plant("drivetrain"))
     assert np.abs(plain - fast).max() <= 1e-12
 
 
@@ -101,8 +101,8 @@ def test_the_result_does_not_depend_on_the_communication_step():
     torque = random_torque(seed=16, steps=2000, hold=100)
     for values in ({}, EFFECTS):
         p = with_values(parameters(alpha=0.01, backlash_model=2.0), values)
-        fine, _ = simulate(p, torque, source=compile_module("drivetrain"))
-        coarse, _ = simulate(p, torque[::50], h=50 * H, source=compile_module("drivetrain"))
+        fine, _ = simulate(p, torque, source=compiled_plant("drivetrain"))
+        coarse, _ = simulate(p, torque[::50], h=50 * H, source=compiled_plant("drivetrain"))
         assert np.abs(fine[::50, :4] - coarse[:, :4]).max() < 1e-8
 
 
@@ -136,7 +136,7 @@ def test_conservative_effects_keep_the_energy():
         },
     )
     start = (0.3, 3.0, 0.0, -2.0, 0.0, 0.0, 0.0, 0.0)
-    states, _ = simulate(p, np.zeros(1000), start=start, source=compile_module("drivetrain"))
+    states, _ = simulate(p, np.zeros(1000), start=start, source=compiled_plant("drivetrain"))
     theta_m, omega_m, theta_l, omega_l, _, theta_r, omega_r = states[:, :7].T
     twist = theta_m / 3.984 - theta_l + 1e-3 * np.sin(2.0 * theta_m + 0.9)
     energy = 0.2 * omega_m**2 + 2.8 * omega_l**2 + 0.4 * omega_r**2 + 1650.0 * twist**2 + 0.25e6 * twist**4
@@ -222,7 +222,7 @@ def test_teeth_never_pull_in_nordins_model():
 def test_a_load_torque_presses_the_teeth_together_at_rest():
     for model in BACKLASH_MODELS[1:]:
         p = parameters(alpha=0.01, backlash_model=float(BACKLASH_MODELS.index(model)), b_m=5.0, b_l=50.0)
-        states, contacts = simulate(p, np.full(20000, 20.0 / 3.984), T_l=20.0, source=compile_module("drivetrain"))
+        states, contacts = simulate(p, np.full(20000, 20.0 / 3.984), T_l=20.0, source=compiled_plant("drivetrain"))
         assert contacts[-1] in (1, 2)
         assert abs(states[-1, 3]) < 1e-3
 
@@ -242,7 +242,7 @@ def test_extreme_values_give_finite_states(model, alpha, c, k, h, twist, speed, 
     p = parameters(alpha=alpha, backlash_model=float(model), c=c, k=k)
     torque = random_torque(seed, steps=40, hold=4)
     start = (3.984 * twist, speed, 0.0, -speed, 0.0, 0.0, 0.0, 0.0)
-    states, contacts = simulate(p, torque, h=h, start=start, source=compile_module("drivetrain"))
+    states, contacts = simulate(p, torque, h=h, start=start, source=compiled_plant("drivetrain"))
     assert np.isfinite(states).all()
     assert np.isin(contacts, (-2, -1, 0, 1, 2)).all()
     assert np.abs(states[:, 1]).max() < 1e5

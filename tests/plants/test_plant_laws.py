@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from orchestrator.plants.compiled import compile_module
 from pyfmu_sources import axis_equations
 from pyfmu_sources.equations import NAMES, parameters
 from pyfmu_sources.parameter_rows import with_values
 from tests.support import independent_plant as truth
+from tests.support.compiled_plants import compiled_plant
 
 RATE = 200.0
 BREAKAWAY_M, BREAKAWAY_L = 0.9, 3.0
@@ -82,7 +82,7 @@ def record(hidden: dict[str, float], seconds: float = 6.0) -> tuple[dict, dict]:
 
 
 def simulated(own: dict[str, float], u: np.ndarray) -> np.ndarray:
-    plant = compile_module("drivetrain")
+    plant = compiled_plant("drivetrain")
     p = with_values(parameters(tau=0.1), {f"effects.{name}": value for name, value in own.items()})
     x = plant.consistent_start((0.0,) * 8, p)
     mode, table, angles = plant.initial_mode(x, p), plant.prepare(p, 1.0 / RATE), []
@@ -106,7 +106,7 @@ def test_law_agrees_with_the_independent_simulator(law: str) -> None:
 
 
 def test_every_effect_of_the_table_is_off_by_default() -> None:
-    plant = compile_module("drivetrain")
+    plant = compiled_plant("drivetrain")
     assert not plant.has_nonlinear_effect(parameters())
     assert len(NAMES) == len(set(NAMES))
 
@@ -218,7 +218,7 @@ def textbook(v: dict[str, float], u: np.ndarray, h: float) -> np.ndarray:
 @pytest.mark.parametrize("law", AXIS)
 def test_axis_agrees_with_its_equations_written_out(law: str) -> None:
     values, tolerance = AXIS[law]
-    source, h = compile_module("servo_axis"), 0.01
+    source, h = compiled_plant("servo_axis"), 0.01
     p = axis_equations.DEFAULTS._replace(**values)
     u = 4.0 * np.cos(2.0 * np.pi * 0.7 * h * np.arange(300)) + 0.5
     x = source.start(0.0, 0.0, 0.0, p)

@@ -6,11 +6,11 @@ import time
 import numpy as np
 import pytest
 
-from orchestrator.plants.compiled import compile_module
 from pyfmu_sources import axis_equations, drivetrain, smooth_mode
 from pyfmu_sources.backlash_models import BACKLASH_MODELS
 from pyfmu_sources.equations import parameters
 from pyfmu_sources.parameter_rows import with_values
+from tests.support.compiled_plants import compiled_plant
 
 RIGID = ("hysteresis", "rigid_impact")
 RIPPLE = {"effects.torque_ripple.amplitude": 2.0, "effects.torque_ripple.cycles_per_rev": 7.0}
@@ -83,7 +83,7 @@ def test_a_state_beyond_a_rigid_flank_ends_in_few_steps(model, counted):
 def test_rigid_teeth_stay_on_their_flank_and_inside_the_gap(model, effects):
     p = gear_train(model, effects, tau=0.05, b_l=20.0)
     torques = 60.0 * np.cos(2.0 * np.pi * 0.8 * 1e-3 * np.arange(3000))
-    states, modes = run(p, torques, 1e-3, source=compile_module("drivetrain"))
+    states, modes = run(p, torques, 1e-3, source=compiled_plant("drivetrain"))
     error = effects.get("effects.gear_eccentricity.amplitude", 0.0)
     turns = effects.get("effects.gear_eccentricity.cycles_per_rev", 0.0)
     twist = states[:, 0] / 3.984 - states[:, 2] + error * np.sin(turns * states[:, 0])
@@ -133,7 +133,7 @@ EXTREME = [{"J_m": 1e-9}, {"J_l": 1e-9}, {"c": 1e12}, {"k": 1e12}, {"J_m": 1e-9,
 @pytest.mark.parametrize("model", BACKLASH_MODELS)
 @pytest.mark.parametrize("effects", [{}, RIPPLE, DRY_M | DRY_L, HARD])
 def test_extreme_parameters_and_inputs_are_quick_or_refused(model, effects):
-    plant = compile_module("drivetrain")
+    plant = compiled_plant("drivetrain")
     run(gear_train(model, effects), [1.0], 1e-3, source=plant)
     for values in EXTREME:
         p = gear_train(model, effects, **values)
@@ -155,5 +155,5 @@ def test_a_stiff_shaft_without_effects_has_a_result():
 
 def test_a_single_axis_that_no_step_resolves_is_refused():
     p = axis_equations.DEFAULTS._replace(J=1e-9, b=1e12)
-    x, _ = compile_module("servo_axis").advance((0.0, 1.0, 0.0, 0.0, 0.0), 1, p, 1.0, 0.0, 1e-3)
+    x, _ = compiled_plant("servo_axis").advance((0.0, 1.0, 0.0, 0.0, 0.0), 1, p, 1.0, 0.0, 1e-3)
     assert np.isnan(x).all()

@@ -3,9 +3,24 @@
 from __future__ import annotations
 
 import ast
+import math
 
+from orchestrator.building.translation.array_items import quotient
 from orchestrator.building.translation.building_tuples import list_lines
-from orchestrator.building.translation.kinds import NOTHING, REAL, WHOLE, Items, Kind, Store, Tuple, describe, size_of
+from orchestrator.building.translation.constants import constant_value, interval
+from orchestrator.building.translation.kernel_arrays import scratch
+from orchestrator.building.translation.kinds import (
+    NOTHING,
+    REAL,
+    WHOLE,
+    ArrayKind,
+    Items,
+    Kind,
+    Store,
+    Tuple,
+    describe,
+    size_of,
+)
 from orchestrator.building.translation.scope import PRIMARY, UNARY, Code, Scope, address_of, convert, part_of
 
 # Larger tuples that are parts of fixed parameters are not copied.
@@ -65,7 +80,7 @@ def _place(scope: Scope, target: ast.expr) -> Code:
         scope.refuse(target, f"`{ast.unparse(target)}` cannot be assigned to")
     if isinstance(target, ast.Subscript):
         owner = scope.expression(target.value)
-        if not isinstance(owner.kind, Items | Store):
+        if not isinstance(owner.kind, Items | Store | ArrayKind) or isinstance(place.kind, ArrayKind):
             scope.refuse(target, "items of a tuple cannot be assigned to")
         scope.note_mutation(target.value)
     return place
@@ -74,6 +89,8 @@ def _place(scope: Scope, target: ast.expr) -> Code:
 def _to_name(scope: Scope, node: ast.stmt, name: str, value: ast.expr) -> list[str]:
     before = scope.faults
     declared = scope.kinds.get(name)
+    if isinstance(value, ast.Call) and constant_value(scope, value.func) is scratch:
+        return _scratch(scope, node, name, value)
     if isinstance(declared, Items) and name not in scope.pointers:
         whole = list_lines(scope, value, Code(scope.local(name), declared, place=True))
         if whole is not None:
@@ -83,6 +100,8 @@ def _to_name(scope: Scope, node: ast.stmt, name: str, value: ast.expr) -> list[s
         scope.assign_kind(node, name, code.kind)
         scope.pointers.add(name)
         return [f"const {scope.program.names.c(code.kind)} *const {scope.local(name)} = {address_of(code)};"]
+    if isinstance(code.kind, ArrayKind):
+        return _part_of_array(scope, node, name, code, value)
     if isinstance(code.kind, Store) or (isinstance(code.kind, Items) and code.place):
         return _alias(scope, node, name, code, value)
     if code.kind == NOTHING:
@@ -132,6 +151,38 @@ def _alias(scope: Scope, node: ast.AST, name: str, code: Code, value: ast.expr) 
     return [f"{constant}{scope.program.names.c(code.kind)} *const {scope.local(name)} = {address};"]
 
 
+def _scratch(scope: Scope, node: ast.stmt, name: str, value: ast.Call) -> list[str]:
+    """``name = scratch(5, 5)``: an array of zeros that lives as long as the block."""
+    lengths = [interval(scope, argument) for argument in value.args]
+    if scope.homes.get(name) is not node or not lengths or value.keywords:
+        scope.refuse(node, f"`{name}` must be given a scratch array once, where all that use it can see it")
+    if any(length is None or length[0] != length[1] or length[0] < 1 for length in lengths):
+        scope.refuse(node, "the lengths of a scratch array must be constants, at least 1")
+    shape = tuple(length[0] for length in lengths if length is not None)
+    kind, local, data = ArrayKind(REAL, shape), scope.local(name), f"{name}_data"
+    scope.assign_kind(node, name, kind)
+    return [
+        f"double {data}[{math.prod(shape)}] = {{0.0}};",
+        f"const {scope.program.names.c(kind)} {local} = {{{data}, {{{', '.join(map(str, shape))}}}}};",
+    ]
+
+
+def _part_of_array(scope: Scope, node: ast.stmt, name: str, code: Code, value: ast.expr) -> list[str]:
+    """A name for an array or a part of one."""
+    if name not in scope.once or scope.homes.get(name) is not node:
+        scope.refuse(node, f"`{name}` names an array and must be assigned once")
+    scope.assign_kind(node, name, code.kind)
+    root = value
+    while isinstance(root, ast.Subscript):
+        root = root.value
+    if not isinstance(root, ast.Name):
+        scope.refuse(node, f"`{ast.unparse(value)}` must be an array that has a name, or a part of one")
+    scope.aliases[name] = root.id
+    if name in scope.mutated:
+        scope.note_mutation(root)
+    return [f"const {scope.program.names.c(code.kind)} {scope.local(name)} = {code.text};"]
+
+
 def _unpack(scope: Scope, node: ast.Assign, target: ast.Tuple) -> list[str]:
     """``a, b = ...``."""
     used = {n.id for n in ast.walk(node.value) if isinstance(n, ast.Name)}
@@ -174,10 +225,10 @@ def translate_augmented(scope: Scope, node: ast.AugAssign) -> list[str]:
         whole = ast.copy_location(ast.BinOp(_load(node), node.op, node.value), node)
         return _translate_target(scope, node, node.target, whole)
     if isinstance(node.op, ast.Div) and place.kind == REAL and value.kind in (REAL, WHOLE):
-        quotient = Code(f"divided({place.text}, {value.text}, {scope.fault()})", REAL)
+        found = quotient(scope, place, value)
         if scope.owner is not None:
-            quotient = scope.hoist(node, quotient, "value")
-        return [*scope.check_faults(before), f"{place.text} = {quotient.text};"]
+            found = scope.hoist(node, found, "value")
+        return [*scope.check_faults(before), f"{place.text} = {found.text};"]
     if type(node.op) not in _SIGNS or place.kind not in (REAL, WHOLE) or value.kind not in (REAL, WHOLE):
         scope.refuse(node, f"`{ast.unparse(node)}` is outside the subset (+=, -=, *= and /= of numbers are in it)")
     if isinstance(node.target, ast.Name):

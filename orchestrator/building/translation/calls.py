@@ -7,10 +7,11 @@ import builtins
 import math
 from typing import Any
 
+from orchestrator.building.translation.array_items import array_length
 from orchestrator.building.translation.building_tuples import tuple_built
 from orchestrator.building.translation.constants import constant_value
 from orchestrator.building.translation.definitions import Function
-from orchestrator.building.translation.kinds import REAL, TRUTH, WHOLE, Items, Kind, Tuple, describe, kind_of
+from orchestrator.building.translation.kinds import REAL, TRUTH, WHOLE, ArrayKind, Items, Kind, Tuple, describe, kind_of
 from orchestrator.building.translation.scope import (
     NUMBERS,
     UNARY,
@@ -97,6 +98,8 @@ def _order_arguments(scope: Scope, node: ast.Call, function: Function) -> list[a
 
 def _pass_argument(scope: Scope, node: ast.expr, kind: Kind, mutated: bool, by_address: bool) -> str:
     code = scope.expression(node, kind)
+    if isinstance(kind, ArrayKind) and mutated:
+        scope.note_mutation(node)
     if not isinstance(kind, Items) and not by_address:
         return code.text
     if mutated:
@@ -121,7 +124,7 @@ def _math(scope: Scope, node: ast.Call, name: str) -> Code:
         scope.refuse(node, f"`math.{name}` has no derivative here ({', '.join(_PAIRED)} have)")
     if scope.program.paired:
         return Code(f"pair_{name}({arguments}{f', {scope.fault()}' if _MATH[name] else ''})", REAL)
-    if _MATH[name]:
+    if _MATH[name] and scope.program.checked:
         return Code(f"checked_{name}({arguments}, {scope.fault()})", REAL)
     return Code(f"{name}({arguments})", REAL)
 
@@ -181,6 +184,8 @@ def _length(scope: Scope, code: Code) -> Code | None:
         return Code(f"{member(code)}n", WHOLE)
     if isinstance(code.kind, Tuple):
         return Code(str(len(code.kind.items)), WHOLE)
+    if isinstance(code.kind, ArrayKind):
+        return array_length(code, 0)
     return None
 
 

@@ -7,9 +7,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from orchestrator.building.translation.array_items import array_item, array_length, index_within, quotient
 from orchestrator.building.translation.calls import call
-from orchestrator.building.translation.constants import constant_value, interval
-from orchestrator.building.translation.kinds import REAL, TRUTH, WHOLE, Items, Kind, Store, Tuple, describe
+from orchestrator.building.translation.constants import axis_of, constant_value, interval
+from orchestrator.building.translation.kinds import REAL, TRUTH, WHOLE, ArrayKind, Items, Kind, Store, Tuple, describe
 from orchestrator.building.translation.scope import (
     AND,
     EQUALITY,
@@ -161,7 +162,7 @@ def _translate_division(scope: Scope, node: ast.BinOp, left: Code, right: Code) 
     if isinstance(divisor, int | float) and divisor:
         cast = "(double)" if left.kind == WHOLE and right.kind == WHOLE else ""
         return Code(f"{cast}{left.within(UNARY if cast else PRODUCT)} / {right.within(PRODUCT + 1)}", REAL, PRODUCT)
-    return Code(f"divided({left.text}, {right.text}, {scope.fault()})", REAL)
+    return quotient(scope, left, right)
 
 
 def _power(scope: Scope, node: ast.BinOp) -> Code:
@@ -175,6 +176,8 @@ def _power(scope: Scope, node: ast.BinOp) -> Code:
         scope.refuse(node, "a power must have a float as its base")
     if scope.program.paired:
         return Code(f"pair_pow({left.text}, {as_real(scope, right).text}, {scope.fault()})", REAL)
+    if not scope.program.checked:
+        return Code(f"pow({left.text}, {right.text})", REAL)
     return Code(f"checked_pow({left.text}, {right.text}, {scope.fault()})", REAL)
 
 
@@ -271,33 +274,27 @@ def _subscript(scope: Scope, node: ast.Subscript, wanted: Kind | None) -> Code:
     whole, place = constant_value(scope, node.value), interval(scope, node.slice)
     if isinstance(whole, tuple) and place is not None and place[0] == place[1] and 0 <= place[0] < len(whole):
         return constant(scope, whole[place[0]], node)
+    axis = axis_of(scope, node)
+    if axis is not None:
+        return array_length(scope.expression(axis[0]), axis[1])
     base = scope.expression(node.value)
     kind = base.kind
+    if isinstance(kind, ArrayKind):
+        return array_item(scope, node, base)
     if isinstance(kind, Tuple) and not kind.uniform:
         n = interval(scope, node.slice)
         if n is None or n[0] != n[1] or not -len(kind.items) <= n[0] < len(kind.items):
             scope.refuse(node, "an item of a mixed tuple must be taken by a constant index")
         return part_of(scope, base, n[0] % len(kind.items))
     if isinstance(kind, Tuple):
-        return Code(f"{member(base)}v[{_index(scope, node, len(kind.items))}]", kind.items[0], place=True)
+        return Code(f"{member(base)}v[{index_within(scope, node.slice, len(kind.items))}]", kind.items[0], place=True)
     if isinstance(kind, Items):
         length = f"{member(base)}n"
-        return Code(f"{member(base)}v[{_index(scope, node, kind.capacity, length)}]", kind.item, place=True)
+        return Code(f"{member(base)}v[{index_within(scope, node.slice, kind.capacity, length)}]", kind.item, place=True)
     if isinstance(kind, Store):
         item = REAL if kind.attribute == "real" else WHOLE
-        return Code(f"{base.within(PRIMARY)}[{_index(scope, node, kind.length)}]", item, place=True)
+        return Code(f"{base.within(PRIMARY)}[{index_within(scope, node.slice, kind.length)}]", item, place=True)
     return scope.refuse(node, f"`{ast.unparse(node.value)}` has no items")
-
-
-def _index(scope: Scope, node: ast.Subscript, size: int, length: str = "") -> str:
-    """Return an index that is inside whatever happens; negative ones count from the end."""
-    bounds = interval(scope, node.slice)
-    text = scope.expression(node.slice, WHOLE).text
-    if bounds is not None and bounds[0] >= 0 and bounds[1] < size:
-        return text
-    if bounds is not None and not length and bounds[0] == bounds[1] and -size <= bounds[0] < 0:
-        return str(size + bounds[0])
-    return f"item_at({text}, {length or size}, {scope.fault()})"
 
 
 def _lists(scope: Scope, node: ast.expr, wanted: Kind | None) -> Code:

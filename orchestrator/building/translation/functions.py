@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from orchestrator.building.translation.definitions import Function, Owner
 from orchestrator.building.translation.expressions import expression
-from orchestrator.building.translation.kinds import NOTHING, REAL, TRUTH, WHOLE, Items, Kind, Tuple, size_of
+from orchestrator.building.translation.kinds import NOTHING, REAL, TRUTH, WHOLE, ArrayKind, Items, Kind, Tuple, size_of
 from orchestrator.building.translation.program import Program
 from orchestrator.building.translation.scope import Scope
 from orchestrator.building.translation.source import ModuleSource, docstring
@@ -42,7 +42,9 @@ def translate(
         if not scope.changed:
             break
     _check_end(source, node, function.returns)
-    function.mutated = {name for name, kind in function.parameters if isinstance(kind, Items) and name in mutated}
+    function.mutated = {
+        name for name, kind in function.parameters if isinstance(kind, Items | ArrayKind) and name in mutated
+    }
     function.faults = scope.faults > 0
     late = [name for name in scope.homes if name in scope.kinds and scope.homes[name] is node]
     unused = [name for name, _ in function.parameters if name not in scope.read]
@@ -62,6 +64,8 @@ def _signature(source: ModuleSource, node: ast.FunctionDef, c_name: str, owner: 
         zip([a.arg for a in names][len(names) - len(arguments.defaults) :], arguments.defaults, strict=True)
     )
     returns = source.annotation(node.returns, node)
+    if isinstance(returns, ArrayKind):
+        source.refuse(node, f"`{node.name}` must not return an array: fill one that it is given")
     return Function(
         node.name,
         c_name,

@@ -1,4 +1,4 @@
-"""The kinds of value in the translated subset: numbers, fixed tuples, lists of declared capacity."""
+"""The kinds of value in the translated subset: numbers, fixed tuples, lists of declared capacity, arrays."""
 
 from __future__ import annotations
 
@@ -52,7 +52,18 @@ class Store:
     length: int
 
 
-Kind = Scalar | Tuple | Items | Store
+@dataclass(frozen=True)
+class ArrayKind:
+    """A contiguous array of floats or ints that the caller owns; a length is ``None`` where only the call says it.
+
+    In sources it stands in an annotation, ``Annotated[Any, ArrayKind(REAL, (None, 2))]``; see :mod:`kernel_arrays`.
+    """
+
+    item: Scalar
+    shape: tuple[int | None, ...]
+
+
+Kind = Scalar | Tuple | Items | Store | ArrayKind
 _SCALARS: dict[Any, Scalar] = {float: REAL, int: WHOLE, bool: TRUTH, None: NOTHING, type(None): NOTHING}
 _KEYWORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
@@ -76,11 +87,13 @@ def kind_of(annotation: Any) -> Kind:
     if isinstance(annotation, type | None) and annotation in _SCALARS:
         return _SCALARS[annotation]
     if isinstance(annotation, type) and issubclass(annotation, tuple) and hasattr(annotation, "_fields"):
-        hints = typing.get_type_hints(annotation)
+        hints = typing.get_type_hints(annotation, include_extras=True)
         return Tuple(
             tuple(kind_of(hints[name]) for name in annotation._fields), tuple(annotation._fields), annotation.__name__
         )
     origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated and isinstance(arguments[1], ArrayKind):
+        return arguments[1]
     if origin is Annotated:
         return _with_capacity(arguments[0], arguments[1])
     if origin is tuple and arguments and arguments[-1] is Ellipsis:
@@ -123,6 +136,8 @@ def describe(kind: Kind) -> str:
             return f"list[{describe(kind.item)}] of at most {kind.capacity}"
         case Store():
             return f"self.{kind.attribute}"
+        case ArrayKind():
+            return f"array of {kind.item.word}, ({', '.join('n' if n is None else str(n) for n in kind.shape)})"
 
 
 def size_of(kind: Kind) -> int:
@@ -163,6 +178,8 @@ class KindNames:
                 return PAIR if self._paired and kind == REAL else kind.c
             case Store():
                 return "double *" if kind.attribute == "real" else "int *"
+            case ArrayKind():
+                return f"{'Reals' if kind.item == REAL else 'Wholes'}{len(kind.shape)}"
         if self._plain is not None and isinstance(kind, Tuple) and kind.names:
             return self._plain.c(kind)
         if kind not in self._order:
@@ -170,7 +187,10 @@ class KindNames:
                 self.c(item)
             self._order.append(kind)
         if kind not in self._names:
-            self._names[kind] = self._unique_name(self._make(kind))
+            name = plain = self._unique_name(self._make(kind))
+            while name in self._names.values():  # two modules may call their own tuples the same
+                name += f"_of_{plain}"
+            self._names[kind] = name
         return self._names[kind]
 
     def _unique_name(self, name: str) -> str:

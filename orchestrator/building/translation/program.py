@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from orchestrator.building.translation.definitions import Function, Owner, comment_of
-from orchestrator.building.translation.kinds import KEYWORDS, KindNames
+from orchestrator.building.translation.kinds import KEYWORDS, ArrayKind, KindNames
 from orchestrator.building.translation.source import ModuleSource, docstring, read_source
 from orchestrator.errors import FmuError
 
@@ -33,6 +33,7 @@ class Program:
         taken: names at file scope that the C around it uses.
         beside: the program of plain numbers in the same file; this one is of pairs then, each number with its
             derivative, and shares the constants.
+        checked: arithmetic raises where Python does; else it goes on with infinities and NaN, as IEEE 754 says.
     """
 
     def __init__(
@@ -41,15 +42,18 @@ class Program:
         owner: Owner | None = None,
         taken: frozenset[str] = frozenset(),
         neighbours: Program | None = None,
+        checked: bool = True,
     ) -> None:
         self._translate = translate
         self._taken = TAKEN | taken
         self.paired = neighbours is not None
+        self.checked = checked
         self.names: KindNames = KindNames(self._taken, None if neighbours is None else neighbours.names)
         self.owner = owner
         self.owner_name = owner.cls.__name__ if owner is not None else ""
         self._functions: dict[tuple[str, str], Function] = {}
         self._underway: list[tuple[str, str]] = []
+        self._given: set[str] = set()  # names of functions, those underway included
         self._constants: dict[str, float | int] = {} if neighbours is None else dict(neighbours._constants)
         self._shared = frozenset(self._constants)
         self._sources: dict[str, ModuleSource] = {}
@@ -68,9 +72,11 @@ class Program:
         return f"{plain}_" if plain in RESERVED else plain
 
     def _global_name(self, name: str, module: str) -> str:
-        taken = {function.c for function in self._functions.values()} | set(self._constants) | self._taken
+        taken = self._given | set(self._constants) | self._taken
         plain = f"{name.lstrip('_')}{'_pair' if self.paired else ''}"
-        return plain if plain not in taken else _name_in(module, plain)
+        given = plain if plain not in taken else _name_in(module, plain)
+        self._given.add(given)
+        return given
 
     def constant(self, source: ModuleSource, name: str, value: float | int) -> str:
         """Return the name of a constant, which is defined once."""
@@ -93,6 +99,8 @@ class Program:
         definition = source.functions.get(name)
         if definition is None:
             raise FmuError(f"{source.path}: `{name}` must be a function of this module, but is not")
+        if name in vars(source.module).get("IN_C", ()):
+            return _function_in_c(source, definition)
         return self._translate_function(user, node, (target.__module__, name), source, definition, None)
 
     def method(self, user: ModuleSource | None, node: ast.AST | None, name: str) -> Function:
@@ -178,6 +186,16 @@ class Program:
 def _name_in(module: str, name: str) -> str:
     """Return a name in C with that of its module, ``laws.friction``, in front."""
     return f"{module.replace('.', '_')}_{name}"
+
+
+def _function_in_c(source: ModuleSource, node: ast.FunctionDef) -> Function:
+    """Return what the headers define already: a function of numbers and arrays, which it may fill."""
+    parameters = [(argument.arg, source.annotation(argument.annotation, argument)) for argument in node.args.args]
+    function = Function(
+        node.name, node.name, source.name, node.lineno, parameters, source.annotation(node.returns, node), {}, False
+    )
+    function.mutated = {name for name, kind in parameters if isinstance(kind, ArrayKind)}
+    return function
 
 
 def _by_value(item: tuple[str, float | int]) -> tuple[str, float | int]:

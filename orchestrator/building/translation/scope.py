@@ -13,6 +13,7 @@ from orchestrator.building.translation.kinds import (
     REAL,
     TRUTH,
     WHOLE,
+    ArrayKind,
     Items,
     Kind,
     Tuple,
@@ -167,7 +168,15 @@ def convert(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
         return as_real(scope, code)
     if isinstance(kind, Tuple) and isinstance(code.kind, Tuple) and code.kind.items == kind.items:
         return code if code.kind.uniform == kind.uniform else _rename_tuple(scope, node, code, kind)
+    if isinstance(kind, ArrayKind) and isinstance(code.kind, ArrayKind) and _fits(code.kind, kind):
+        return code
     return scope.refuse(node, f"a value must be {describe(kind)}, but is {describe(code.kind)}")
+
+
+def _fits(given: ArrayKind, wanted: ArrayKind) -> bool:
+    """Tell whether an array has the lengths that are wanted, as far as its kind says."""
+    same = given.item == wanted.item and len(given.shape) == len(wanted.shape)
+    return same and all(b is None or a == b for a, b in zip(given.shape, wanted.shape, strict=False))
 
 
 def as_real(scope: Scope, code: Code) -> Code:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import io
+import sys
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -72,6 +73,8 @@ class ModuleSource:
 
     def imports(self) -> Iterator[str]:
         """Yield the full names of the modules that it imports from, base classes of slaves apart."""
+        if not self.module.__name__.startswith(f"{PACKAGE}."):
+            return  # a kernel
         names = (module_name(path) for path in read_imports(Path(self.module.__file__ or "")))
         yield from (f"{PACKAGE}.{name}" for name in names if name not in NOT_TRANSLATED)
 
@@ -93,7 +96,7 @@ class ModuleSource:
 def read_source(name: str) -> ModuleSource:
     """Return the module of this full name."""
     try:
-        module = importlib.import_module(name)
+        module = sys.modules.get(name) or importlib.import_module(name)
         path = Path(module.__file__ or "")
         content = path.read_bytes()
         tree = ast.parse(content)
@@ -101,7 +104,8 @@ def read_source(name: str) -> ModuleSource:
         raise FmuError(f"the source {name} cannot be read: {error}") from None
     functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
     remarks, whole = _remarks(content)
-    return ModuleSource(name.removeprefix(f"{PACKAGE}."), _relative_path(path), tree, module, functions, remarks, whole)
+    short = name.partition("[")[0].removeprefix(f"{PACKAGE}.")
+    return ModuleSource(short, _relative_path(path), tree, module, functions, remarks, whole)
 
 
 def _remarks(content: bytes) -> tuple[dict[int, str], frozenset[int]]:

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.fmu.loop import LOOP
+from orchestrator.diagnosis.fmu.loop_kernel import AWAY, SET, STEP
 from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import read_description
@@ -21,7 +23,6 @@ from orchestrator.fmi.slave3 import Fmu3Slave
 from orchestrator.master.protocol import NativeTransfer, Value
 from orchestrator.master.result import RunRemark
 from orchestrator.master.system import split
-from orchestrator.shared.numba_cache import use_cache_read_only
 
 Array = NDArray[np.float64]
 BEYOND = 1.01
@@ -82,7 +83,6 @@ class Batch:
 
 def open_fmus(request: LoadRequest) -> Callable[[Batch], list[Any]]:
     """Return what runs batches: results (arrays, or None), reasons of failures, the time taken [s], and remarks."""
-    use_cache_read_only()
     fmus = CoupledFmus(request)
 
     def run(batch: Batch) -> list[Any]:
@@ -153,8 +153,6 @@ class MemberFmu:
 
     def name_of_call(self, call: int) -> str:
         """Return the name of the function that ``run_loop`` names by a number."""
-        from orchestrator.diagnosis.fmu.loop import SET, STEP
-
         if call == STEP:
             return self.native.step_name
         return (self.native.inputs if call == SET else self.native.outputs)[0].name
@@ -189,9 +187,6 @@ class CoupledFmus:
     """One FMU, or several that hand values to one another, behind one list of inputs and one of what is read."""
 
     def __init__(self, request: LoadRequest) -> None:
-        from orchestrator.diagnosis.fmu import loop  # finds its machine code only once it is told where
-
-        self._loop = loop
         members, self._request = request.members, request
         owners = {n: split_name(n, members) for n in (*request.inputs, *request.tunables, *request.reads)}
 
@@ -225,10 +220,13 @@ class CoupledFmus:
         passing = np.array([[t.wire, t.by] for t in batch.feedthrough], dtype=np.int64).reshape(-1, 2)
         gains = np.array([t.gain for t in batch.feedthrough], dtype=float)
         warned, astray = np.zeros((len(self._members), 3), dtype=np.int64), np.zeros((len(self._members), 3))
-        status, call, k, n = self._loop.run_loop(
-            calls, counts, where, self._sent, self._read, self._into[: values.shape[1]], self._outof, values,
-            np.array([start, step]), self._wires, self._gains, passing, gains, ports, laws, warned, astray, out,
+        last, handed = np.zeros((len(ports), 3)), np.zeros((len(self._wires), 4))
+        outcome = np.zeros(4, dtype=np.int64)
+        LOOP.run_loop(
+            calls, counts, where, self._sent, self._read, self._into[: values.shape[1]], self._outof, values, start,
+            step, self._wires, self._gains, passing, gains, ports, laws, last, handed, warned, astray, outcome, out,
         )  # fmt: skip
+        status, call, k, n = outcome.tolist()
         members = list(self._members.values())
         for member, (count, first, at) in zip(members, warned.tolist(), strict=True):
             if count:
@@ -237,12 +235,12 @@ class CoupledFmus:
             if number:
                 assert isinstance(member.slave, Fmu3Slave)
                 member.slave.came_elsewhere(int(number), start + begin * step, off)
-        if status > 1 and call != self._loop.AWAY:
+        if status > 1 and call != AWAY:
             reached = start + k * step
             members[n].slave.raise_for_status(int(status), members[n].name_of_call(call), reached, reached, step)
         for member in members:
             member.broken = False
-        if call == self._loop.AWAY:
+        if call == AWAY:
             raise SlaveError(
                 f"efforts at ports must stay within those of the drive, but run away at {start + k * step:g} s"
             )

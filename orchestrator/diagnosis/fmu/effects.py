@@ -3,26 +3,18 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.fmu.loop import LOOP
 from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
 from orchestrator.effects.effect import PlaceScales
 from orchestrator.effects.of_fmus import BANK, CUT, INPUT, OUTPUT, PORT, FmuEffect
-from orchestrator.plants.compiled import compile_module
 from orchestrator.shared.inference.noise import rms
-from orchestrator.shared.numba_cache import njit_on_disk
 
 Array = NDArray[np.float64]
-
-_laws = compile_module("laws.port")
-_built_up: Any = _laws.built_up
-_has_memory: Any = _laws.has_memory
-_distance: Any = _laws.distance_of
-_resistance: Any = _laws.resistance
 
 FLOWS = ("W", "kW", "m3/s", "m3/h", "l/s", "l/min", "kg/s")
 """Units of inputs that are flows of heat or matter: what they change has no direction of motion, and no cycles."""
@@ -78,17 +70,8 @@ def port_motions(problem: FmuProblem, reads: Array) -> dict[str, Motion]:
 def efforts_along(motion: Motion, law: int, values: tuple[float, ...], step: float) -> Array:
     """Return the effort (n,) against the motion that a law has in each sample, ``step`` [s] apart."""
     q = np.array([*values, *[0.0] * (4 - len(values))])
-    return np.asarray(_efforts(law, motion.x, motion.v, motion.a, q, step))
-
-
-@njit_on_disk()
-def _efforts(law, x, v, a, q, h):  # type: ignore[no-untyped-def]
-    """Return the effort against the motion in each sample."""
-    found, built = np.zeros(len(x)), 0.0
-    for k in range(len(x)):
-        if _has_memory(law):
-            built = _built_up(law, built, v[k], _distance(law, q[1], q[3]), h)
-        found[k] = _resistance(law, x[k], v[k], a[k], built, q[0], q[1], q[2])
+    found = np.empty(len(motion.x))
+    LOOP.efforts_along(law, motion.x, motion.v, motion.a, q, step, found)
     return found
 
 

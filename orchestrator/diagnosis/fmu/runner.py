@@ -7,13 +7,13 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.coupled_fmus import Batch, Feedthrough, LoadRequest, Run
+from orchestrator.diagnosis.fmu.loop import LOOP
 from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.diagnosis.settings import FmuSettings
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
@@ -77,7 +77,7 @@ class Runner:
         self._most = min(2, usable_cores()) if workers is None else workers
         self._threads = [ThreadPoolExecutor(1)]
         try:
-            _compile_loop()
+            LOOP.load()  # here: children cannot compile
             for name, folder in self._folders.items():
                 name_folder(folder, self.system.members[name])
                 unpack(system.members[name], folder)
@@ -272,18 +272,3 @@ def _failure_words(error: ChildError, allowed: float) -> str:
     if error.reason == "time":
         return f"hangs: no answer within {allowed:.0f} s"
     return f"crashes: {error}" if error.reason == "signal" else str(error)
-
-
-@cache
-def _compile_loop() -> None:
-    """Compile the loop, once per machine, here: children cannot keep machine code."""
-    import numba
-
-    from orchestrator.diagnosis.fmu.loop import run_loop
-
-    whole, real = numba.int64, numba.float64
-    run_loop.compile(
-        (whole[:, ::1], whole[:, ::1], whole[:, ::1], real[::1], real[::1], whole[::1], whole[::1], real[:, ::1],
-         real[::1], whole[:, ::1], real[:, ::1], whole[:, ::1], real[::1], whole[:, ::1], real[:, ::1],
-         whole[:, ::1], real[:, ::1], real[:, ::1])
-    )  # fmt: skip

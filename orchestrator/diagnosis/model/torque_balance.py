@@ -32,7 +32,6 @@ from orchestrator.diagnosis.data.signals import (
     smooth,
     triangle_average,
 )
-from orchestrator.diagnosis.model.balance_kernel import acceleration_kernel, hidden_load_kernel, slide_bristle
 from orchestrator.diagnosis.model.drive import delivered_torque, logged_torque, shift_signal
 from orchestrator.diagnosis.model.interface import (
     CandidateEffect,
@@ -201,7 +200,7 @@ class TorqueBalance(ResidualModel):
             found[:, 0] = self._simulate_hidden_load(p)[1]
         else:
             motion = np.column_stack([angles[0], speeds[0], angles[-1], speeds[-1]])
-            acceleration_kernel(plant, p)(motion, self._directions(p), p, step, self._uses_memory(p), found)
+            plant.motion.accelerate(motion, self._directions(p), p, step, self._uses_memory(p), found)
         missing = np.array(
             [p[place] * (triangle_average(found[:, n]) - accelerations[n]) for n, place in enumerate(self.inertias)]
         )
@@ -214,9 +213,9 @@ class TorqueBalance(ResidualModel):
         """Return angle and speed (n, 2) of a load that no encoder shows, and the motor's acceleration (n,)."""
         (angle, *_), (speed, *_), _ = self._motion(p)
         motion, signs, acceleration = np.empty((self.size, 2)), np.empty(self.size), np.empty(self.size)
-        width = float(np.exp(p[self.plant.stage().presliding[1]]))
+        width = float(np.exp(self.plant.value(p, self.plant.presliding[1])))
         substeps = max(2, self.plant.substeps(p, self.step))
-        fill = hidden_load_kernel(self.plant, p)
+        fill = self.plant.motion.accelerate_with_hidden_load
         bristle = np.ascontiguousarray(self._directions(p)[:, 0])
         fill(np.column_stack([angle, speed]), width, p, self.step, substeps, bristle, motion, signs, acceleration)
         return motion, acceleration
@@ -236,14 +235,13 @@ class TorqueBalance(ResidualModel):
     def _directions(self, p: Array) -> Array:
         """Return the directions (n, 2) of dry friction, which build up over the distances in ``p``."""
         signs = np.zeros((self.size, 2))
-        places = self.plant.stage().presliding
-        for n, angle in enumerate(self._angles):
-            key = (n, float(p[places[n]]))
+        for n, (angle, distance) in enumerate(zip(self._angles, self.plant.presliding, strict=False)):
+            key = (n, self.plant.value(p, distance))
             if key not in self._bristles:
                 if len(self._bristles) > MOST_KEPT:
                     self._bristles.clear()
                 steps, bristle = np.diff(angle, prepend=angle[0]), np.empty(self.size)
-                slide_bristle(steps, float(np.exp(key[1])), bristle)
+                self.plant.motion.slide_bristle(steps, float(np.exp(key[1])), bristle)
                 self._bristles[key] = bristle
             signs[:, n] = self._bristles[key]
         return signs

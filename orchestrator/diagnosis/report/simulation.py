@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.data.signals import first_derivative, smooth
 from orchestrator.diagnosis.model.drive import apply_lag, logged_torque, shift_signal
 from orchestrator.effects.of_logs import LEAD, SHIFT
-from orchestrator.plants.coarse_run import FINER, coarse_runner_of, coarse_steps, runs_coarsely
+from orchestrator.plants.coarse_run import FINER, coarse_steps, runs_coarsely
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import is_linear, linear_run_of
 from orchestrator.records.record import Record, quantisation_step
@@ -217,16 +217,14 @@ class Simulation:
         if not (self.history and runs_coarsely(plant, p)):
             return None
         steps = coarse_steps(plant, p, h, self.signals.turn)
-        coarse = coarse_runner_of(plant, p)
-        return lambda start, early, late, out: coarse(
-            tuple(start.tolist()), p, early, late, first, h, (steps, FINER * steps), out
-        )
+        run = plant.motion.run_coarsely
+        return lambda start, early, late, out: run(start, p, early, late, first, h, steps, FINER * steps, out)
 
     def _run_exactly(self, start: Array, asked: float, early: Array, late: Array, out: Array) -> None:
         _, first = self._dead_time
         memory = (float(start[7]), asked) if self.history else (0.0, UNASKED)
         own = self.plant.fmu_values(self.p)
-        self.plant.runner()((*start[:7].tolist(), *memory), own, early, late, first, self.signals.step, out)
+        self.plant.run_exactly(np.append(start[:7], memory), own, early, late, first, self.signals.step, out)
 
 
 def _requests(u: Array, begin: int, count: int, first: int) -> Array:

@@ -1,29 +1,33 @@
-"""A chain of three hidden states: the teeth touch at the lower flank, nowhere, or at the upper one."""
+"""A chain of three hidden states: the teeth touch at the lower flank, nowhere, or at the upper one; kernels."""
 
 import math
+from typing import Annotated, Any
 
-import numpy as np
+from orchestrator.building.translation.kernel_arrays import Reals, Wholes, scratch
+from orchestrator.building.translation.kinds import REAL, ArrayKind
 
-from orchestrator.shared.numba_cache import njit_on_disk
+__all__ = ["densities", "smooth"]
 
+States = Annotated[Any, ArrayKind(REAL, (None, 3))]
+Change = Annotated[Any, ArrayKind(REAL, (3, 3))]
 STATES = 3
 OUTLIER = 1e-6  # share of points that may be anything, so that one bad row cannot rule
 ROOT_HALF = math.sqrt(0.5)
 
 
-@njit_on_disk(nogil=True, error_model="numpy")
-def densities(left, variance, alpha, mask, out):  # type: ignore[no-untyped-def]
+def densities(left: Reals, variance: Reals, alpha: float, mask: Wholes, out: States) -> None:
     """Fill ``out`` (n, 3) with the density of each point's twist in each state.
 
     Args:
         left: (n,) twist about mid-gap [rad].
         variance: (n,) of its noise [rad^2].
         alpha: half-gap [rad].
-        mask: (n,) whether a point counts.
+        mask: (n,) whether a point counts: 1, else 0.
     """
-    for k in range(left.size):
-        if not mask[k]:
-            out[k, :] = 1.0
+    for k in range(len(left)):
+        if mask[k] == 0:
+            for s in range(3):
+                out[k, s] = 1.0
             continue
         sigma = math.sqrt(variance[k])
         r = left[k]
@@ -36,19 +40,18 @@ def densities(left, variance, alpha, mask, out):  # type: ignore[no-untyped-def]
         out[k, 1] = inside / (2.0 * alpha) + floor
 
 
-@njit_on_disk(nogil=True, error_model="numpy")
-def smooth(density, change, share, steps):  # type: ignore[no-untyped-def]
+def smooth(density: States, change: Change, scale: Reals, ahead: States, share: States, steps: Change) -> float:
     """Return the log likelihood; fill each state's share at each point and the expected steps between states.
 
     Args:
         density: (n, 3) of each point in each state.
         change: (3, 3) probabilities of the next state.
+        scale: (n,) scratch.
+        ahead: (n, 3) scratch.
         share: (n, 3) filled: probability of each state, given all points.
         steps: (3, 3) filled: expected number of steps from state to state.
     """
-    n = density.shape[0]
-    scale = np.empty(n)
-    ahead = np.empty((n, 3))
+    n = len(density)
     total = 0.0
     for k in range(n):
         norm = 0.0
@@ -65,10 +68,12 @@ def smooth(density, change, share, steps):  # type: ignore[no-untyped-def]
         total += math.log(norm)
         for s in range(3):
             ahead[k, s] /= norm
-    back = np.ones(3)
-    before = np.empty(3)
-    steps[:, :] = 0.0
+    back = scratch(3)
+    before = scratch(3)
     for s in range(3):
+        back[s] = 1.0
+        for r in range(3):
+            steps[r, s] = 0.0
         share[n - 1, s] = ahead[n - 1, s]
     for k in range(n - 2, -1, -1):
         for r in range(3):

@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.estimation.flanks.chain import STATES, densities, smooth
+from orchestrator.building.translation.kernels import Kernels
+from orchestrator.estimation.flanks.chain import STATES
 from orchestrator.estimation.flanks.points import Points
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.settings import FlankSettings
 
+CHAIN = Kernels("orchestrator.estimation.flanks.chain")
 TURN = 2.0 * math.pi
 OFFSET, RATIO, LATE, ALPHA = range(4)  # places of the columns of the regression
 STARTS = (0.3, 0.6, 1.0, 1.5)  # half-gaps tried, in standard deviations of the twist
@@ -154,15 +156,16 @@ class FlankProblem:
         """
         n = self.points.time.size
         mask = np.ones(n, dtype=np.bool_) if mask is None else mask
-        density, share, steps = np.empty((n, STATES)), np.empty((n, STATES)), np.empty((STATES, STATES))
+        density, ahead, share = (np.empty((n, STATES)) for _ in range(3))
+        steps, scale = np.empty((STATES, STATES)), np.empty(n)
         before = -math.inf
         for _ in range(self.settings.rounds if rounds is None else rounds):
             values = fit.values.copy()
             values[ALPHA] = max(fit.alpha, 0.1 * math.sqrt(fit.variance))
             twist = self._table(fit.base) @ values - self.points.load
             variance = fit.variance + self.points.variance
-            densities(twist, variance, float(values[ALPHA]), mask, density)
-            loglik = float(smooth(density, fit.change, share, steps))
+            CHAIN.densities(twist, variance, float(values[ALPHA]), mask, density)
+            loglik = CHAIN.smooth(density, fit.change, scale, ahead, share, steps)
             touching = share[:, 0] + share[:, 2]
             flank = np.divide(share[:, 2] - share[:, 0], touching, out=np.zeros(n), where=touching > 1e-12)
             weight = touching * mask * fit.variance / variance

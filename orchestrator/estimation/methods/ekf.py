@@ -1,22 +1,20 @@
 """The online estimator run over a whole record: the same source as the FMU ``BacklashEstimator``, compiled."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
+from orchestrator.building.translation.kernels import Kernels
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
-from orchestrator.plants.compiled import compile_module
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
-from orchestrator.shared.numba_cache import njit_on_disk
-from pyfmu_sources.backlash_estimator import FILTERS, SIZE, NoiseSettings
+from pyfmu_sources.backlash_estimator import NoiseSettings
 
+ONLINE = Kernels("orchestrator.estimation.online", checked=True)
 UNMEASURED = 1e6  # rad, standard deviation that stands for an encoder that is absent
 
 
@@ -29,47 +27,19 @@ class OnlineTrace:
     contact: Array
 
 
-@cache
-def _runner() -> Callable[..., None]:
-    """Return the compiled loop over a record."""
-    source = compile_module("backlash_estimator")
-    begin, advance, measure = source.begin, source.advance, source.measure
-    look, touching = source.combine, source.contact
-
-    @njit_on_disk()
-    def loop(u, theta_m, theta_l, model, settings, step, filters, alpha, deviation, contact):  # type: ignore[no-untyped-def]
-        first = 0
-        while first < u.size - 1 and not (theta_m[first] == theta_m[first] and theta_l[first] == theta_l[first]):
-            first += 1
-        begin(filters, theta_m[first], theta_l[first], settings)
-        for n in range(u.size):
-            if n > 0:
-                advance(filters, model, settings, u[n - 1], step)
-                if theta_m[n] == theta_m[n] and theta_l[n] == theta_l[n]:  # NaN: missing, no update
-                    measure(filters, settings, theta_m[n], theta_l[n])
-            alpha[n], deviation[n], best = look(filters, filters.shape[0])
-            contact[n] = touching(filters[best], model[6])
-
-    return loop
-
-
 def trace(record: Record, model: Model, settings: NoiseSettings | None = None) -> OnlineTrace:
     """Return the online estimate over a record; ``settings`` default to what the record and the model say.
 
     Returns:
         Half-gap [rad], its standard deviation and contact at each sample.
     """
-    loop = _runner()
     p = {name: entry.value for name, entry in model.parameters.items()}
     plant = (p["J_m"], p["J_l"], p["k"], p["c"], p["b_m"], p["b_l"], p["i"], p["tau"])
     load = record.theta_m / p["i"] if record.theta_l is None else record.theta_l
     chosen = settings or default_settings(record, model)
     n = record.size
     alpha, deviation, contact = np.empty(n), np.empty(n), np.empty(n)
-    loop(
-        record.u, record.theta_m, load, plant, tuple(chosen), record.step, np.zeros((FILTERS, SIZE)), alpha, deviation,
-        contact,
-    )  # fmt: skip
+    ONLINE.follow(record.u, record.theta_m, load, plant, tuple(chosen), record.step, alpha, deviation, contact)
     return OnlineTrace(alpha, deviation, contact)
 
 

@@ -20,7 +20,7 @@ _PYTHON = (
     "sys.path.pop(0); inmate.main()"
 )
 _SECRET = re.compile(r"TOKEN|SECRET|PASSWORD|PASSWD|CREDENTIAL|PRIVATE|API_?KEY|SESSION|COOKIE|AUTH", re.IGNORECASE)
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _OURS = ("orchestrator", "pyfmu_sources")
 _SYSTEM = (
     "/lib", "/lib32", "/lib64", "/usr/lib", "/usr/lib32", "/usr/lib64", "/usr/local/lib", "/usr/share/zoneinfo",
@@ -50,7 +50,7 @@ def environment(temporary: Path, walls: bool) -> dict[str, str]:
     if not walls:
         return dict.fromkeys(_ONE_THREAD, "1") | dict(os.environ) | own
     kept = {k: v for k, v in os.environ.items() if not _SECRET.search(k) and not k.startswith("PYTHON")}
-    own |= dict.fromkeys(("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR"), str(temporary))
+    own |= dict.fromkeys(("HOME", "XDG_CACHE_HOME"), str(temporary))
     own[VARIABLE] = str(machine_code_folder())
     return kept | own | dict.fromkeys(_ONE_THREAD, "1")
 

@@ -76,9 +76,9 @@ def test_pickles_of_a_child_are_bytes_and_nothing_else() -> None:
         if re.search(r"pickle\.loads?\(|Unpickler|multiprocessing|shelve|marshal\.loads?|allow_pickle=True",
                      path.read_text(encoding="utf-8"))
     }  # fmt: skip
-    # What the parent sent, and what the user's own cache holds; see docs/security.md.
+    # What the parent sent; see docs/security.md.
     own = {"shared/isolation/inmate.py", "engine/lane.py", "engine/worker.py", "engine/cluster.py"}
-    assert found == own | {"shared/numba_cache.py"}
+    assert found == own
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError()])
