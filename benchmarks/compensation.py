@@ -17,9 +17,9 @@ from types import MappingProxyType
 
 import numpy as np
 from numba import njit
-from orchestrator.plants.compiled import compile_module
 
 from orchestrator.building.native_build import ensure_native
+from orchestrator.building.translation.kernels import Kernels
 from orchestrator.plants.design import DrivetrainValues, design_regulator, five_state_model
 from pyfmu_sources.backlash_compensator_slave import BacklashCompensator
 from pyfmu_sources.backlash_estimator import SIZE, NoiseSettings, covariance
@@ -64,20 +64,17 @@ class Run:
         return np.concatenate([speed[1:][up], -speed[1:][down], [0.0]])
 
 
+OBSERVER = Kernels("benchmarks.observer_kernel", checked=True)
+
+
 @cache
 def kernels() -> tuple[Callable[..., None], Callable[..., Array]]:
     """The filter's sample and the plant's, compiled."""
-    source = compile_module("backlash_estimator")
-    predict, correct = source.predict, source.correct
     step, bristle = independent_plant._step, independent_plant._bristle
     coulomb = independent_plant.FC_L
 
-    @njit
     def observe(f, model, settings, u, theta_m, theta_l, first):
-        if not first:
-            predict(f, model, u, STEP, settings)
-        correct(f, 0, theta_m, settings[0] ** 2)
-        correct(f, 2, theta_l, settings[1] ** 2)
+        OBSERVER.observe(f, model, settings, u, theta_m, theta_l, STEP, first)
 
     @njit
     def run(x, bend, v, u, out):

@@ -55,7 +55,7 @@ def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_dire
     """Build a wheel of this platform, or of any where nothing was compiled; return its name.
 
     Args:
-        wheel_directory: where it goes.
+        wheel_directory: folder in which the wheel is put.
     """
     compile_all(INSTALLED)
     options = dict(config_settings or {})
@@ -69,7 +69,7 @@ def build_editable(wheel_directory: str, config_settings: Any = None, metadata_d
     """Build an editable installation, its machine code in the source tree; return the name of its wheel.
 
     Args:
-        wheel_directory: where it goes.
+        wheel_directory: folder in which the wheel is put.
     """
     compile_all(INSTALLED)
     return build_meta.build_editable(wheel_directory, config_settings, metadata_directory)
@@ -79,7 +79,7 @@ def compile_all(folder: Path) -> None:
     """Compile all kernels of the package into a folder, which is emptied before.
 
     Args:
-        folder: made if needed.
+        folder: of the libraries, made anew.
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()

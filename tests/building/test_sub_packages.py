@@ -1,4 +1,4 @@
-"""Equations in a package within the sources reach every kind of FMU and the compiled modules; others are refused."""
+"""Equations in a package within the sources reach every kind of FMU and kernels; others are refused."""
 
 import json
 import math
@@ -36,11 +36,17 @@ from fmpy import simulate_fmu
 from orchestrator.building.build import ensure_built
 from orchestrator.building.native_build import ensure_native
 from orchestrator.building.python_fmi3 import ensure_python_fmi3
-from orchestrator.plants.compiled import compile_module
+from orchestrator.building.translation.kernels import Kernels
 paths = [make(["LowPass"], Path(folder))["LowPass"] for make, folder in MAKERS]
 kept = dict(stop_time=0.5, output_interval=0.01, start_values={"u": 2.0, "T": 0.25}, output=["y"])
 ends = [float(simulate_fmu(str(path), **kept)["y"][-1]) for path in paths]
-print(json.dumps([*ends, compile_module("shapes.filters").filtered(0.0, 2.0, 0.25, 0.5)]))
+print(json.dumps([*ends, Kernels("low_pass").final(0.0, 2.0, 0.25, 0.5)]))
+"""
+KERNEL = """
+from pyfmu_sources.shapes.filters import filtered
+__all__ = ["final"]
+def final(y: float, u: float, time_constant: float, step: float) -> float:
+    return filtered(y, u, time_constant, step)
 """
 
 
@@ -57,6 +63,7 @@ def project(tmp_path: Path) -> Path:
         "from .slave_base", "from .shapes.filters import filtered\nfrom .slave_base"
     )
     (tmp_path / "pyfmu_sources" / "low_pass_slave.py").write_text(code, encoding="utf-8")
+    (tmp_path / "low_pass.py").write_text(KERNEL, encoding="utf-8")
     for name, text in SHAPES.items():
         (tmp_path / "pyfmu_sources" / "shapes").mkdir(exist_ok=True)
         (tmp_path / "pyfmu_sources" / "shapes" / name).write_text(text, encoding="utf-8")
