@@ -22,7 +22,7 @@ export function build(panel) {
     const before = first.value;
     first.replaceChildren(...whole().map((job) => make("option", { value: job.name, selected: job.name === before }, job.name)));
     alike();
-    fill(table, jobs.length ? make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "History" }, make("table", {},
+    fill(table, jobs.length ? make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "History" }, make("table", { class: "stack" },
       make("thead", {}, make("tr", {}, ["job", "ended", "state", "took", "command line"].map((text) => make("th", { scope: "col" }, text)))),
       make("tbody", {}, jobs.toReversed().map((job) => make("tr", {},
         make("td", {}, job.files.includes("report.html") ? make("a", { href: `file/results/${job.name}/report.html`, target: "_blank", rel: "noopener" }, job.name) : job.name),

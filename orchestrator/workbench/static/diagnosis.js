@@ -29,11 +29,11 @@ export function build(panel, go) {
 
   function effects(found) {
     const size = ([name, one]) => `${name} ${digits(one.value)} ${one.unit ?? ""}` + (one.interval ? ` (${digits(one.interval[0])} to ${digits(one.interval[1])})` : "");
-    return make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Effects" }, make("table", {},
+    return make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Effects" }, make("table", { class: "stack" },
       make("thead", {}, make("tr", {}, ["effect", "at", "grade", "size, 95 %", "not told apart from"].map((text) => make("th", { scope: "col" }, text)))),
       make("tbody", {}, found.effects.map((one) => make("tr", {},
-        make("td", {}, one.name.replaceAll("_", " ")), make("td", {}, one.site ?? ""), make("td", {}, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
-        make("td", {}, Object.entries(one.parameters).map(size).join("; ")), make("td", {}, (one.family ?? []).map((name) => name.replaceAll("_", " ")).join(", ") || "none"))))));
+        make("td", {}, one.name.replaceAll("_", " ")), make("td", { "data-label": "at" }, one.site ?? ""), make("td", { "data-label": "grade" }, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
+        make("td", { "data-label": "size, 95 %" }, Object.entries(one.parameters).map(size).join("; ")), make("td", { "data-label": "not told apart from" }, (one.family ?? []).map((name) => name.replaceAll("_", " ")).join(", ") || "none"))))));
   }
 
   // The corrected model with some of its effects ticked off, re-fitted by `diagnose --no-search`.

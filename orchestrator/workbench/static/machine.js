@@ -56,7 +56,7 @@ export function build(panel, go) {
       const off = make("input", { class: "number", inputmode: "decimal", value: digits(share), "aria-label": `${one.name}, off by at most, in percent`,
         onchange: () => set("uncertainty", off.value, off) });
       return make("tr", {}, make("td", {}, make("strong", {}, one.name), make("br"), make("span", { class: "note" }, one.meaning)),
-        make("td", { class: "pair" }, value, " ", one.unit === "1" ? "" : one.unit), make("td", { class: "pair" }, off, " %"),
+        make("td", { class: "pair" }, value, " ", one.unit === "1" ? "" : one.unit), make("td", { class: "pair", "data-label": "off by at most" }, off, " %"),
         make("td", {}, tag, make("br"), make("span", { class: "note" }, one.said.replace(/^[^:]*: (?:[^;]*; )?(?=.)/, ""))));
     }
 

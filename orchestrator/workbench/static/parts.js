@@ -101,7 +101,7 @@ function finished(job) {
       make("strong", {}, job.name), make("span", { class: `tag ${STATES[job.state]}` }, job.state),
       make("span", { class: "note" }, seconds > 0 ? duration(seconds) : ""),
       make("span", { class: "note" }, job.files.length > 1 ? "" : job.state === "stopped" ? "no results were left" : "")),
-    words.map((text) => make("p", { class: job.state === "failed" ? "message" : "message calm" }, plain(text.replace(/^error: /, "")))),
+    words.map((text) => make("p", { class: job.state === "failed" ? "message" : "message calm" }, plain(text.replace(/^error: /, "").replaceAll("Ctrl-C", "Stop")))),
     make("code", {}, job.line),
     make("ul", { class: "files" }, job.files.map((name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name }, name)))));
 }
