@@ -15,7 +15,7 @@ def check_fmus(
     policy: Policy,
     progress: Callable[[Verdict], None] = lambda verdict: None,
 ) -> list[Verdict]:
-    """Check FMUs one after the other. Return A verdict for each FMU."""
+    """Check FMUs one after the other, and return a verdict of each."""
     baseline = read_baseline(Path(policy.baseline)) if policy.baseline else frozenset()
     verdicts = []
     for path in paths:

@@ -142,7 +142,7 @@ def read_baseline(path: Path) -> frozenset[str]:
 
 
 def baseline_of(verdicts: Iterable[Verdict]) -> str:
-    """Write all issues as known ones. Return A JSON document for ``read_baseline``."""
+    """Return all issues as known ones: a JSON document for ``read_baseline``."""
     known = [
         _Known(issue.fingerprint, artifact(verdict.fmu), issue.finding.rule, issue.finding.message)
         for verdict in verdicts

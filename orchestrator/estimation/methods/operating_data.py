@@ -15,7 +15,7 @@ from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import interval_95
 
 LEAST_REVERSALS = 4
-SYSTEMATIC = 0.06  # of the size: what a model 5 % off does to all reversals alike, over records with known gaps
+SYSTEMATIC = 0.06  # of the size: what a model 5 % off does to all reversals alike, over known gaps
 
 
 def estimate(record: Record, model: Model) -> Estimate:

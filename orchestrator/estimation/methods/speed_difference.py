@@ -16,9 +16,7 @@ from orchestrator.shared.inference.normal import interval_95
 LEAST_TRAVERSALS = 3
 THRESHOLD = 4.0  # standard deviations of the torque's noise
 LEAST_SHARE = 0.05  # of the torque's effective value
-SYSTEMATIC = (
-    0.15  # of the size: what filters and a model 5 % off do to all traversals alike, over records with known gaps
-)
+SYSTEMATIC = 0.15  # of the size: what filters and a model 5 % off do to all traversals alike, over known gaps
 
 
 def estimate(record: Record, model: Model) -> Estimate:
