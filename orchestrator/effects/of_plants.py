@@ -277,6 +277,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         "shaft_hysteresis", "shaft", "gap", group("shaft_hysteresis", "torque", "twist"), "torque",
         lambda s: {"torque": 0.01 * s.torque_at("load"), "twist": 0.05 * s.typical_twist},
         lambda s: {"twist": tuple(f * s.typical_twist for f in (0.1, 0.4, 1.2))}, ("torque",), signed=False,
-        bounds=lambda s: {"twist": (0.02 * s.typical_twist, 5.0 * s.typical_twist)}, memory=True,
+        bounds=lambda s: {"twist": (0.02 * s.typical_twist, 5.0 * s.typical_twist)},
+        possible=lambda v, s: v["twist"] < 4.75 * s.typical_twist, memory=True,
     ),
 )  # fmt: skip

@@ -1,5 +1,6 @@
 """What is said of an axis: laws that a machine can have, names that test data refute, hints beside verdicts."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +11,9 @@ from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
+from orchestrator.diagnosis.report.summary import sureness, words_on_test_data
+from orchestrator.diagnosis.result import SignalMisfit
+from orchestrator.diagnosis.result import TestMisfit as MisfitOnTest
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model, read_model
@@ -108,3 +112,28 @@ def test_what_test_data_refute_is_not_in_the_corrected_model(tmp_path) -> None:
     assert found.workings.search.final.labels == tuple(one.label for one in found.effects if one.in_model)
     assert found.workings.final[model.plant.index(FRICTION)] == 0.0
     assert found.verdict == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("final", "torque", "still", "worse"),
+    [
+        (2.0, (0.9, 0.5, 0.05), False, False),  # runs drift, and the torque is better
+        (2.0, (0.9, 0.05, 0.5), False, True),
+        (2.0, (), False, True),
+        (2.0, (0.9, 0.5, 0.05), True, False),
+        (0.5, (0.9, 0.5, 0.05), False, False),
+    ],
+)
+def test_a_model_is_worse_by_its_torque_where_free_runs_drift(final, torque, still, worse) -> None:
+    signal = SignalMisfit("theta_m", "rad", 0.01, 3.0, 1.0, final)
+    assert MisfitOnTest("record", 100, (signal,), torque, still).is_worse(0.05, 0.1) is worse
+
+
+def test_a_test_part_at_rest_says_nothing_of_an_effect(model: Model) -> None:
+    record = axis_record(values(model, **{FRICTION: 0.8}), 3, "axis")
+    rest = replace(record, u=0.0 * record.u + 0.1, theta_m=0.0 * record.theta_m + 1.0)
+    found = diagnose(record, model, test=rest)
+    assert found.test[0].still
+    assert found.effects
+    assert all(np.isnan(one.evidence.motion_share) and "confirmed" in one.lowered_by for one in found.effects)
+    assert "on test data" not in " ".join(sureness(one) + words_on_test_data(one) for one in found.effects)

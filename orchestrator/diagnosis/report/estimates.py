@@ -153,7 +153,7 @@ def add_test_evidence(
     hold = not any(one.is_missed for record in test for one in record.signals)
 
     def with_test_evidence(effect: EffectEvidence) -> EffectEvidence:
-        if effect.label not in result.final.labels:
+        if effect.label not in result.final.labels or all(record.still for record in test):
             return effect
         without = fit_model(result.problem, result.final.point.without_effects([effect.label]), 3).point
         misses = missed(without)

@@ -51,6 +51,7 @@ EXPERIMENTS = {
     "limit": "torque steps of several sizes in both directions",
     "resonance": "a torque that sweeps slowly through all frequencies",
 }
+SLIGHT = 0.02  # share of the misfit on test data, a hundredth in rms, that is not worth a number
 NOTABLE_CHANGE = 0.005  # of a value that is worth a word
 REPEAT = "the same torque twice: what comes again is the machine, what does not is a disturbance"
 
@@ -169,6 +170,8 @@ def words_on_test_data(effect: GradedEffect) -> str:
         return f"; on test data it takes {percent(torque.gain)} of the torque that is left without it"
     if share < 0.0:
         return "; without it the test data are predicted better"
+    if share < SLIGHT:
+        return "; the test data are predicted as well without it"
     if share == 1.0:
         return "; without it no run follows the test data"
     return f"; without it the misfit on test data is {1.0 / math.sqrt(1.0 - share):.3g} times as large"
