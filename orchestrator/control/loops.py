@@ -66,6 +66,11 @@ class ControlTask:
         """The drivetrain as the controllers know it."""
         return DrivetrainValues(tau=self.tau)
 
+    def gains(self) -> tuple[float, ...]:
+        """Return the gains of the LQR for ``REGULATOR_STATES``."""
+        weights = np.diag(self.state_weights)
+        return design_regulator(five_state_model(self.nominal), weights, self.torque_weight, self.sample_time).gains
+
     def reference(self) -> tuple[Array, Array]:
         """Return the wanted angle [rad] and speed [rad/s] of the load at each sample, acceleration continuous."""
         t = np.arange(round(self.stop / self.sample_time) + 1) * self.sample_time
@@ -82,11 +87,8 @@ def make_loop(task: ControlTask, fmus: Mapping[str, Path], law: str, seed: Seque
     drawn = {name: getattr(nominal, name) * (1.0 + task.mismatch * rng.uniform(-1.0, 1.0)) for name in names}
     given = task.alpha * (1.0 + task.known * rng.uniform(-1.0, 1.0))
     seeds = [int(n) for n in rng.integers(2**31, size=2)]
-    gains = design_regulator(
-        five_state_model(nominal), np.diag(task.state_weights), task.torque_weight, task.sample_time
-    )
     values = {name: getattr(nominal, name) for name in ("J_m", "J_l", "b_m", "b_l", "i", "tau")}
-    controller = values | {f"K[{n}]": gain for n, gain in enumerate(gains.gains, start=1)}
+    controller = values | {f"K[{n}]": gain for n, gain in enumerate(task.gains(), start=1)}
     controller |= {"compliance": 1.0 / nominal.k, "u_max": task.torque_limit, "sample_time": task.sample_time}
     controller |= {"impact_speed": task.impact_speed, "torque_share": 0.0 if law == SHIFTED else 0.85}
     plant = drawn | {"alpha": task.alpha, "backlash_model": "nordin", "theta_m_start": -task.alpha * nominal.i}

@@ -24,6 +24,22 @@ class LawFound(msgspec.Struct, frozen=True):
     path: tuple[float, ...] = ()
 
 
+class ForecastFound(msgspec.Struct, frozen=True):
+    """The plain LQR at rest, without friction and load, by its gains alone.
+
+    ``twist`` and ``load`` are amplitudes over the half-gap, ``frequency`` [Hz]; margins [rad], [s]; ``rank`` of six
+    states.
+    """
+
+    cycles: bool
+    twist: float
+    load: float
+    frequency: float
+    phase_margin: float
+    delay_margin: float | None
+    rank: int
+
+
 class CompensateFound(ResultData, frozen=True, kw_only=True):
     """``compensate``: half-gap [rad], impact speed asked for [rad/s], and the least time of a traversal [s].
 
@@ -36,6 +52,7 @@ class CompensateFound(ResultData, frozen=True, kw_only=True):
     impact_speed: float
     bound: float
     laws: tuple[LawFound, ...]
+    forecast: ForecastFound | None = None
     bound_speeds: tuple[float, ...] = ()
     bound_times: tuple[float, ...] = ()
     path_times: tuple[float, ...] = ()

@@ -1,0 +1,94 @@
+"""Forecast of a loop at rest, against integration with events and against eigenvalues."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from orchestrator.control.standstill import forecast_rest, loop_margins
+from orchestrator.errors import ScenarioError
+from orchestrator.plants.design import DrivetrainValues, design_regulator, discretise, five_state_model
+
+STEP = 1e-3
+THESIS = (10.0, 50.0, 1.0, 1.0, 0.01)
+LOAD = (10.0, 1.0, 1000.0, 500.0, 0.01)
+
+
+def gains_of(tau, weights):
+    values = DrivetrainValues(tau=tau)
+    return values, design_regulator(five_state_model(values), np.diag(weights), 2e-3, STEP).gains
+
+
+def spectral_radius(values, gains, delay):
+    """Of the sampled loop whose request is late by whole samples."""
+    A, B = discretise(five_state_model(values), STEP)
+    n = 5 + delay
+    whole = np.zeros((n, n))
+    whole[:5, :5] = A
+    if delay:
+        whole[:5, 5] = B[:, 0]
+        whole[5:-1, 6:] = np.eye(delay - 1)
+        whole[-1, :5] = -np.asarray(gains)
+    else:
+        whole -= B @ np.atleast_2d(gains)
+    return np.abs(np.linalg.eigvals(whole)).max()
+
+
+@pytest.mark.parametrize("tau", [1.0, 5e-3])
+def test_the_margins_are_where_the_loop_becomes_unstable(tau):
+    values, gains = gains_of(tau, THESIS)
+    margins = loop_margins(five_state_model(values), gains, STEP)
+    late = int(margins.delay / STEP)
+    assert late > 2
+    assert spectral_radius(values, gains, late) < 1.0 < spectral_radius(values, gains, late + 1)
+    slow = loop_margins(five_state_model(values), gains, STEP, delay=2)
+    assert slow.delay == pytest.approx(margins.delay - 2.0 * STEP, rel=1e-3)
+    assert slow.phase < margins.phase
+    for factor in (slow.lower, slow.upper):
+        if 0.0 < factor < np.inf:
+            few = [spectral_radius(values, np.multiply(gains, factor * s), 2) for s in (0.99, 1.01)]
+            assert min(few) < 1.0 < max(few)
+    assert slow.upper < np.inf
+
+
+def integrate(values, gains, seconds):
+    """Load angle over the half-gap at each sample of the loop, from afar, by an integrator with tight tolerance."""
+    v, x, loads = values, np.array([0.0, 0.0, 0.0, 3.0, 0.0]), []
+
+    def rates(_, x, u):
+        phi, speed = x[0] / v.i - x[2], x[1] / v.i - x[3]
+        wound = phi - np.clip(phi, -1.0, 1.0)
+        torque = v.k * wound + v.c * speed * (wound != 0.0)
+        motor = (x[4] - v.b_m * x[1] - torque / v.i) / v.J_m
+        return x[1], motor, x[3], (torque - v.b_l * x[3]) / v.J_l, (u - x[4]) / v.tau
+
+    for _ in range(round(seconds / STEP)):
+        u = -float(np.dot(gains, x))
+        x = solve_ivp(rates, (0.0, STEP), x, args=(u,), rtol=1e-6, atol=1e-9, method="RK23").y[:, -1]
+        loads.append(x[2])
+    return np.array(loads)
+
+
+def test_the_thesis_weights_cycle_as_an_integrator_says():
+    values, gains = gains_of(1.0, THESIS)
+    found = forecast_rest(values, gains, STEP)
+    load = integrate(values, gains, 9.0)[-2000:]
+    up = np.flatnonzero((load[1:] >= 0.0) & (load[:-1] < 0.0))
+    assert found.cycles
+    assert found.settled
+    assert found.load == pytest.approx(0.5 * np.ptp(load), rel=0.05)
+    assert found.frequency == pytest.approx((up.size - 1) / ((up[-1] - up[0]) * STEP), rel=0.03)
+    assert found.rank == 5
+
+
+def test_weights_that_damp_the_load_are_still_on_a_fast_drive():
+    values, gains = gains_of(5e-3, LOAD)
+    found = forecast_rest(values, gains, STEP)
+    assert not found.cycles
+    assert found.settled
+    assert (found.load, found.twist, found.frequency) == (0.0, 0.0, 0.0)
+
+
+def test_a_loop_that_is_unstable_without_a_gap_is_refused():
+    values, gains = gains_of(5e-3, THESIS)
+    with pytest.raises(ScenarioError, match="must be stable without a gap"):
+        forecast_rest(values, gains, STEP, delay=6)
