@@ -30,7 +30,11 @@ def run(words, folder):
 
 def test_the_oldest_versions_are_those_that_are_allowed():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = [text for name in ("dask", "hdf5", "mdf", "parquet") for text in project["optional-dependencies"][name]]
+    extras = [
+        text
+        for name in ("dask", "hdf5", "mdf", "parquet", "workbench")
+        for text in project["optional-dependencies"][name]
+    ]
     allowed = dict(text.split(">=") for text in (*project["dependencies"], *extras))
     pinned = dict(line.split("==") for line in (ROOT / ".ci" / "oldest.txt").read_text().splitlines() if "==" in line)
     assert {name: (v + ".0.0").split(".")[:3] for name, v in allowed.items()} == {
