@@ -155,7 +155,7 @@ def plain(value: Any) -> Cell:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, Mapping):
-        return ", ".join(f"{k}: {_short(plain(v))}" for k, v in value.items())
+        return ", ".join(f"{k}: {_short(plain(v))}" for k, v in value.items() if v not in (None, "", [], {}))
     return ", ".join(_short(plain(v)) for v in value)
 
 

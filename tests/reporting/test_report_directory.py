@@ -1,8 +1,9 @@
 """From a result directory to its page: every command, damaged input, the `report` command."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
+import msgspec
 import pytest
 
 from orchestrator.checking.findings import Execution
@@ -273,3 +274,25 @@ def test_the_page_of_a_benchmark_shows_ratios_and_scaling(tmp_path):
     bars, growth = sections(report, Plot)
     assert bars.categories == ("ours", "theirs")
     assert [s.name for s in growth.series] == ["2 FMUs", "64 FMUs"]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """An argument as commands hand it on."""
+
+    ratio: float
+    names: tuple[str, ...] = ()
+
+
+class Limits(msgspec.Struct):
+    select: tuple[str, ...]
+    limits: dict[str, float]
+    choice: Choice
+
+
+def test_arguments_of_the_program_s_own_kinds_are_told_in_words(tmp_path):
+    given = {"policy": Limits(("unit.*", "xml"), {}, Choice(2.5)), "where": tmp_path}
+    write_result(tmp_path, "build", given, None, {"fmus": {}})
+    origin = dict(report_from_directory(tmp_path).origin)
+    assert origin["policy"] == "select: unit.*, xml, choice: ratio: 2.5"
+    assert origin["where"] == str(tmp_path)
