@@ -255,6 +255,11 @@ class BrokenPlant:
         more = " ".join(f"{key}={value}" for key, value in self.changes)
         return f"{self.version} {self.interfaces} {self.fault} {more}".strip()
 
+    @property
+    def clock(self) -> str:
+        """What clock the plant has; empty: none."""
+        return dict(self.changes).get("clock", "")
+
     def build(self, path: Path) -> Path:
         """Build it at ``path`` and return that."""
         return build_plant(path, self.version, self.interfaces, self.fault.strip("-"), dict(self.changes))
