@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
-from orchestrator.checking.probing.movement import moved
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
 from orchestrator.checking.probing.statuses import StatusError
 
@@ -51,9 +50,9 @@ def _silent_run(context: Context, driver: Driver) -> list[list[Any]]:
 
 @contextmanager
 def _other_instance(context: Context) -> Iterator[Driver]:
-    """A second instance, with other parameters and start values than the first where the FMU takes them."""
+    """A second instance, with the parameters and start values of the file set, where the first has others."""
     bench, movement = context.bench, context.bench.movement
-    others = {v: x for v in movement.values if (x := moved(v, v.start or (), 1)) is not None}
+    others = {v: v.start or () for v in movement.values}
     with bench.instance(name="second", initialised=False) as other:
         bench.movement = replace(movement, values=others)
         try:
