@@ -45,9 +45,9 @@ def call(scope: Scope, node: ast.Call, wanted: Kind | None) -> Code:
         kind = kind_of(target.__self__)
         return convert(scope, node, tuple_built(scope, node, kind), kind)
     name = getattr(target, "__name__", "")
-    if target is getattr(math, name, None):
+    if name and target is getattr(math, name, None):
         return _math(scope, node, name)
-    if target is getattr(builtins, name, None):
+    if name and target is getattr(builtins, name, None):
         return _builtin(scope, node, name, wanted)
     if isinstance(target, type) and hasattr(target, "_fields"):
         return _construct(scope, node, target)
