@@ -100,7 +100,7 @@ def test_ctrl_c_ends_the_command_with_what_it_has(
 
 def test_work_ends_at_twice_what_was_told(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [50.0]
-    monkeypatch.setattr(_budget, "working_seconds", lambda: now[0])
+    monkeypatch.setattr(_budget.time, "process_time", lambda: now[0])
     budget = Budget()
     assert budget.why() == ""
     budget.begin(10.0)
