@@ -21,7 +21,7 @@ from orchestrator.records.columns import (
 from orchestrator.records.counters import check_sign, check_wraps, decode_sign, unwrap, unwrap_time
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
-from orchestrator.records.names import Choice, choose
+from orchestrator.records.names import Choice, find_channels
 from orchestrator.records.rasters import bring_to_motor, make_uniform
 from orchestrator.records.requests import SAMPLED
 from orchestrator.records.stamps import seconds_of
@@ -190,23 +190,44 @@ def _in_part(
 def choose_channels(
     source: RecordSource, columns: Mapping[str, Column], where: str, torque_needed: bool = True
 ) -> dict[str, Choice]:
-    """Return the channel of each column; the time is one of the motor's raster, or made from a rate."""
+    """Return the channel of each column; the time is one of the motor's raster, or made from a rate.
+
+    Raises:
+        RecordError: a column that must be there is not, or several channels may be it.
+    """
+    found, unclear = find_all_channels(source, columns, where, torque_needed)
+    for message in unclear.values():
+        raise RecordError(message)
+    return found
+
+
+def find_all_channels(
+    source: RecordSource, columns: Mapping[str, Column], where: str, torque_needed: bool = True
+) -> tuple[dict[str, Choice], dict[str, str]]:
+    """Return the channels that were found, and for each other column that must be there what is missing.
+
+    Raises:
+        RecordError: there are no columns of numbers.
+    """
     heads = list(source.heads)
     if not heads:
         raise RecordError(f"{where}: a record must hold columns of numbers, but there are none")
     rated = columns.get("time", Column()).rate is not None or source.rate is not None
     rasters = {head.raster for head in heads}
     if len(rasters) > 1:
-        signals = choose(heads, columns, where, skip=("time",), torque_needed=torque_needed)
+        signals, unclear = find_channels(heads, columns, where, skip=("time",), torque_needed=torque_needed)
+        if "theta_m" not in signals:
+            return signals, unclear
         raster = heads[signals["theta_m"].place].raster
         inside = [n for n, head in enumerate(heads) if head.raster == raster]
         taken = {choice.place for choice in signals.values()}
         clocks = [n for n in inside if n not in taken]
-        found = choose([heads[n] for n in clocks], columns, where, ("u", "theta_m", "theta_l"), rated)
-        return signals | {
-            name: Choice(clocks[choice.place], choice.assumed, choice.numbered) for name, choice in found.items()
-        }
-    return choose(heads, columns, where, (), rated, torque_needed)
+        found, unclear_time = find_channels(
+            [heads[n] for n in clocks], columns, where, ("u", "theta_m", "theta_l"), rated
+        )
+        placed = {name: Choice(clocks[one.place], one.assumed, one.numbered) for name, one in found.items()}
+        return signals | placed, unclear | unclear_time
+    return find_channels(heads, columns, where, (), rated, torque_needed)
 
 
 def _time(

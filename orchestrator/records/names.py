@@ -22,42 +22,52 @@ class Choice:
     numbered: bool = False
 
 
-def choose(
+def find_channels(
     heads: Sequence[Head],
     columns: Mapping[str, Column],
     source: str,
     skip: Sequence[str] = (),
     rated: bool = False,
     torque_needed: bool = True,
-) -> dict[str, Choice]:
-    """Return the channel of each column of a record: named, of the same name, or recognised without doubt."""
+) -> tuple[dict[str, Choice], dict[str, str]]:
+    """Return the channel of each column of a record: named, of the same name, or recognised without doubt.
+
+    Returns:
+        the channels that were found, and for each other column that must be there a message that says what is missing.
+    """
     found: dict[str, Choice] = {}
+    unclear: dict[str, str] = {}
     names = [name for name in COLUMNS if name not in skip]
     for name in names:
         wanted = columns.get(name, Column()).name
         places = find_named(heads, wanted or name)
         if len(places) > 1:
-            raise RecordError(
+            unclear[name] = (
                 f"{source}: column `{wanted or name}` must appear once, but appears {len(places)} times: say "
                 f'`[columns.{name}] name = "#{places[0] + 1}"` to take the first of them'
             )
-        if places:
+        elif places:
             found[name] = Choice(places[0])
         elif wanted:
-            raise RecordError(
+            unclear[name] = (
                 f"{source}: column `{wanted}` of `[columns.{name}] name` must be there, but is not; there is "
                 f"{list_names(heads)}{near(wanted, heads)}"
             )
     for name in names:
-        if name not in found:
+        if name in found or name in unclear:
+            continue
+        try:
             choice = _recognise(name, heads, {c.place for c in found.values()}, source)
-            if choice is not None:
-                found[name] = choice
-            elif name not in OPTIONAL and not (name == "time" and rated) and (name != "u" or torque_needed):
-                raise RecordError(_absence_message(name, heads, source))
+        except RecordError as error:
+            unclear[name] = str(error)
+            continue
+        if choice is not None:
+            found[name] = choice
+        elif name not in OPTIONAL and not (name == "time" and rated) and (name != "u" or torque_needed):
+            unclear[name] = _absence_message(name, heads, source)
     if "u" in names and "u" not in found and "theta_l" not in found:
-        raise RecordError(_absence_message("u", heads, source))
-    return found
+        unclear.setdefault("u", _absence_message("u", heads, source))
+    return found, unclear
 
 
 def find_named(heads: Sequence[Head], name: str) -> list[int]:

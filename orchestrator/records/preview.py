@@ -14,7 +14,7 @@ from orchestrator.records.columns import COLUMNS, KINDS, MEANINGS, SI, Column
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.formats.text_file import open_text
-from orchestrator.records.loading import Reading, choose_channels, load
+from orchestrator.records.loading import Reading, find_all_channels, load
 from orchestrator.records.names import Choice
 from orchestrator.records.units import parse_unit
 
@@ -70,7 +70,8 @@ class ColumnTaken(msgspec.Struct, frozen=True):
 class LogPreview(msgspec.Struct, frozen=True):
     """A log: raw lines of a text with the line of its names (from 1), channels, columns, and what is wrong so far.
 
-    ``notes`` are what was detected and assumed, such as the columns that are not used.
+    ``notes`` are what was detected and assumed, such as the columns that are not used; ``missing`` are the columns that
+    must be there and are not, or that several channels may be.
     """
 
     file: str
@@ -82,6 +83,7 @@ class LogPreview(msgspec.Struct, frozen=True):
     columns: tuple[ColumnTaken, ...]
     problem: str = ""
     notes: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
 
 
 def preview_log(path: Path, columns: Mapping[str, Column], header: int | None = None) -> LogPreview:
@@ -96,11 +98,11 @@ def preview_log(path: Path, columns: Mapping[str, Column], header: int | None = 
     """
     lines = _raw_lines(path)
     with open_source(path, header) as source:
-        problem, chosen = "", dict[str, Choice]()
         try:
-            chosen = choose_channels(source, columns, str(path), torque_needed=False)
+            chosen, unclear = find_all_channels(source, columns, str(path), torque_needed=False)
+            problem = next(iter(unclear.values()), "")
         except RecordError as error:
-            problem = str(error)
+            chosen, unclear, problem = {}, {}, str(error)
         taken = [_take(name, chosen.get(name), columns.get(name, Column()), source) for name in COLUMNS]
         notes: tuple[str, ...] = ()
         if not problem:
@@ -109,6 +111,7 @@ def preview_log(path: Path, columns: Mapping[str, Column], header: int | None = 
         return LogPreview(
             path.name, source.dialect, source.rate, lines if header is not None or lines else (),
             _names_line(lines, source, header), tuple(_channels(source, used)), tuple(taken), problem, notes,
+            tuple(unclear),
         )  # fmt: skip
 
 

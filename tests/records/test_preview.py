@@ -39,6 +39,21 @@ def test_what_is_recognised_what_is_not_and_what_is_missing(log: Path) -> None:
     assert seen.channels[3].rows[0] == "0"
 
 
+def test_a_column_that_is_missing_hides_no_other(log: Path) -> None:
+    log.write_text(log.read_text().replace("Motor position [deg]", "Achse A [deg]"))
+    seen = preview_log(log, {})
+    assert [channel.taken_as for channel in seen.channels] == ["time", "u", "", ""]
+    assert seen.missing == ("theta_m",)
+    assert "both look like the motor's angle" in seen.problem
+
+
+def test_a_stated_name_that_is_wrong_hides_no_other(log: Path) -> None:
+    seen = preview_log(log, {"theta_l": Column(name="Achse Q")})
+    assert [channel.taken_as for channel in seen.channels] == ["time", "u", "theta_m", ""]
+    assert seen.missing == ("theta_l",)
+    assert "did you mean `Achse B [deg]`?" in seen.problem
+
+
 def test_choices_change_ranges_in_si(log: Path) -> None:
     stated = {"u": Column(torque_constant=0.5), "theta_l": Column(name="#4")}
     seen = preview_log(log, stated)
