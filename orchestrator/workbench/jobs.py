@@ -67,7 +67,8 @@ class Job:
     def as_plain(self) -> dict[str, Any]:
         """Return what a page and ``job.json`` say of it."""
         plain = {name: getattr(self, name) for name in _SHOWN}
-        files = () if not self.is_over() else sorted(p.name for p in self.folder.iterdir() if _is_result(p))
+        found = () if not self.is_over() else (*self.folder.glob("*"), *self.folder.glob("diagnosis/*"))
+        files = sorted(path.relative_to(self.folder).as_posix() for path in found if _is_result(path))
         return {**plain, "line": shlex.join([PROGRAM, *self.words]), "files": list(files)}
 
 

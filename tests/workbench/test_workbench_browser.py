@@ -122,6 +122,27 @@ def test_a_value_of_the_machine_becomes_the_users(inspected: Any, served: Served
     assert "value = 0.003   # kg.m2: yours" in (served.folder / "files" / "model-yours.toml").read_text()
 
 
+def test_no_action_runs_on_a_number_that_is_none(inspected: Any, served: Served) -> None:
+    value = find(inspected, "input[aria-label='k, value in N.m/rad']")
+    before = value.get_attribute("value")
+    value.clear()
+    value.send_keys("4OO\t")
+    press(inspected, "Save as a new model file")
+    wait(inspected, lambda d: "but is “4OO”" in d.find_element("id", "panel-machine").text)
+    assert not (served.folder / "files" / "model-yours-2.toml").exists()
+    value.clear()
+    value.send_keys(f"{before}\t")
+
+
+def test_results_of_a_tab_stand_there_after_a_reload(inspected: Any) -> None:
+    inspected.refresh()
+    choose_tab(inspected, "log")
+    find(inspected, "#panel-log iframe")
+    assert find(inspected, "[data-key=use-3]").get_attribute("value") == "theta_l"
+    choose_tab(inspected, "machine")
+    wait(inspected, lambda d: "model-yours.toml" in d.find_element("id", "panel-machine").text)
+
+
 def test_a_diagnosis_is_stopped_from_the_page(inspected: Any, served: Served) -> None:
     choose_tab(inspected, "diagnosis")
     press(inspected, "Diagnose")
@@ -166,9 +187,24 @@ def test_outputs_are_dragged_to_inputs_of_the_same_quantity(inspected: Any, serv
     set_screen(inspected, 1280, 900, "light")
 
 
+def test_a_log_chosen_in_another_tab_is_looked_at(inspected: Any, served: Served) -> None:
+    lines = (served.folder / "files" / "drive.csv").read_text().splitlines()
+    lines[2] = "Time [ms];Current setpoint [A];Achse A [deg];Achse B [deg]"
+    (served.folder / "other.csv").write_text("\n".join(lines) + "\n")
+    other = served.upload(served.folder / "other.csv")
+    choose_tab(inspected, "gap")
+    find(inspected, f"#panel-gap option[value='{other}']")
+    pick(inspected, "#panel-gap select", "other.csv")
+    choose_tab(inspected, "log")
+    wait(inspected, lambda d: "Not used: Achse A [deg], Achse B [deg]" in d.find_element("id", "panel-log").text)
+    assert "Still needed. Motor angle: the channel that holds it" in inspected.find_element("id", "panel-log").text
+    assert inspected.find_elements("css selector", "#panel-log iframe") == []
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (390, "light"), (1280, "dark")])
 def test_nothing_is_wider_than_the_screen(inspected: Any, served: Served, width: int, scheme: str) -> None:
     set_screen(inspected, width, 900, scheme)
+    inspected.execute_script("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
     for tab in inspected.find_elements("css selector", "[role=tab]"):
         inspected.execute_script("arguments[0].click()", tab)
         assert inspected.execute_script("return document.documentElement.scrollWidth") <= width, tab.text

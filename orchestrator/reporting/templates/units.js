@@ -7,9 +7,9 @@ class Units {
   static listeners = [];
 
   // Factor and name with which a quantity in `unit` is shown.
-  static shown(unit) {
+  static shown(unit, chosen = Units.chosen) {
     const found = ANGULAR.exec(unit ?? "");
-    return found ? { factor: ANGLES[Units.chosen], name: Units.chosen + (found[1] ?? "") } : { factor: 1, name: unit };
+    return found ? { factor: ANGLES[chosen], name: chosen + (found[1] ?? "") } : { factor: 1, name: unit };
   }
 
   static choose(name) {

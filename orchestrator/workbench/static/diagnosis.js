@@ -1,3 +1,4 @@
+/* global Units */
 import { get, post } from "./api.js";
 import { check, digits, fill, make, plain } from "./dom.js";
 import { inputs, needLog, reading, trustTag } from "./gap.js";
@@ -10,7 +11,7 @@ export function build(panel, go) {
   const said = message(), read = reading();
   let test = "", settings = "";
   const options = () => ({ model: choices.model, test, settings, ...read.options() });
-  const view = jobView((job) => {
+  const view = jobView("diagnosis", (job) => {
     const place = make("div", {});
     show(job, place).catch((error) => said.say(error.message));
     return place;
@@ -28,7 +29,10 @@ export function build(panel, go) {
   }
 
   function effects(found) {
-    const size = ([name, one]) => `${name} ${digits(one.value)} ${one.unit ?? ""}` + (one.interval ? ` (${digits(one.interval[0])} to ${digits(one.interval[1])})` : "");
+    const size = ([key, one]) => {
+      const { factor, name } = Units.shown(one.unit, found.angle_unit);
+      return `${key.replaceAll("_", " ")} ${digits(factor * one.value)} ${name && name !== "1" ? name : ""}` + (one.interval ? ` (${digits(factor * one.interval[0])} to ${digits(factor * one.interval[1])})` : "");
+    };
     return make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Effects" }, make("table", { class: "stack" },
       make("thead", {}, make("tr", {}, ["effect", "at", "grade", "size, 95 %", "not told apart from"].map((text) => make("th", { scope: "col" }, text)))),
       make("tbody", {}, found.effects.map((one) => make("tr", {},

@@ -23,6 +23,25 @@ export function check(text, checked, onchange) {
   return make("label", { class: "check" }, make("input", { type: "checkbox", checked, onchange }), text);
 }
 
+// A field for a number, with a point or a comma; `taken` gets it, or null where the field was emptied and is not required.
+export function numberInput(attributes, taken, able = () => true) {
+  const made = make("input", { class: "number", inputmode: "decimal", ...attributes, onchange: () => {
+    const number = numberIn(made), wrong = number === null ? made.required : !(Number.isFinite(number) && able(number));
+    made.setAttribute("aria-invalid", String(wrong));
+    if (!wrong) taken?.(number);
+  } });
+  return made;
+}
+
+export const numberIn = (input) => (input.value.trim() === "" ? null : Number(input.value.trim().replace(",", ".")));
+
+// What a page says of a field that holds no number which can be meant, null where there is none.
+export function wrongField(place) {
+  const input = [...place.querySelectorAll('input[aria-invalid="true"]')].find((one) => one.offsetParent);
+  if (!input) return null;
+  return { input, said: `“${input.labels?.[0]?.textContent ?? input.getAttribute("aria-label")}” must be a number that makes sense there, but is “${input.value}”` };
+}
+
 export function choice(options, value, onchange) {
   const made = make("select", { onchange: () => onchange(made.value) },
     options.map(([key, text]) => make("option", { value: key, selected: key === value }, text)));

@@ -1,5 +1,5 @@
 import { fileAddress, get, post, upload } from "./api.js";
-import { check, choice, field, fill, make } from "./dom.js";
+import { check, choice, field, fill, make, numberIn, numberInput } from "./dom.js";
 import { Graph, fits, inputsOf, outputsOf, place } from "./graph.js";
 import { action, dropZone, fileChoice, isFmu, isLog, jobView, message } from "./parts.js";
 import { choose, refresh, start } from "./state.js";
@@ -15,7 +15,7 @@ const KINDS = {
 const WORDS = { constant: "constant", step: "step", sine: "sine", square: "square wave", table: "a table of the session", drawn: "drawn by hand" };
 
 export function build(panel) {
-  const said = message(), graphSaid = message(), tree = make("div", {}), editor = make("div", {}), view = jobView();
+  const said = message(), graphSaid = message(), tree = make("div", {}), editor = make("div", {}), view = jobView("fmus");
   const nodes = {}, known = new Map();
   let connections = [], sources = [], fmu = "", unwanted = new Set();
   const run = { stop: 1, step: 0.001, algorithm: "gauss_seidel" };
@@ -141,23 +141,17 @@ export function build(panel) {
   }
 
   function number(text, table, key) {
-    const input = make("input", { class: "number", inputmode: "decimal", value: table[key] ?? "", onchange: () => {
-      const value = Number(input.value.replace(",", "."));
-      input.setAttribute("aria-invalid", String(!Number.isFinite(value)));
-      if (Number.isFinite(value)) table[key] = value;
-    } });
-    return field(text, input);
+    return field(text, numberInput({ value: table[key] ?? "", required: true }, (value) => { table[key] = value; }));
   }
 
   function parameters(name, node) {
     const open = node.variables.filter((one) => one.causality === "parameter" && ["Real", "Integer"].includes(one.type)).slice(0, 200);
     if (!open.length) return null;
     return make("details", {}, make("summary", {}, `Parameters of ${name} (${open.length})`), make("div", { class: "row" }, open.map((one) => {
-      const input = make("input", { class: "number", inputmode: "decimal", placeholder: String(one.start ?? ""), value: node.parameters[one.name] ?? "", onchange: () => {
-        const value = Number(input.value.replace(",", "."));
-        if (input.value.trim() === "") delete node.parameters[one.name];
-        else if (Number.isFinite(value)) node.parameters[one.name] = value;
-      } });
+      const input = numberInput({ placeholder: String(one.start ?? ""), value: node.parameters[one.name] ?? "" }, (value) => {
+        if (value === null) delete node.parameters[one.name];
+        else node.parameters[one.name] = value;
+      });
       return field(`${one.name}${one.unit && one.unit !== "1" ? ` [${one.unit}]` : ""}`, input);
     })));
   }
@@ -230,8 +224,8 @@ export function build(panel) {
     return made;
   }
 
-  const limit = make("input", { class: "number", inputmode: "decimal", placeholder: "the usual one" });
-  const limited = () => ({ time_limit: limit.value.trim() === "" ? null : Number(limit.value.replace(",", ".")) });
+  const limit = numberInput({ placeholder: "the usual one" });
+  const limited = () => ({ time_limit: numberIn(limit) });
   const written = make("p", { class: "note", role: "status" });
   panel.append(
     dropZone("Drop FMUs, SSP files or tables here", (file) => (isFmu(file) ? pick(file) : undefined), true),

@@ -1,5 +1,6 @@
+/* global Units */
 import { post } from "./api.js";
-import { check, digits, field, make, plain } from "./dom.js";
+import { check, digits, field, make, numberIn, numberInput, plain } from "./dom.js";
 import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, start } from "./state.js";
 
@@ -10,13 +11,13 @@ export const inputs = () => make("div", { class: "row" },
 // Options that all commands have for reading a log; `reading()` gives what the user has filled in.
 export function reading() {
   const part = make("input", { placeholder: "all, or 2:30", "aria-describedby": "" });
-  const rate = make("input", { class: "number", inputmode: "decimal", placeholder: "all samples" });
+  const rate = numberInput({ placeholder: "all samples" });
   const stamps = make("select", {}, [["", "are uniform"], ["uniform", "jitter, the samples do not"], ["linear", "interpolate linearly"], ["cubic", "interpolate by cubics"]]
     .map(([value, text]) => make("option", { value }, text)));
   return {
     element: make("details", {}, make("summary", {}, "Reading of the log"), make("div", { class: "row" },
       field("Part [s]", part), field("Samples per second", rate), field("Times of the rows", stamps))),
-    options: () => ({ part: part.value.trim(), rate: rate.value.trim() === "" ? null : Number(rate.value), resample: stamps.value }),
+    options: () => ({ part: part.value.trim(), rate: numberIn(rate), resample: stamps.value }),
   };
 }
 
@@ -30,7 +31,7 @@ export function build(panel) {
   const said = message(), cost = make("p", { role: "status" });
   const read = reading(), motorOnly = check("leave the load encoder out", false, () => {});
   const options = () => ({ model: choices.model, motor_only: motorOnly.querySelector("input").checked, ...read.options() });
-  const view = jobView((job) => {
+  const view = jobView("gap", (job) => {
     const place = make("div", {});
     resultOf(job).then((found) => {
       if (!found) return;
@@ -39,10 +40,10 @@ export function build(panel) {
         place.append(make("p", { class: "answer" }, best ? `Best: ${best.name}, bound ${digits(best.bound)} rad, up to ${digits(best.peak_torque)} N.m` : "no excitation within these limits shows it"));
       }
       if (!found.record && found.design) return;
-      const alpha = found.alpha ?? null;
+      const alpha = found.alpha ?? null, { factor, name } = Units.shown("rad", found.record?.angle_unit);
       const lines = alpha === null
         ? [found.not_applicable ?? found.message ?? "no half-gap"]
-        : [`Half-gap ${digits(alpha)} rad` + (found.interval ? `, 95 %: ${digits(found.interval[0])} to ${digits(found.interval[1])} rad` : "")];
+        : [`Half-gap ${digits(factor * alpha)} ${name}` + (found.interval ? `, 95 %: ${digits(factor * found.interval[0])} to ${digits(factor * found.interval[1])} ${name}` : "")];
       place.append(make("p", { class: "answer" }, lines.join(" "), " ", trustTag(found.trust)));
       for (const reason of found.trust?.reasons ?? []) place.append(make("p", { class: "note" }, plain(reason)));
     });
@@ -63,8 +64,8 @@ export function build(panel) {
 
   // An experiment that would show the gap better, by the command's own design.
   const limits = [["size", "Half-gap to be seen [rad]", "the estimate"], ["torque_limit", "Largest torque [N.m]", "250"], ["speed_limit", "Largest motor speed [rad/s]", "50"], ["duration", "Length [s]", "10"]]
-    .map(([key, text, usual]) => ({ key, text, input: make("input", { class: "number", inputmode: "decimal", placeholder: usual }) }));
-  const wanted = () => Object.fromEntries(limits.filter(({ input }) => input.value.trim() !== "").map(({ key, input }) => [key, Number(input.value.replace(",", "."))]));
+    .map(([key, text, usual]) => ({ key, text, input: numberInput({ placeholder: usual }) }));
+  const wanted = () => Object.fromEntries(limits.map(({ key, input }) => [key, numberIn(input)]));
   const proposal = make("details", {}, make("summary", {}, "What to log next: propose an experiment"),
     make("div", { class: "row" }, limits.map(({ text, input }) => field(text, input)),
       action("Propose an experiment", said, async () => view.show(await start("estimate", [], { model: choices.model, design: true, ...wanted() })))));

@@ -1,5 +1,5 @@
 import { post } from "./api.js";
-import { choice, digits, field, fill, make, plain } from "./dom.js";
+import { choice, digits, field, fill, make, numberInput, plain } from "./dom.js";
 import { action, dropZone, fileChoice, isLog, jobView, message } from "./parts.js";
 import { choices, choose, jobOf, start, watch } from "./state.js";
 
@@ -24,15 +24,19 @@ const OF_COLUMN = {
 export function build(panel, go) {
   const said = message(), changes = make("p", { class: "message calm", role: "status" });
   const body = make("div", {});
-  let seen = null, turn = 0;
-  const view = jobView(() => [make("p", {}, action("Go on to the machine", said, () => go("machine")))]);
+  let seen = null, turn = 0, looked = choices.log;
+  const view = jobView("log", () => [make("p", {}, action("Go on to the machine", said, () => go("machine")))]);
+  watch(() => {  // whichever tab has chosen another log
+    if (choices.log === looked) return;
+    looked = choices.log;
+    seen = null;
+    view.show("");
+    look();
+  });
   watch(() => {
     const job = jobOf(view.name());
     const made = job && `results/${job.name}/model.toml`;
-    if (job?.state === "done" && job.files.includes("model.toml") && view.given !== job.name) {
-      view.given = job.name;
-      choose({ model: made });
-    }
+    if (job?.state === "done" && job.files.includes("model.toml") && choices.given !== job.name) choose({ model: made, given: job.name });
   });
 
   async function look() {
@@ -51,10 +55,7 @@ export function build(panel, go) {
   }
 
   function pick(log) {
-    if (log === choices.log) return;
-    seen = null;
-    choose({ log, columns: {}, header: null, model: "" });
-    look();
+    if (log !== choices.log) choose({ log, columns: {}, header: null, model: "" });
   }
 
   function state(column, changed) {
@@ -87,7 +88,7 @@ export function build(panel, go) {
 
   function card(one) {
     const stated = choices.columns[one.column] ?? {};
-    const options = [["", one.how === "named" && !stated.name ? "by its own name" : "as recognised"],
+    const options = [["", one.how === "absent" ? "none" : one.how === "named" && !stated.name ? "by its own name" : "as recognised"],
       ...seen.channels.map((channel) => [String(channel.place), channel.label])];
     const pickChannel = choice(options, stated.name && one.place !== null ? String(one.place) : "", (place) => assign(one.column, place));
     pickChannel.dataset.key = `channel-${one.column}`;
@@ -110,13 +111,7 @@ export function build(panel, go) {
   }
 
   function numberField(column, key, value, needed) {
-    const input = make("input", { class: "number", inputmode: "decimal", value: value ?? "", "data-key": `${key}-${column}`,
-      onchange: () => {
-        const number = Number(input.value.trim().replace(",", "."));
-        const wrong = input.value.trim() !== "" && !Number.isFinite(number);
-        input.setAttribute("aria-invalid", String(wrong));
-        if (!wrong) state(column, { [key]: input.value.trim() === "" ? null : number });
-      } });
+    const input = numberInput({ value: value ?? "", "data-key": `${key}-${column}` }, (number) => state(column, { [key]: number }));
     return { open: needed || value !== undefined, element: field(NUMBERS[key], input) };
   }
 
@@ -176,7 +171,9 @@ export function build(panel, go) {
 
 function problemOf(seen) {
   const needs = seen.columns.flatMap((one) => one.needs.map((key) => `${TITLES[one.column]}: ${NUMBERS[key] ?? key}`));
-  return needs.length ? `Still needed. ${needs.join("; ")}` : plain(seen.problem);
+  const missing = seen.columns.filter((one) => one.how === "absent" && seen.missing.includes(one.column)).map((one) => TITLES[one.column]);
+  const asked = [...missing.map((title) => `${title}: the channel that holds it`), ...needs];
+  return asked.length ? `Still needed. ${asked.join("; ")}` : plain(seen.problem);
 }
 
 // What a choice has changed, column by column.

@@ -1,5 +1,5 @@
 import { fileAddress, get, post } from "./api.js";
-import { digits, field, fill, make } from "./dom.js";
+import { digits, field, fill, make, numberInput } from "./dom.js";
 import { action, dropZone, fileChoice, isModel, message } from "./parts.js";
 import { choices, choose, watch } from "./state.js";
 
@@ -36,11 +36,7 @@ export function build(panel, go) {
 
     function row(one) {
       const tag = make("span", { class: `tag ${TAGS[one.source]}` }, one.source);
-      const set = (key, text, input) => {
-        const number = Number(String(text).trim().replace(",", "."));
-        const wrong = text.trim() === "" || !Number.isFinite(number) || (key === "uncertainty" && number < 0);
-        input.setAttribute("aria-invalid", String(wrong));
-        if (wrong) return;
+      const set = (key, number) => {
         changed[one.name] ??= { value: one.value, uncertainty: one.uncertainty };
         if (key === "value") {
           if (one.value !== 0) changed[one.name].uncertainty = (one.uncertainty / Math.abs(one.value)) * Math.abs(number);
@@ -50,11 +46,9 @@ export function build(panel, go) {
         tag.textContent = "yours";
         tell();
       };
-      const value = make("input", { class: "number", inputmode: "decimal", value: String(one.value), "aria-label": `${one.name}, value in ${one.unit || "1"}`,
-        onchange: () => set("value", value.value, value) });
+      const value = numberInput({ value: String(one.value), required: true, "aria-label": `${one.name}, value in ${one.unit || "1"}` }, (number) => set("value", number));
       const share = one.value === 0 ? 0 : (100 * one.uncertainty) / Math.abs(one.value);
-      const off = make("input", { class: "number", inputmode: "decimal", value: digits(share), "aria-label": `${one.name}, off by at most, in percent`,
-        onchange: () => set("uncertainty", off.value, off) });
+      const off = numberInput({ value: digits(share), required: true, "aria-label": `${one.name}, off by at most, in percent` }, (number) => set("uncertainty", number), (number) => number >= 0);
       return make("tr", {}, make("td", {}, make("strong", {}, one.name), make("br"), make("span", { class: "note" }, one.meaning)),
         make("td", { class: "pair" }, value, " ", one.unit === "1" ? "" : one.unit), make("td", { class: "pair", "data-label": "off by at most" }, off, " %"),
         make("td", {}, tag, make("br"), make("span", { class: "note" }, one.said.replace(/^[^:]*: (?:[^;]*; )?(?=.)/, ""))));
@@ -65,13 +59,12 @@ export function build(panel, go) {
       make("tbody", {}, rows.map(row))));
     const encoderFields = ["theta_m", "theta_l"].map((name) => make("div", { class: "card" }, make("h3", {}, name === "theta_m" ? "Motor encoder" : "Load encoder"),
       ["counts_per_rev", "noise"].map((key) => {
-        const input = make("input", { class: "number", inputmode: "decimal", value: encoders[name]?.[key] ?? "", placeholder: "from the record",
-          onchange: () => {
-            encoders[name] ??= {};
-            if (input.value.trim() === "") delete encoders[name][key];
-            else encoders[name][key] = Number(input.value.replace(",", "."));
-            if (key === "counts_per_rev") delete encoders[name].resolution;
-          } });
+        const input = numberInput({ value: encoders[name]?.[key] ?? "", placeholder: "from the record" }, (number) => {
+          encoders[name] ??= {};
+          if (number === null) delete encoders[name][key];
+          else encoders[name][key] = number;
+          if (key === "counts_per_rev") delete encoders[name].resolution;
+        });
         return field(key === "noise" ? "noise [rad], before rounding" : "counts per revolution", input);
       }),
       encoders[name]?.resolution ? make("p", { class: "note" }, `resolution ${digits(encoders[name].resolution)} rad`) : null));

@@ -6,11 +6,11 @@ import { choose, isOver, latest, session, start, watch } from "./state.js";
 
 // What a diagnosis leaves: the corrected FMU, its model file, the check of it, and a simulation under sliders.
 export function build(panel) {
-  const said = message(), list = make("div", {}), moving = make("div", {}), which = make("div", { class: "field grows" }), view = jobView();
+  const said = message(), list = make("div", {}), moving = make("div", {}), which = make("div", { class: "field grows" }), view = jobView("model");
   let fmu = "", shown = "", simulated = "";
   const able = () => session.jobs.filter((job) => isOver(job) && ["diagnose", "estimate"].includes(job.command) && job.files.includes(`${job.command}.csv`));
   const draw = () => {
-    const jobs = session.jobs.filter((job) => job.files.some((name) => /\.(fmu|ssp)$/i.test(name) || name === "corrected.toml"));
+    const jobs = session.jobs.filter((job) => job.files.some((name) => /\.(fmu|ssp)$/i.test(name) || /(^|\/)corrected\.toml$/.test(name)));
     const names = able().map((job) => job.name), now = JSON.stringify([jobs.map((job) => job.name), names]);
     if (now === shown) return;
     shown = now;
@@ -18,7 +18,7 @@ export function build(panel) {
     if (last) fmu = `results/${latest("diagnose").name}/${last}`;
     fill(list, jobs.length ? jobs.toReversed().map((job) => make("div", { class: "job" }, make("strong", {}, job.name),
       make("ul", { class: "files" }, job.files.filter((name) => /\.(fmu|ssp|toml)$/i.test(name)).map((name) =>
-        make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name }, name))))))
+        make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name.split("/").at(-1) }, name))))))
       : make("p", {}, "A diagnosis leaves the corrected model here."));
     simulated = names.includes(simulated) ? simulated : names.at(-1) ?? "";
     const made = choice(names.map((name) => [name, name]), simulated, (name) => { simulated = name; });

@@ -1,8 +1,9 @@
 import { fileAddress, upload } from "./api.js";
-import { choice, fill, field, make, plain } from "./dom.js";
-import { isOver, jobOf, refresh, session, stop, watch } from "./state.js";
+import { choice, fill, field, make, plain, wrongField } from "./dom.js";
+import { choices, choose, isOver, jobOf, refresh, session, stop, watch } from "./state.js";
 
 const LOGS = /\.(csv|txt|tsv|dat|lvm|log|asc|npz|npy|mat|h5|hdf5|hdf|nc|parquet|pq|mf4|mdf)$/i;
+const OUTPUT = "output.txt";  // what a job has printed
 export const isLog = (name) => LOGS.test(name);
 export const isModel = (name) => /\.toml$/i.test(name);
 export const isFmu = (name) => /\.(fmu|ssp)$/i.test(name);
@@ -10,7 +11,7 @@ export const isFmu = (name) => /\.(fmu|ssp)$/i.test(name);
 // All files of the session of one kind, those of results too.
 export function filesOf(test) {
   const uploads = session.files.filter((file) => test(file.name)).map((file) => [file.file, file.name]);
-  const results = session.jobs.flatMap((job) => job.files.filter(test).map((name) => [`results/${job.name}/${name}`, `${job.name}: ${name}`]));
+  const results = session.jobs.flatMap((job) => job.files.filter((name) => test(name) && name !== OUTPUT).map((name) => [`results/${job.name}/${name}`, `${job.name}: ${name}`]));
   return [...uploads, ...results];
 }
 
@@ -63,12 +64,13 @@ export function fileChoice(text, test, value, picked, none = "none") {
 
 const STATES = { waiting: "", running: "", done: "good", stopped: "warn", ended: "warn", failed: "bad" };
 
-// One job: its stage, the time left, Stop; then what it said, and its page.
-export function jobView(result = () => []) {
+// One job: its stage, the time left, Stop; then what it said, and its page. `key` keeps which one over a reload of the page.
+export function jobView(key, result = () => []) {
   const place = make("div", {});
-  let name = "", shown = "";
+  let shown = "";
   const draw = () => {
-    const job = jobOf(name);
+    const name = choices.shown[key], job = jobOf(name);
+    if (!name) { shown = ""; fill(place); }
     if (!job) return;
     const now = JSON.stringify([name, job.state]);
     if (now === shown) return;
@@ -78,7 +80,7 @@ export function jobView(result = () => []) {
     if (isOver(job) && job.files.includes("report.html")) place.append(reportOf(job));
   };
   watch(draw);
-  return { element: place, show(job) { name = job; shown = ""; draw(); }, name: () => name };
+  return { element: place, show(job) { shown = ""; choose({ shown: { ...choices.shown, [key]: job } }); }, name: () => choices.shown[key] };
 }
 
 export function jobLine(job) {
@@ -103,7 +105,7 @@ function finished(job) {
       make("span", { class: "note" }, job.files.length > 1 ? "" : job.state === "stopped" ? "no results were left" : "")),
     words.map((text) => make("p", { class: job.state === "failed" ? "message" : "message calm" }, plain(text.replace(/^error: /, "").replaceAll("Ctrl-C", "Stop")))),
     make("code", {}, job.line),
-    make("ul", { class: "files" }, job.files.map((name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name }, name)))));
+    make("ul", { class: "files" }, job.files.map((name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name.split("/").at(-1) }, name)))));
 }
 
 function reportOf(job) {
@@ -127,8 +129,10 @@ export function message() {
 // Run an action of a button: disabled meanwhile, an error becomes a line.
 export function action(text, said, act, kind = "") {
   const made = make("button", { type: "button", class: kind, async onclick() {
-    made.disabled = true;
     said.say("");
+    const wrong = wrongField(made.closest("[role=tabpanel]"));
+    if (wrong) { said.say(wrong.said); wrong.input.focus(); return; }
+    made.disabled = true;
     try { await act(); } catch (error) { said.say(error.message); }
     made.disabled = false;
     if (document.activeElement === document.body) made.focus();

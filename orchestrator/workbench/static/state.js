@@ -2,7 +2,7 @@ import { get, post } from "./api.js";
 
 // What this tab works on; other tabs of the browser have their own.
 const KEPT = "workbench";
-export const choices = { log: "", model: "", columns: {}, header: null, ...JSON.parse(sessionStorage.getItem(KEPT) ?? "{}") };
+export const choices = { log: "", model: "", columns: {}, header: null, shown: {}, ...JSON.parse(sessionStorage.getItem(KEPT) ?? "{}") };
 export const session = { folder: "", files: [], jobs: [], largest_file: 0 };
 const watchers = new Set();
 
