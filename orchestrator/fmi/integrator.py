@@ -9,7 +9,6 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import DOP853, Radau
 
 from orchestrator.fmi.equations import Equations
 
@@ -46,7 +45,7 @@ class Integrator:
 
     def __init__(self, equations: Equations) -> None:
         self._equations = equations
-        self._method: Any = DOP853
+        self._stiff = False
         self._solver: Any = None
         self._length: float | None = None  # of the next step [s]
         self._stop, self._steps = np.nan, 0
@@ -113,13 +112,13 @@ class Integrator:
             return None
         self._steps = self._steps + 1 if stop == self._stop else 1
         self._stop = stop
-        if self._steps > STIFF_FROM and self._method is DOP853:
-            self._method, self._solver = Radau, None
+        if self._steps > STIFF_FROM and not self._stiff:
+            self._stiff, self._solver = True, None
         with np.errstate(all="ignore"):
             solver = self._solver = self._solver_to(stop)
             message = solver.step()
         if message:
-            raise IntegrationError(f"{self._method.__name__} of SciPy says: {message}")
+            raise IntegrationError(f"{type(solver).__name__} of SciPy says: {message}")
         self.time, self.states, self._length = float(solver.t), solver.y, solver.h_abs
         return cast("Callable[[], Any]", solver.dense_output)
 
@@ -127,8 +126,11 @@ class Integrator:
         if self._solver is not None:
             self._solver.t_bound, self._solver.status = stop, "running"
             return self._solver
+        from scipy.integrate import DOP853, Radau  # costs a third of a second, which only model exchange shall pay
+
+        method = Radau if self._stiff else DOP853
         try:
-            return self._method(
+            return method(
                 self._equations.rates,
                 self.time,
                 self.states,
@@ -138,4 +140,4 @@ class Integrator:
                 first_step=None if self._length is None else min(self._length, stop - self.time),
             )
         except ValueError as error:  # of values that are not finite
-            raise IntegrationError(f"{self._method.__name__} of SciPy says: {error}") from None
+            raise IntegrationError(f"{method.__name__} of SciPy says: {error}") from None

@@ -54,6 +54,8 @@ def inner_steps(context: Context) -> None:
     usual = _rows(context, outputs, job.step, job.steps)
     period, error = _period(fine, job.step / _FINE) or _period(usual, job.step) or (0.0, 0.0)
     if not period:
+        if "steps.variable" in context.remarked:
+            return  # told already: what goes by the number of steps depends on their size
         if not _report_count(context, outputs, (usual, fine), job.step, _FINE):
             double = _rows(context, outputs, 2.0 * job.step, job.steps // 2)
             _report_count(context, outputs, (double, usual), 2.0 * job.step, 2)
@@ -165,6 +167,7 @@ def variable_steps(context: Context) -> None:
             off = f"is off by more than {_STEP_TOLERANCE:.0%} of its range at {far} of {pairs} points with uneven steps"
             message = f"`{v.name}` must hardly depend on the communication step, but {off}"
             context.report("steps.variable", message, v.name)
+            context.remarked.add("steps.variable")
 
 
 def _run_in_pairs(context: Context, outputs: list[ProbedVariable], sizes: tuple[float, ...]) -> list[list[Any]]:
