@@ -42,12 +42,17 @@ def members(name: str) -> dict[str, bytes]:
     return {path.relative_to(SOURCES).as_posix(): path.read_bytes() for path in closure(name)}
 
 
-def read_imports(path: Path) -> Iterator[Path]:
-    """Yield the files that a source imports from beside it, with those of the packages that they lie in.
+@cache
+def read_imports(path: Path) -> tuple[Path, ...]:
+    """Return the files that a source imports from beside it, with those of the packages that they lie in.
 
     Raises:
         FmuError: an import that is not relative, or of what is no module.
     """
+    return tuple(_imports(path))
+
+
+def _imports(path: Path) -> Iterator[Path]:
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.Import) and any(_is_ours(alias.name) for alias in node.names):
             raise FmuError(f"{path}:{node.lineno}: {_MESSAGE}, but is `{ast.unparse(node)}`")
