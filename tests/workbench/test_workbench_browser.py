@@ -85,8 +85,9 @@ def inspected(page: Any, served: Served, log: Path) -> Any:
     assert "torque constant" in page.find_element("css selector", "#panel-log [role=alert].message:not(:empty)").text
     pick(page, "select[aria-label='Use Achse B [deg] as']", "Load angle")
     wait(page, lambda d: "Load angle: nothing → Achse B [deg]" in d.find_element("id", "panel-log").text)
-    find(page, "[data-key=torque_constant-u]").send_keys("0.5\t")
+    find(page, "[data-key=torque_constant-u]").send_keys("0.5\t")  # Tab goes on to the next control, which is made anew
     wait(page, lambda d: "can be read" in d.find_element("id", "panel-log").text)
+    assert page.switch_to.active_element.text == "More"
     press(page, "Look at this log")
     find(page, "#panel-log iframe")
     return page
@@ -199,6 +200,27 @@ def test_a_log_chosen_in_another_tab_is_looked_at(inspected: Any, served: Served
     wait(inspected, lambda d: "Not used: Achse A [deg], Achse B [deg]" in d.find_element("id", "panel-log").text)
     assert "Still needed. Motor angle: the channel that holds it" in inspected.find_element("id", "panel-log").text
     assert inspected.find_elements("css selector", "#panel-log iframe") == []
+
+
+def test_a_drawn_curve_and_its_scenario_outlast_a_reload(inspected: Any, served: Served) -> None:
+    choose_tab(inspected, "fmus")
+    inspected.refresh()
+    find(inspected, "[data-port='drivetrain.u']")
+    assert "drivetrain.theta_m → kalmanestimator.theta_m" in inspected.find_element("id", "panel-fmus").text
+    press(inspected, "Feed an input")
+    kind = "//label[normalize-space()='is']/following-sibling::select"
+    inspected.find_element("xpath", kind).send_keys("drawn by hand")
+    lines = find(inspected, "#panel-fmus textarea")
+    type_into = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))"
+    inspected.execute_script(type_into, lines, "0, 0\n0.5, 1, 2\n1, 0")
+    press(inspected, "Write it as TOML")
+    wait(inspected, lambda d: "must hold two numbers a line" in d.find_element("id", "panel-fmus").text)
+    assert not (served.folder / "files" / "drawn.csv").exists()
+    inspected.execute_script(type_into, lines, "0; 0\n0,5; -1,25\n1 0")
+    press(inspected, "Write it as TOML")
+    drawn = served.folder / "files" / "drawn.csv"
+    wait(inspected, lambda d: drawn.exists() and drawn.read_text().endswith("\n1,0\n"))
+    assert drawn.read_text().splitlines() == ["time,value", "0,0", "0.5,-1.25", "1,0"]
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (390, "light"), (1280, "dark")])

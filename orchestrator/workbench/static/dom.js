@@ -37,9 +37,9 @@ export const numberIn = (input) => (input.value.trim() === "" ? null : Number(in
 
 // What a page says of a field that holds no number which can be meant, null where there is none.
 export function wrongField(place) {
-  const input = [...place.querySelectorAll('input[aria-invalid="true"]')].find((one) => one.offsetParent);
+  const input = [...place.querySelectorAll('[aria-invalid="true"]')].find((one) => one.offsetParent);
   if (!input) return null;
-  return { input, said: `“${input.labels?.[0]?.textContent ?? input.getAttribute("aria-label")}” must be a number that makes sense there, but is “${input.value}”` };
+  return { input, said: `“${input.labels?.[0]?.textContent ?? input.getAttribute("aria-label")}” must hold ${input.tagName === "TEXTAREA" ? "two numbers a line" : "a number that makes sense there"}, but is “${input.value.replaceAll("\n", " / ")}”` };
 }
 
 export function choice(options, value, onchange) {
@@ -48,11 +48,26 @@ export function choice(options, value, onchange) {
   return made;
 }
 
-// Replace what an element holds, and keep the focus where it was by the id of what had it.
+// What can have the focus below an element, each under a key that the same control has after it was made anew.
+function controlsOf(element) {
+  const seen = new Map();
+  return [...element.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex]")].map((one) => {
+    const key = one.dataset.key ?? `${one.tagName} ${one.getAttribute("aria-label") ?? one.labels?.[0]?.textContent ?? one.textContent}`;
+    seen.set(key, (seen.get(key) ?? 0) + 1);
+    return { one, key: `${key} ${seen.get(key)}` };
+  });
+}
+
+// Replace what an element holds; the focus stays where it was, and what was unfolded stays so.
 export function fill(element, ...children) {
-  const focused = element.contains(document.activeElement) ? document.activeElement.dataset.key : null;
+  const before = controlsOf(element);
+  const focused = before.find(({ one }) => one === document.activeElement)?.key;
+  const unfolded = new Set(before.filter(({ one }) => one.tagName === "SUMMARY" && one.parentElement.open).map(({ key }) => key));
   element.replaceChildren(...children.flat().filter(Boolean));
-  if (focused) element.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+  for (const { one, key } of controlsOf(element)) {
+    if (unfolded.has(key) && one.tagName === "SUMMARY") one.parentElement.open = true;
+    if (key === focused) one.focus();
+  }
 }
 
 export const digits = (value, most = 4) =>

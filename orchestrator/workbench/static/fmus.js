@@ -2,7 +2,7 @@ import { fileAddress, get, post, upload } from "./api.js";
 import { check, choice, field, fill, make, numberIn, numberInput } from "./dom.js";
 import { Graph, fits, inputsOf, outputsOf, place } from "./graph.js";
 import { action, dropZone, fileChoice, isFmu, isLog, jobView, message } from "./parts.js";
-import { choose, refresh, start } from "./state.js";
+import { choices, choose, refresh, start } from "./state.js";
 
 const KINDS = {
   constant: [["value", "value", 0]],
@@ -14,11 +14,19 @@ const KINDS = {
 };
 const WORDS = { constant: "constant", step: "step", sine: "sine", square: "square wave", table: "a table of the session", drawn: "drawn by hand" };
 
+// Time and value of a line such as "0.5, 2" or "0,5; 2"; null: it does not hold two numbers.
+function pairOf(line) {
+  const parts = /[;\t]/.test(line) ? line.split(/[;\t]/).map((part) => part.trim().replace(",", ".")) : line.trim().split(/\s*,\s*|\s+/);
+  const numbers = parts.map((part) => (part === "" ? NaN : Number(part)));
+  return numbers.length === 2 && numbers.every(Number.isFinite) ? numbers : null;
+}
+
 export function build(panel) {
   const said = message(), graphSaid = message(), tree = make("div", {}), editor = make("div", {}), view = jobView("fmus");
   const nodes = {}, known = new Map();
-  let connections = [], sources = [], fmu = "", unwanted = new Set();
-  const run = { stop: 1, step: 0.001, algorithm: "gauss_seidel" };
+  const kept = choices.scenario ?? { nodes: {}, connections: [], sources: [], unwanted: [], run: { stop: 1, step: 0.001, algorithm: "gauss_seidel" } };
+  let { connections, sources } = kept, fmu = "";
+  const { run } = kept, unwanted = new Set(kept.unwanted);
   const graph = new Graph(connect, () => {});
 
   async function variablesOf(file) {
@@ -176,8 +184,11 @@ export function build(panel) {
   function drawing(source) {
     source.points ??= [[0, 0], [run.stop / 2, 1], [run.stop, 0]];
     const text = make("textarea", { rows: 4, cols: 22, onchange: () => {
-      const points = text.value.split("\n").map((line) => line.split(/[;,\s]+/).map(Number)).filter((pair) => pair.length >= 2 && pair.every(Number.isFinite));
-      if (points.length) source.points = points.map(([t, v]) => [t, v]).sort((a, b) => a[0] - b[0]);
+      const lines = text.value.split("\n").filter((line) => line.trim() !== ""), points = lines.map(pairOf);
+      const wrong = !lines.length || points.includes(null);
+      text.setAttribute("aria-invalid", String(wrong));
+      if (wrong) return;
+      source.points = points.sort((a, b) => a[0] - b[0]);
       show();
     } });
     const box = document.createElementNS("http://www.w3.org/2000/svg", "svg");
@@ -248,4 +259,17 @@ export function build(panel) {
       }, "main")),
     written, view.element);
   draw();
+  restore().catch((error) => said.say(error.message));
+
+  // The scenario stands here again after a reload of the page.
+  async function restore() {
+    const before = Object.entries(kept.nodes);
+    if (!before.length) return;
+    for (const [name, node] of before) nodes[name] = { ...node, variables: (await variablesOf(node.fmu)).variables };
+    draw();
+  }
+  addEventListener("pagehide", () => {
+    const plain = Object.fromEntries(Object.entries(nodes).map(([name, { variables, ...node }]) => [name, node]));
+    choose({ scenario: { nodes: plain, connections, sources, unwanted: [...unwanted], run } });
+  });
 }

@@ -25,7 +25,7 @@ export function build(panel, go) {
   const said = message(), changes = make("p", { class: "message calm", role: "status" });
   const body = make("div", {});
   let seen = null, turn = 0, looked = choices.log;
-  const view = jobView("log", () => [make("p", {}, action("Go on to the machine", said, () => go("machine")))]);
+  const view = jobView("log", (job) => (job.state === "done" ? make("p", {}, action("Go on to the machine", said, () => go("machine"))) : []));
   watch(() => {  // whichever tab has chosen another log
     if (choices.log === looked) return;
     looked = choices.log;

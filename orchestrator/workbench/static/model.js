@@ -7,7 +7,7 @@ import { choose, isOver, latest, session, start, watch } from "./state.js";
 // What a diagnosis leaves: the corrected FMU, its model file, the check of it, and a simulation under sliders.
 export function build(panel) {
   const said = message(), list = make("div", {}), moving = make("div", {}), which = make("div", { class: "field grows" }), view = jobView("model");
-  let fmu = "", shown = "", simulated = "";
+  let fmu = "", shown = "", simulated = "", wanted = "";
   const able = () => session.jobs.filter((job) => isOver(job) && ["diagnose", "estimate"].includes(job.command) && job.files.includes(`${job.command}.csv`));
   const draw = () => {
     const jobs = session.jobs.filter((job) => job.files.some((name) => /\.(fmu|ssp)$/i.test(name) || /(^|\/)corrected\.toml$/.test(name)));
@@ -20,8 +20,8 @@ export function build(panel) {
       make("ul", { class: "files" }, job.files.filter((name) => /\.(fmu|ssp|toml)$/i.test(name)).map((name) =>
         make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name.split("/").at(-1) }, name))))))
       : make("p", {}, "A diagnosis leaves the corrected model here."));
-    simulated = names.includes(simulated) ? simulated : names.at(-1) ?? "";
-    const made = choice(names.map((name) => [name, name]), simulated, (name) => { simulated = name; });
+    simulated = names.includes(wanted) ? wanted : names.at(-1) ?? "";
+    const made = choice(names.map((name) => [name, name]), simulated, (name) => { simulated = wanted = name; });
     fill(which, ...field("Model of", made).children);
   };
   watch(draw);

@@ -1,6 +1,8 @@
 /* global Plot, Units */
 import { get, post } from "./api.js";
 import { choice, digits, field, fill, make } from "./dom.js";
+import { resultOf } from "./parts.js";
+import { jobOf } from "./state.js";
 
 const TITLES = { theta_m: "Motor angle", theta_l: "Load angle", theta_x: "Angle" };
 const STEPS = 400;
@@ -8,6 +10,8 @@ const STEPS = 400;
 // The model of a result under sliders: every move runs its native FMU, beside what was measured.
 export async function sliders(job) {
   const model = await get(`sliders?job=${encodeURIComponent(job)}`);
+  const result = await resultOf(jobOf(job));
+  Units.choose(result?.record?.angle_unit ?? result?.angle_unit ?? "rad");
   const values = {}, said = make("p", { class: "note", role: "status" });
   const plots = Object.entries(model.measured).map(([name, y]) => {
     const figure = make("figure", { class: "plot", "aria-label": TITLES[name] ?? name });
@@ -44,7 +48,8 @@ export async function sliders(job) {
     const shown = make("output", {});
     const input = make("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${slider.name}: ${slider.meaning}` });
     const show = (value) => {
-      shown.textContent = `${digits(value)} ${slider.unit === "1" ? "" : slider.unit}`;
+      const { factor, name } = Units.shown(slider.unit);
+      shown.textContent = `${digits(factor * value)} ${name === "1" ? "" : name}`;
       input.setAttribute("aria-valuetext", shown.textContent);
     };
     const home = () => {
@@ -58,6 +63,7 @@ export async function sliders(job) {
       run();
     });
     home();
+    Units.listeners.push(() => show(values[slider.name] ?? slider.value));
     return { home, element: make("div", { class: "field" }, make("span", {}, slider.name.startsWith("effects.") ? slider.name.slice(8).replaceAll("_", " ") : slider.name), input, shown) };
   });
   const units = choice(["rad", "deg", "arcmin", "turns"].map((unit) => [unit, unit]), Units.chosen, (unit) => Units.choose(unit));
