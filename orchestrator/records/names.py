@@ -38,7 +38,7 @@ def find_channels(
     found: dict[str, Choice] = {}
     unclear: dict[str, str] = {}
     names = [name for name in COLUMNS if name not in skip]
-    for name in names:
+    for name in sorted(names, key=lambda name: not columns.get(name, Column()).name):  # what is stated comes first
         wanted = columns.get(name, Column()).name
         places = find_named(heads, wanted or name)
         if len(places) > 1:
@@ -46,6 +46,12 @@ def find_channels(
                 f"{source}: column `{wanted or name}` must appear once, but appears {len(places)} times: say "
                 f'`[columns.{name}] name = "#{places[0] + 1}"` to take the first of them'
             )
+        elif places and (other := next((n for n, one in found.items() if one.place == places[0]), "")):
+            if wanted:
+                unclear[name] = (
+                    f"{source}: column `{wanted}` must be one column of a record, but is named for `{other}` and for "
+                    f"`{name}`: name another by `[columns.{name}] name` in the model file (`model`)"
+                )
         elif places:
             found[name] = Choice(places[0])
         elif wanted:

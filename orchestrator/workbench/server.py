@@ -85,6 +85,7 @@ class Workbench:
         chosen = self._scratch(model_text(None, {key: asked[key] for key in ("columns", "header") if key in asked}))
         try:
             code, out, said = await self.jobs.answer([*words, "--model", str(chosen), log])
+            said = said.replace(f" in {chosen}", "")  # a file that nobody has written
         finally:
             chosen.unlink(missing_ok=True)
         if code:

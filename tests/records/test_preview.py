@@ -54,6 +54,19 @@ def test_a_stated_name_that_is_wrong_hides_no_other(log: Path) -> None:
     assert "did you mean `Achse B [deg]`?" in seen.problem
 
 
+def test_a_channel_that_is_stated_is_taken_from_the_column_of_its_own_name(tmp_path: Path) -> None:
+    path = tmp_path / "own.csv"
+    rows = "\n".join(f"{n / 100},{n % 7},{n / 9:.3f},{n / 90:.4f}" for n in range(60))
+    path.write_text(f"time,u,theta_m,theta_l\n{rows}\n")
+    moved = preview_log(path, {"theta_m": Column(name="theta_l")})
+    assert [channel.taken_as for channel in moved.channels] == ["time", "u", "", "theta_m"]
+    assert columns_of(moved)["theta_l"].how == "absent"
+    assert moved.problem == ""
+    twice = preview_log(path, {"theta_m": Column(name="u"), "theta_l": Column(name="u"), "u": Column(name="theta_m")})
+    assert twice.missing == ("theta_l",)
+    assert "`u` must be one column of a record, but is named for `theta_m` and for `theta_l`" in twice.problem
+
+
 def test_choices_change_ranges_in_si(log: Path) -> None:
     stated = {"u": Column(torque_constant=0.5), "theta_l": Column(name="#4")}
     seen = preview_log(log, stated)

@@ -253,3 +253,11 @@ def test_only_one_workbench_uses_a_directory(served: Served, capsys: pytest.Capt
     assert main(["workbench", "--no-browser", "--port", str(served.port), "--out", f"{served.folder}-2"]) == 2
     assert "must be free" in capsys.readouterr().err
     assert main(["workbench", "--port", "99999"]) == 2
+
+
+def test_a_look_at_a_log_speaks_of_no_file_that_nobody_has_written(served: Served) -> None:
+    assert served.ask("PUT", "upload/look.csv", LOG.encode())[0] == 201
+    status, said = served.ask(
+        "POST", "columns", {"file": "files/look.csv", "columns": {"theta_m": {"unit": "furlong"}}}
+    )
+    assert (status, said["error"].startswith("`columns.theta_m.unit` must be one of rad")) == (422, True), said
