@@ -220,10 +220,11 @@ class Likelihood:
         def run(n: int) -> tuple[Array, Array]:
             error, spread = look(n, self.difference)
             # A direction is scaled to an information of one. Much more is a contact that comes or goes within the step.
-            if float(error @ error) > JUMP:
-                other = look(n, -self.difference)
-                if float(other[0] @ other[0]) < float(error @ error):
-                    return other
+            with np.errstate(all="ignore"):  # threads of a pool do not have the caller's
+                if float(error @ error) > JUMP:
+                    other = look(n, -self.difference)
+                    if float(other[0] @ other[0]) < float(error @ error):
+                        return other
             return error, spread
 
         columns = list(self._pool.map(run, range(free.size)) if self._pool else map(run, range(free.size)))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.inference.problem import fit_problem
+from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.selection.evidence import effect_evidence, leave_out_possible, size_over_error
 from orchestrator.diagnosis.selection.outcome import RecordEvidence
 from orchestrator.diagnosis.selection.screening import products_with_waves
@@ -24,6 +24,18 @@ def test_effects_that_are_there_are_found(seed):
     assert sorted(found.final.labels) == ["effect1@motor", "effect4@motor"]
     assert found.complete
     assert [step.taken for step in found.steps][-1] == ""
+
+
+def test_an_effect_with_which_the_machine_runs_away_is_passed_over(monkeypatch):
+    problem = linear_problem({"a@motor": 0.4, "b@motor": 0.4})
+    changes = FitProblem.changes
+
+    def run_away(self, point, residual, trials):
+        found = changes(self, point, residual, trials)
+        return [one * (np.inf if label == "b@motor" else 1.0) for (label, _), one in zip(trials, found, strict=True)]
+
+    monkeypatch.setattr(FitProblem, "changes", run_away)
+    assert search_effects(problem, SETTINGS).final.labels == ("a@motor",)
 
 
 def test_chance_is_rarely_found():

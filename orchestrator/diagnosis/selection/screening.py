@@ -114,11 +114,11 @@ class Screening:
         return (*values[:place], effect.scales[place], *values[place + 1 :])
 
     def _gain(self, effect: CandidateEffect, values: Values, columns: Array) -> ScreenedEffect | None:
+        if not np.isfinite(np.linalg.norm(columns)):
+            return None  # a start from which the machine runs away
         padded = np.vstack([columns, np.zeros((self.padding.size, columns.shape[1]))])
         padded -= self.basis @ (self.basis.T @ padded)
         share = np.linalg.lstsq(padded, -self.unexplained, rcond=1e-8)[0]
-        if not np.all(np.isfinite(share)):
-            return None
         left = self.unexplained + padded @ share
         gain = float(self.unexplained @ self.unexplained - left @ left)
         if not effect.amplitudes:
