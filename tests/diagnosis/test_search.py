@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.selection.evidence import effect_evidence, leave_out_possible, size_over_error
 from orchestrator.diagnosis.selection.outcome import RecordEvidence
@@ -35,6 +36,17 @@ def test_an_effect_with_which_the_machine_runs_away_is_passed_over(monkeypatch):
         return [one * (np.inf if label == "b@motor" else 1.0) for (label, _), one in zip(trials, found, strict=True)]
 
     monkeypatch.setattr(FitProblem, "changes", run_away)
+    assert search_effects(problem, SETTINGS).final.labels == ("a@motor",)
+
+
+def test_an_effect_whose_fit_has_no_solution_is_passed_over(monkeypatch):
+    def fit(problem, point, *more):
+        if "b@motor" in point.effects:
+            raise np.linalg.LinAlgError("SVD did not converge")
+        return fit_model(problem, point, *more)
+
+    monkeypatch.setattr("orchestrator.diagnosis.selection.search.fit_model", fit)
+    problem = linear_problem({"a@motor": 0.4, "b@motor": 0.4})
     assert search_effects(problem, SETTINGS).final.labels == ("a@motor",)
 
 

@@ -223,7 +223,10 @@ class _Search:
         screening = Screening(problem, model)
         tried = []
         for screened in screening.screen(self._candidates(problem, model, refused))[:count]:
-            fitted = fit_model(problem, start_of_fit(model, screened))
+            try:
+                fitted = fit_model(problem, start_of_fit(model, screened))
+            except np.linalg.LinAlgError:  # the machine runs away with it
+                continue
             tried.append(TriedEffect(screened.label, compare(model, fitted), fitted))
             self.progress(" + ".join((*model.labels, screened.label)))
         return sorted(tried, key=lambda trial: -trial.comparison.gain)
