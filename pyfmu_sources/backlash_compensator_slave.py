@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from .backlash_compensator import CrossingState, Gap, Train, Tuning, act, start_state
+from .controller_variables import GAINS, INPUTS
 from .fmu_variables import FmuVariable
 from .gap_traversal import Traversal
 from .lqr import Estimate, Gains
@@ -17,14 +18,7 @@ FIRST_TUNING = FIRST_TRAIN + 7
 SAMPLE_TIME = FIRST_TUNING + 5
 
 _INPUTS = (
-    ("reference", "rad", "Wanted load angle"),
-    ("reference_speed", "rad/s", "Wanted load speed"),
-    ("theta_m_hat", "rad", "Estimated motor angle"),
-    ("omega_m_hat", "rad/s", "Estimated motor speed"),
-    ("theta_l_hat", "rad", "Estimated load angle"),
-    ("omega_l_hat", "rad/s", "Estimated load speed"),
-    ("T_l_hat", "N.m", "Estimated load torque"),
-    ("T_m_hat", "N.m", "Estimated motor torque"),
+    *INPUTS,
     ("alpha_hat", "rad", "Estimated half-gap; 0: not known"),
     ("alpha_deviation", "rad", "Standard deviation of the estimated half-gap"),
     ("offset_hat", "rad", "Estimated twist in mid-gap"),
@@ -33,13 +27,6 @@ _OUTPUTS = (
     ("u", "N.m", "Requested motor torque", 100.0),
     ("flank", "1", "Flank that is held or approached: -1 or 1", 1.0),
     ("crossing", "1", "1 while the wanted flank is approached, 0 while it is held", 1.0),
-)
-_GAINS = (
-    ("K[1]", "N.m/rad", "Gain of the motor angle"),
-    ("K[2]", "N.m.s/rad", "Gain of the motor speed"),
-    ("K[3]", "N.m/rad", "Gain of the load angle"),
-    ("K[4]", "N.m.s/rad", "Gain of the load speed"),
-    ("K[5]", "1", "Gain of the motor torque"),
 )
 _TRAIN = (
     ("J_m", "kg.m2", 0.4, "Motor inertia", 1e-9),
@@ -58,7 +45,7 @@ _TUNING = (
     ("margin", "rad", 3e-4, "Way before the flank at which a plan ends: noise of the encoders", 0.0, 1e6),
 )
 _INPUT_NAMES = tuple(row[0] for row in _INPUTS)
-_PARAMETER_NAMES = tuple(row[0] for row in (*_GAINS, *_TRAIN, *_TUNING))
+_PARAMETER_NAMES = tuple(row[0] for row in (*GAINS, *_TRAIN, *_TUNING))
 
 
 class BacklashCompensator(SampledSlave):
@@ -75,7 +62,7 @@ class BacklashCompensator(SampledSlave):
             )
             for name, unit, text, nominal in _OUTPUTS
         ),
-        *(FmuVariable(name, "parameter", unit, 0.0, text) for name, unit, text in _GAINS),
+        *(FmuVariable(name, "parameter", unit, 0.0, text) for name, unit, text in GAINS),
         *(FmuVariable(name, "parameter", unit, start, text, least, 1e12) for name, unit, start, text, least in _TRAIN),
         *(FmuVariable(name, "parameter", unit, start, text, least, most)
             for name, unit, start, text, least, most in _TUNING),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from .controller_variables import GAINS, INPUTS
 from .fmu_variables import FmuVariable
 from .lqr import Gains, control
 from .sampled_slave import SampledSlave
@@ -13,25 +14,8 @@ U = FIRST_ESTIMATE + 6
 FIRST_GAIN = U + 1
 I, COMPLIANCE, U_MAX, SAMPLE_TIME = range(FIRST_GAIN + 5, FIRST_GAIN + 9)
 
-_INPUTS = (
-    ("reference", "rad", "Wanted load angle"),
-    ("reference_speed", "rad/s", "Wanted load speed"),
-    ("theta_m_hat", "rad", "Estimated motor angle"),
-    ("omega_m_hat", "rad/s", "Estimated motor speed"),
-    ("theta_l_hat", "rad", "Estimated load angle"),
-    ("omega_l_hat", "rad/s", "Estimated load speed"),
-    ("T_l_hat", "N.m", "Estimated load torque"),
-    ("T_m_hat", "N.m", "Estimated motor torque"),
-)
-_GAINS = (
-    ("K[1]", "N.m/rad", "Gain of the motor angle"),
-    ("K[2]", "N.m.s/rad", "Gain of the motor speed"),
-    ("K[3]", "N.m/rad", "Gain of the load angle"),
-    ("K[4]", "N.m.s/rad", "Gain of the load speed"),
-    ("K[5]", "1", "Gain of the motor torque"),
-)
-_INPUT_NAMES = tuple(name for name, _, _ in _INPUTS)
-_PARAMETER_NAMES = (*(name for name, _, _ in _GAINS), "i", "compliance", "u_max")
+_INPUT_NAMES = tuple(name for name, _, _ in INPUTS)
+_PARAMETER_NAMES = (*(name for name, _, _ in GAINS), "i", "compliance", "u_max")
 
 
 class LqrController(SampledSlave):
@@ -40,7 +24,7 @@ class LqrController(SampledSlave):
     title = "Sampled-data linear-quadratic regulator of the drivetrain, load torque fed forward"
     sample_time_reference = SAMPLE_TIME
     table: ClassVar[tuple[FmuVariable, ...]] = (
-        *(FmuVariable(name, "input", unit, 0.0, text) for name, unit, text in _INPUTS),
+        *(FmuVariable(name, "input", unit, 0.0, text) for name, unit, text in INPUTS),
         FmuVariable(
             "u",
             "output",
@@ -52,7 +36,7 @@ class LqrController(SampledSlave):
             depends_on=_INPUT_NAMES,
             starts_from=(*_INPUT_NAMES, *_PARAMETER_NAMES),
         ),
-        *(FmuVariable(name, "parameter", unit, 0.0, text) for name, unit, text in _GAINS),
+        *(FmuVariable(name, "parameter", unit, 0.0, text) for name, unit, text in GAINS),
         FmuVariable("i", "parameter", "1", 3.984, "Gear ratio: motor angle over load angle", 1e-9, 1e12),
         FmuVariable("compliance", "parameter", "rad/(N.m)", 1.0 / 3300.0, "Compliance of the shaft", 0.0, 1e12),
         FmuVariable("u_max", "parameter", "N.m", 1e4, "Torque limit", 0.0, 1e12),
