@@ -14,6 +14,7 @@ from typing import Any
 
 from orchestrator.errors import FmuError
 from orchestrator.shared.equation_files import SOURCES, closure
+from orchestrator.shared.syntax import parse_python
 from orchestrator.shared.version import __version__
 
 HERE = Path(__file__).parent
@@ -47,7 +48,7 @@ def catalogue() -> dict[str, Recipe]:
     for path in sorted(SOURCES.glob(f"*{SUFFIX}.py")):
         if path.stem in BASES:
             continue
-        classes = [node.name for node in ast.parse(path.read_bytes()).body if isinstance(node, ast.ClassDef)]
+        classes = [node.name for node in parse_python(path.read_bytes()).body if isinstance(node, ast.ClassDef)]
         recipes[classes[-1]] = Recipe(classes[-1], path.stem, classes[-1])
     return recipes
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pyfmu_sources
 from orchestrator.errors import FmuError
+from orchestrator.shared.syntax import parse_python
 
 PACKAGE = pyfmu_sources.__name__
 SOURCES = Path(pyfmu_sources.__file__).parent
@@ -53,7 +54,7 @@ def read_imports(path: Path) -> tuple[Path, ...]:
 
 
 def _imports(path: Path) -> Iterator[Path]:
-    for node in ast.walk(ast.parse(path.read_bytes())):
+    for node in ast.walk(parse_python(path.read_bytes())):
         if isinstance(node, ast.Import) and any(_is_ours(alias.name) for alias in node.names):
             raise FmuError(f"{path}:{node.lineno}: {_MESSAGE}, but is `{ast.unparse(node)}`")
         if not isinstance(node, ast.ImportFrom):

@@ -24,6 +24,7 @@ from orchestrator.building.translation.functions import translate
 from orchestrator.building.translation.kinds import NOTHING, REAL, TRUTH, WHOLE, ArrayKind, Kind, Scalar, describe
 from orchestrator.building.translation.program import Program
 from orchestrator.building.translation.source import read_source
+from orchestrator.shared.syntax import parse_python
 
 HEADERS = tuple(Path(__file__).parents[1] / "native_fmu" / name for name in ("translated.h", "kernel.h"))
 _NUMBERS: dict[Kind, str] = {REAL: "double", WHOLE: "int64_t", TRUTH: "bool"}
@@ -44,7 +45,7 @@ def bind_module(name: str) -> ModuleType:
     assert spec.loader is not None
     module: Any = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    for node in ast.parse(Path(path).read_bytes()).body:
+    for node in parse_python(Path(path).read_bytes()).body:
         if isinstance(node, ast.ImportFrom) and node.module == module.SLOTS:
             for alias in node.names:
                 setattr(module, alias.asname or alias.name, _slot(module, given, alias.name))

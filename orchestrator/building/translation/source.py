@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 from orchestrator.building.translation.kinds import Kind, KindError, is_type, kind_of
 from orchestrator.errors import FmuError
 from orchestrator.shared.equation_files import PACKAGE, module_name, read_imports
+from orchestrator.shared.syntax import parse_expression, parse_python
 
 # Their classes are the runtime's business.
 NOT_TRANSLATED = ("slave_base", "sampled_slave")
@@ -62,7 +63,7 @@ class ModuleSource:
         if node is None:
             self.refuse(place, "parameters and results must have type annotations")
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            node = ast.parse(node.value, mode="eval").body
+            node = parse_expression(node.value)
         try:
             evaluated = eval(compile(ast.Expression(node), str(self.path), "eval"), vars(self.module))
             return kind_of(evaluated)
@@ -99,7 +100,7 @@ def read_source(name: str) -> ModuleSource:
         module = sys.modules.get(name) or importlib.import_module(name)
         path = Path(module.__file__ or "")
         content = path.read_bytes()
-        tree = ast.parse(content)
+        tree = parse_python(content)
     except (ImportError, OSError, SyntaxError) as error:
         raise FmuError(f"the source {name} cannot be read: {error}") from None
     functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
