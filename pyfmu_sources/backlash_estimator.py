@@ -36,7 +36,7 @@ ROOT_INVERSE_2PI = 0.3989422804014327
 LEAST_BLUR = 1e-8  # least variance [rad2] of the distance to a flank
 LAG_MEMORY = 0.6  # s over which the error of the lag acts in one direction
 LARGEST_ERROR = 1e3  # innovation [rad] at which a filter counts as diverged
-DEAD = -1e9  # log weight of such a filter
+DEAD = -1e300  # log weight of such a filter, and of a forgotten one: no sample that the others see brings it back
 LONGEST_PART = 0.06  # of the shaft's oscillation, in radians of its phase
 
 
@@ -240,7 +240,8 @@ def correct(f: Filter, state: int, measured: float, variance: float) -> tuple[fl
 def combine(filters: Filters, count: int) -> tuple[float, float, int]:
     """Return (alpha [rad], its standard deviation [rad], number of the heaviest filter) of the Gaussian sum.
 
-    Log weights are shifted so that the largest is zero, and kept from falling out of range.
+    Log weights are shifted so that the largest is zero. A filter that falls behind stays behind: its state is of
+    another instant, so it must not win where a wild sample makes all that are run unlikely.
     """
     largest = filters[0][WEIGHT]
     best = 0
@@ -253,8 +254,10 @@ def combine(filters: Filters, count: int) -> tuple[float, float, int]:
     square = 0.0
     for n in range(count):
         f = filters[n]
-        f[WEIGHT] = max(f[WEIGHT] - largest, 2.0 * FORGOTTEN)
-        if f[WEIGHT] > FORGOTTEN:
+        f[WEIGHT] -= largest
+        if f[WEIGHT] <= FORGOTTEN:
+            f[WEIGHT] = DEAD
+        else:
             weight = exp(f[WEIGHT])
             total += weight
             mean += weight * f[ALPHA]

@@ -10,11 +10,12 @@ from orchestrator.estimation.methods import ekf
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import Record, record_from_columns
 from orchestrator.scenarios.scenario import load_scenario, simulate
-from pyfmu_sources.backlash_estimator import FILTERS, SIZE, NoiseSettings, covariance
+from pyfmu_sources.backlash_estimator import FILTERS, FORGOTTEN, SIZE, WEIGHT, NoiseSettings, covariance
 from pyfmu_sources.backlash_estimator_slave import (
     ALPHA_DEVIATION,
     ALPHA_HAT,
     CONTACT_HAT,
+    FIRST_ESTIMATE,
     FIRST_SETTING,
     SAMPLE_TIME,
     THETA_L,
@@ -116,6 +117,24 @@ def test_a_filter_that_diverges_is_dropped() -> None:
     assert best not in (0, 3)
     assert np.isfinite(alpha)
     assert np.isfinite(deviation)
+
+
+def test_one_wild_sample_wakes_no_filter_that_was_forgotten(record: Record) -> None:
+    """A host that reads outputs before it sets inputs makes such samples at every step: their angles are old."""
+    slave = _started(record)
+    n = 300
+    _steps(slave, record, 0, n)
+    kept = [f[WEIGHT] > FORGOTTEN for f in slave.__dict__["_filters"]]
+    assert 0 < sum(kept) < FILTERS
+    assert record.theta_l is not None
+    wild = [float(record.u[n]), float(record.theta_m[n + 1]) + 0.05, float(record.theta_l[n + 1])]
+    slave.set_real([U, THETA_M, THETA_L], wild)
+    assert slave.do_step(n * record.step, record.step)
+    assert slave.get_real([FIRST_ESTIMATE])[0] == pytest.approx(wild[1], abs=0.06)
+    rows = _steps(slave, record, n + 1, n + 6)
+    assert rows[-1][0] == pytest.approx(0.03, rel=0.3)
+    run = [f[WEIGHT] > FORGOTTEN for f in slave.__dict__["_filters"]]
+    assert all(before or not now for before, now in zip(kept, run, strict=True))
 
 
 @pytest.mark.parametrize(("alpha", "seed"), [(0.01, 3), (0.02, 1), (0.06, 5)])
