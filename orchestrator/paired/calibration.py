@@ -9,24 +9,22 @@ import contextlib
 import hashlib
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.building.fastest import NATIVE, ensure_fastest
 from orchestrator.building.sources import recipe_of
 from orchestrator.errors import CalibrationError
+from orchestrator.paired.compiled_loop import CompiledLoop, make_loop
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import difference_sum
 from orchestrator.paired.monotone import monotone_cubic
-from orchestrator.paired.native_loop import NativeLoop
 from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.cores import usable_cores
@@ -85,22 +83,6 @@ class GapEstimate:
     alpha: float
     lower: float
     upper: float
-
-
-class CalibratedLoop(Protocol):
-    """What is calibrated: a loop of an experiment."""
-
-    @property
-    def experiment(self) -> Experiment:
-        """The experiment."""
-
-    def run(self, alpha: float, errors: tuple[Array, Array]) -> Array:
-        """Return (n, columns) of a run with the half-gap ``alpha``; column 2 is the estimated load angle.
-
-        Args:
-            alpha: half-gap [rad].
-            errors: errors [rad] of both encoders, each (n,).
-        """
 
 
 class GapMap:
@@ -183,28 +165,24 @@ def _sources() -> tuple[Path, ...]:
     """Return the files of the three slaves, of their design and of the method."""
     slaves = {path for name in FMUS for path in closure(recipe_of(name).module)}
     here = Path(__file__).parent
-    method = ("calibration", "cosimulation", "experiment", "metric", "monotone", "native_loop", "settings")
+    method = (
+        "calibration", "compiled_loop", "cosimulation", "experiment", "loop_kernel", "metric", "monotone", "settings",
+    )  # fmt: skip
     return (*sorted(slaves), here.parent / "plants" / "design.py", *(here / f"{name}.py" for name in method))
 
 
 def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) -> Calibration:
     """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds."""
-    builds = ensure_fastest(FMUS)
-    if builds.kind != NATIVE:
-        from orchestrator.paired.compiled_loop import make_loop  # numba takes its time to import
-
-        return calibrate_loop(make_loop(experiment), settings)
-    with closing(NativeLoop(experiment, builds.paths)) as loop:
-        return calibrate_loop(loop, settings, usable_cores())
+    return calibrate_loop(make_loop(experiment), settings, usable_cores())
 
 
-def calibrate_loop(loop: CalibratedLoop, settings: MapSettings, threads: int = 1) -> Calibration:
-    """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`."""
+def calibrate_loop(loop: CompiledLoop, settings: MapSettings, threads: int = 1) -> Calibration:
+    """Return the calibrated map of an experiment's loop; see :func:`calibrate`."""
     with ThreadPoolExecutor(threads) as pool:
         return _calibrate(loop, settings, pool.map)
 
 
-def _calibrate(loop: CalibratedLoop, settings: MapSettings, each: Each) -> Calibration:
+def _calibrate(loop: CompiledLoop, settings: MapSettings, each: Each) -> Calibration:
     experiment = loop.experiment
     zero = (np.zeros(experiment.steps + 1), np.zeros(experiment.steps + 1))
     twin = loop.run(0.0, zero)[:, 2]
@@ -261,14 +239,14 @@ def _generator(*key: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(0, spawn_key=(CALIBRATION_BRANCH, *key)))
 
 
-def _noisy_sum(loop: CalibratedLoop, twin: Array, alpha: float, generator: np.random.Generator) -> float:
+def _noisy_sum(loop: CompiledLoop, twin: Array, alpha: float, generator: np.random.Generator) -> float:
     noise = loop.experiment.encoder_noise
     errors = generator.normal(0.0, noise, (2, len(twin))) if noise else np.zeros((2, len(twin)))
     return difference_sum(loop.run(alpha, (errors[0], errors[1]))[:, 2], twin)
 
 
 def _noisy_map(
-    loop: CalibratedLoop, twin: Array, log_alpha: Array, log_sum: Array, settings: MapSettings, each: Each
+    loop: CompiledLoop, twin: Array, log_alpha: Array, log_sum: Array, settings: MapSettings, each: Each
 ) -> tuple[Array, Array]:
     """Return (mean of log S under noise, spread of log alpha_hat), both at the clean map's nodes."""
     nodes = np.linspace(log_alpha[0], log_alpha[-1], settings.noisy_sizes)
@@ -295,7 +273,7 @@ def _smooth(values: Array) -> Array:
 
 
 def _conformal_width(
-    loop: CalibratedLoop,
+    loop: CompiledLoop,
     twin: Array,
     log_alpha: Array,
     log_sum: Array,

@@ -50,17 +50,9 @@ def _plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]
     """Return the plant's flat parameter tuple for a half-gap ``alpha`` [rad]."""
     v = experiment.values
     return parameters(
-        J_m=v.J_m,
-        J_l=v.J_l,
-        k=v.k,
-        c=v.c,
-        b_m=v.b_m,
-        b_l=v.b_l,
-        i=v.i,
-        tau=v.tau,
-        alpha=alpha,
+        J_m=v.J_m, J_l=v.J_l, k=v.k, c=v.c, b_m=v.b_m, b_l=v.b_l, i=v.i, tau=v.tau, alpha=alpha,
         backlash_model=float(BACKLASH_MODELS.index(experiment.backlash_model)) if alpha else 0.0,
-    )
+    )  # fmt: skip
 
 
 def make_loop(experiment: Experiment) -> CompiledLoop:

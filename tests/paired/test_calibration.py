@@ -112,8 +112,7 @@ def test_a_calibration_is_made_anew_when_a_module_changes_that_its_numbers_come_
         for node in ast.walk(ast.parse(path.read_bytes()))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("orchestrator.paired.", PLANTS))
     }
-    # The compiled loop runs the slaves' own sources where there is no native FMU.
-    files = {Path(import_module(name).__file__) for name in used - {"orchestrator.paired.compiled_loop"}}
+    files = {Path(import_module(name).__file__) for name in used}
     assert files <= sources
 
 
