@@ -22,18 +22,14 @@ from .drivetrain_modes import (
 from .equations import NAMES, PARAMETERS
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
-from .laws.drive import saturated
-from .parameter_rows import BIG, Parameter
-from .plant_slave import PlantSlave
+from .parameter_rows import Parameter
+from .plant_slave import KNOWN_STEPS, T_L, PlantSlave, input_variables, parameter_variable, start_variable
 from .slave_base import TOO_STIFF, StepRefusedError
 
-U, T_L, THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(9)
+THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(T_L + 1, T_L + 8)
 FIRST_PARAMETER = CONTACT + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
 MODEL = FIRST_PARAMETER + NAMES.index("backlash_model")
-KNOWN_STEPS = 16
-# The work of a step grows with its length; a host that asks for more than this has mistaken the unit.
-LONGEST_STEP = 100.0
 # Angles [rad] beyond which neighbouring numbers are over 2 mrad apart: a gap and most motion are lost in rounding.
 FARTHEST = 1e13
 TOO_FAR = (
@@ -45,43 +41,34 @@ KnownStep = tuple[float, Table]
 KnownSteps = Annotated[list[KnownStep], KNOWN_STEPS]
 
 _STARTS = (
-    ("theta_m_start", "rad", "Initial motor angle"),
-    ("omega_m_start", "rad/s", "Initial motor speed"),
-    ("theta_l_start", "rad", "Initial load angle"),
-    ("omega_l_start", "rad/s", "Initial load speed"),
-    ("T_m_start", "N.m", "Initial motor torque"),
+    start_variable("theta_m_start", "rad", "Initial motor angle"),
+    start_variable("omega_m_start", "rad/s", "Initial motor speed"),
+    start_variable("theta_l_start", "rad", "Initial load angle"),
+    start_variable("omega_l_start", "rad/s", "Initial load speed"),
+    start_variable("T_m_start", "N.m", "Initial motor torque"),
 )
-_START_NAMES = tuple(name for name, _, _ in _STARTS)
-_SHAFT = (*(name for name in NAMES if not name.startswith(("effects.input", "effects.sensor"))), *_START_NAMES)
+_OFFSET = "effects.sensor_offset"
+_SHAFT = (
+    *(name for name in NAMES if not name.startswith(("effects.input", "effects.sensor"))), *(v.name for v in _STARTS)
+)  # fmt: skip
 # Rigid models move a load that would be wound beyond its gap to the flank, so its angle depends on these as well.
-_LOAD = ("alpha", "i", "backlash_model", "theta_m_start", "theta_l_start", "effects.sensor_offset.load.offset")
+_LOAD = ("alpha", "i", "backlash_model", "theta_m_start", "theta_l_start", f"{_OFFSET}.load.offset")
 _GEAR = ("J_m", "J_l", "i", "alpha", "backlash_model", "theta_m_start", "theta_l_start", "omega_m_start")
 
 _prepare = lru_cache(maxsize=256)(drivetrain.prepare)
 
 
-def _variable(parameter: Parameter) -> FmuVariable:
-    name, unit, default, minimum, maximum, description, _ = parameter
-    if name == "backlash_model":
-        return FmuVariable(
-            name,
-            "parameter",
-            "",
-            int(default) + 1,
-            description,
-            1,
-            int(maximum) + 1,
-            type="Enumeration",
-            declared_type="BacklashModel",
-        )
-    return FmuVariable(name, "parameter", unit, default, description, minimum, maximum)
-
-
-def _output(name: str, unit: str, description: str, nominal: float, starts_from: tuple[str, ...]) -> FmuVariable:
-    depends_on = ("T_l",) if name == "T_shaft" else ()
+def _variable(row: Parameter) -> FmuVariable:
+    if row.name != "backlash_model":
+        return parameter_variable(row)
     return FmuVariable(
-        name, "output", unit, None, description, nominal=nominal, depends_on=depends_on, starts_from=starts_from
-    )
+        row.name, "parameter", "", int(row.default) + 1, row.description, 1, int(row.maximum) + 1, type="Enumeration",
+        declared_type="BacklashModel",
+    )  # fmt: skip
+
+
+def _output(name: str, unit: str, description: str, nominal: float, *starts_from: str) -> FmuVariable:
+    return FmuVariable(name, "output", unit, None, description, nominal=nominal, starts_from=starts_from)
 
 
 class Drivetrain(PlantSlave):
@@ -90,30 +77,22 @@ class Drivetrain(PlantSlave):
     title = "Geared drivetrain with backlash: motor with lag, gear with play, elastic shaft, load"
     feedthrough = True
     table: ClassVar[tuple[FmuVariable, ...]] = (
-        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque", -BIG, BIG, nominal=100.0),
-        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the load", -BIG, BIG, nominal=100.0),
-        _output(
-            "theta_m", "rad", "Motor angle as measured", 1.0, ("theta_m_start", "effects.sensor_offset.motor.offset")
+        *input_variables("motor ", "load"),
+        _output("theta_m", "rad", "Motor angle as measured", 1.0, "theta_m_start", f"{_OFFSET}.motor.offset"),
+        _output("theta_l", "rad", "Load angle as measured", 1.0, *_LOAD),
+        _output("omega_m", "rad/s", "Motor speed", 10.0, *_GEAR, "omega_l_start"),
+        _output("omega_l", "rad/s", "Load speed", 10.0, *_GEAR, "omega_l_start"),
+        _output("T_m", "N.m", "Motor torque", 100.0, "T_m_start"),
+        _output("T_shaft", "N.m", "Torque of the shaft on the load", 100.0, *_SHAFT, "T_l")._replace(
+            depends_on=("T_l",)
         ),
-        _output("theta_l", "rad", "Load angle as measured", 1.0, _LOAD),
-        _output("omega_m", "rad/s", "Motor speed", 10.0, (*_GEAR, "omega_l_start")),
-        _output("omega_l", "rad/s", "Load speed", 10.0, (*_GEAR, "omega_l_start")),
-        _output("T_m", "N.m", "Motor torque", 100.0, ("T_m_start",)),
-        _output("T_shaft", "N.m", "Torque of the shaft on the load", 100.0, (*_SHAFT, "T_l")),
         FmuVariable(
-            "contact",
-            "output",
-            "",
-            None,
-            "Flank that touches: -1, 0 (none) or 1",
-            -1,
-            1,
-            type="Integer",
+            "contact", "output", "", None, "Flank that touches: -1, 0 (none) or 1", -1, 1, type="Integer",
             starts_from=_SHAFT,
         ),
-        *(_variable(parameter) for parameter in PARAMETERS),
-        *(FmuVariable(name, "parameter", unit, 0.0, text, -1e12, 1e12) for name, unit, text in _STARTS),
-    )
+        *map(_variable, PARAMETERS),
+        *_STARTS,
+    )  # fmt: skip
     terminals: ClassVar[Terminals] = {
         "shaft": {"angle": "theta_l", "speed": "omega_l", "torque": "T_l"},
         "encoder": {"motor": "theta_m", "load": "theta_l"},
@@ -126,8 +105,6 @@ class Drivetrain(PlantSlave):
     _event_time: float
     _known: KnownSteps
 
-    # The hidden attribute that model exchange integrates, and its items: name, unit, nominal value, meaning.
-    state_attribute: ClassVar[str] = "_x"
     continuous_states: ClassVar[tuple[tuple[str, str, float, str], ...]] = (
         ("state.theta_m", "rad", 1.0, "Motor angle"),
         ("state.omega_m", "rad/s", 10.0, "Motor speed"),
@@ -143,8 +120,6 @@ class Drivetrain(PlantSlave):
         ("state.y", "N.m", 100.0, "Filtered torque request"),
     )
 
-    # What directional derivatives are of: a function of hidden attributes and inputs by their names, which returns the
-    # derivatives of the states and these outputs.
     response: ClassVar[Callable[..., Any]] = rates_and_outputs
     response_outputs: ClassVar[tuple[str, ...]] = ("theta_m", "theta_l", "omega_m", "omega_l", "T_m", "T_shaft")
 
@@ -164,16 +139,7 @@ class Drivetrain(PlantSlave):
         self._event_time = 0.0
         self._write()
 
-    def _request(self) -> float:
-        """Return the requested torque within its limit [N.m]."""
-        return saturated(self.real[U], self._p.torque_saturation_limit)
-
-    def _dead_time(self) -> float:
-        """Return how late a request acts [s]."""
-        return self._p.input_delay_delay
-
     def _moved(self, x: State, mode: Mode, u: float, time: float, step: float) -> tuple[State, Mode]:
-        """Return state and mode after a piece of a step."""
         number = self._step_number(time, step)
         known = self._known
         return drivetrain.advance(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
@@ -181,13 +147,11 @@ class Drivetrain(PlantSlave):
     def _moved_to_event(
         self, x: State, mode: Mode, u: float, time: float, step: float
     ) -> tuple[State, Mode, float, int]:
-        """Return state and mode at the first event of a piece, how far it is, and the guard that ends the mode."""
         number = self._step_number(time, step)
         known = self._known
         return drivetrain.advance_to_event(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
 
     def _take(self, x: State, mode: Mode, acting: float, step: float) -> None:
-        """Take over a state that is finite and not too far away to be told from its neighbours, or refuse the step."""
         if x[0] != x[0]:
             raise StepRefusedError(f"the step of {step!r} s {TOO_STIFF}")
         if not (-FARTHEST <= x[0] <= FARTHEST and -FARTHEST <= x[2] <= FARTHEST):
@@ -199,44 +163,20 @@ class Drivetrain(PlantSlave):
         self._acting = acting
         self._write()
 
-    def _step_number(self, time: float, step: float) -> int:
-        """Return which of the known steps this one is, after preparing for it if it is new.
-
-        Hosts compute step sizes as differences of time stamps, so that equal sizes differ by rounding; they
-        count as equal. Which sizes are known is part of the saved state, so that a restored run repeats bit for bit.
-        """
-        for n in range(len(self._known)):
-            if self._known[n][0] == step:
-                return n
-        noise = 1e-15 * (1.0 + abs(time))
-        for n in range(len(self._known)):
-            if abs(self._known[n][0] - step) <= noise:
-                return n
-        if step > LONGEST_STEP:
-            raise StepRefusedError(f"a step must be at most {LONGEST_STEP!r} s long, but is {step!r} s")
-        table = _prepare(self._p, step)
-        if len(self._known) == KNOWN_STEPS:
-            self._known[KNOWN_STEPS - 1] = (step, table)
-        else:
-            self._known.append((step, table))
-        return len(self._known) - 1
+    def _prepared(self, step: float) -> Table:
+        return _prepare(self._p, step)
 
     def derivatives(self) -> State:
         """Return the derivatives of the state."""
         return state_rates(self._x, self._mode, self._p, self._acting_request(), self.real[T_L])
 
     def output_rates(self) -> Outputs:
-        """Return the derivatives of the outputs that ``response_outputs`` names, with the inputs held.
-
-        Returns:
-            The derivatives, SI units per second.
-        """
+        """Return the derivatives of the outputs, inputs held, SI units per second."""
         return output_rates(self._x, self._mode, self._p, self._acting_request(), self.real[T_L])
 
     def indicators(self) -> Indicators:
         """Return the event indicators, for model exchange."""
-        u = self._request()
-        return indicators(self._x, self._mode, self._p, u, self.real[T_L])
+        return indicators(self._x, self._mode, self._p, self._request(), self.real[T_L])
 
     def update(self, time: float) -> None:
         """Give an event at ``time`` [s] its effect, and settle state and mode at the inputs of the moment."""
@@ -253,10 +193,7 @@ class Drivetrain(PlantSlave):
 
     def begin_exchange(self) -> None:
         """Settle the drive at what is asked first; effects that need time events are refused in model exchange."""
-        if self._p.input_delay_delay > 0.0:
-            raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
-        if self._p.rate_limit_rate < BIG:
-            raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
+        self._require_no_time_events()
         self._x = asked_first(self._x, self._request())
 
     def observe(self) -> None:

@@ -8,15 +8,47 @@ In all functions: ``time`` [s]; ``step`` [s].
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from .dead_time import MOST_REQUESTS, ROUNDING, Requests, is_new, request_at
 from .event_numbers import NO_EVENT
+from .fmu_variables import FmuVariable
+from .laws.drive import saturated
+from .parameter_rows import BIG, Parameter
 from .slave_base import SlaveBase, StepRefusedError
+
+U, T_L = 0, 1  # the inputs of every plant
+# Lengths of steps that a plant which prepares for them has ready.
+KNOWN_STEPS = 16
+# The work of a step grows with its length; a host that asks for more than this has mistaken the unit.
+LONGEST_STEP = 100.0
+
+
+def input_variables(driven: str, loaded: str) -> tuple[FmuVariable, FmuVariable]:
+    """Return the inputs of a plant, by what is ``driven`` ("motor ", or nothing) and what is ``loaded``."""
+    return (
+        FmuVariable("u", "input", "N.m", 0.0, f"Requested {driven}torque", -BIG, BIG, nominal=100.0),
+        FmuVariable("T_l", "input", "N.m", 0.0, f"External torque against the {loaded}", -BIG, BIG, nominal=100.0),
+    )
+
+
+def parameter_variable(row: Parameter) -> FmuVariable:
+    """Return the variable of a row of a plant's table."""
+    return FmuVariable(row.name, "parameter", row.unit, row.default, row.description, row.minimum, row.maximum)
+
+
+def start_variable(name: str, unit: str, text: str) -> FmuVariable:
+    """Return the parameter ``name`` of an initial state."""
+    return FmuVariable(name, "parameter", unit, 0.0, text, -1e12, 1e12)
 
 
 class PlantSlave(SlaveBase):
     """A plant driven by a torque that is limited and may come late; subclasses hold its state and move it."""
+
+    # The hidden attribute that model exchange integrates; a plant's `continuous_states` are name, unit, nominal value
+    # and meaning of its items. Directional derivatives are of its `response`: a function of hidden attributes and
+    # inputs by their names, which returns the derivatives of the states, and `response_outputs`.
+    state_attribute: ClassVar[str] = "_x"
 
     _requests: Requests
     _acting: float
@@ -24,14 +56,16 @@ class PlantSlave(SlaveBase):
     if TYPE_CHECKING:  # of the subclass's own types
         _x: Any
         _mode: Any
+        _p: Any
+        _known: Any
 
     def _request(self) -> float:
         """Return the requested torque within its limit [N.m]."""
-        raise NotImplementedError
+        return saturated(self.real[U], self._p.torque_saturation_limit)
 
     def _dead_time(self) -> float:
         """Return how late a request acts [s]."""
-        raise NotImplementedError
+        return self._p.input_delay_delay
 
     def _moved(self, x: Any, mode: Any, u: float, time: float, step: float) -> tuple[Any, Any]:
         """Return state and mode after a piece of a step."""
@@ -42,8 +76,41 @@ class PlantSlave(SlaveBase):
         raise NotImplementedError
 
     def _take(self, x: Any, mode: Any, acting: float, step: float) -> None:
-        """Take over the state after a step, or refuse the step."""
+        """Take over the state after a step if it is finite, and near enough to be told from others; else refuse it."""
         raise NotImplementedError
+
+    def _prepared(self, step: float) -> Any:
+        """Return what steps of this length need again and again, of a plant that has ``_known`` steps."""
+        raise NotImplementedError
+
+    def _step_number(self, time: float, step: float) -> int:
+        """Return which of the known steps this one is, after preparing for it if it is new.
+
+        Hosts compute step sizes as differences of time stamps, so that equal sizes differ by rounding; they
+        count as equal. Which sizes are known is part of the saved state, so that a restored run repeats bit for bit.
+        """
+        for n in range(len(self._known)):
+            if self._known[n][0] == step:
+                return n
+        noise = 1e-15 * (1.0 + abs(time))
+        for n in range(len(self._known)):
+            if abs(self._known[n][0] - step) <= noise:
+                return n
+        if step > LONGEST_STEP:
+            raise StepRefusedError(f"a step must be at most {LONGEST_STEP!r} s long, but is {step!r} s")
+        table = self._prepared(step)
+        if len(self._known) == KNOWN_STEPS:
+            self._known[KNOWN_STEPS - 1] = (step, table)
+        else:
+            self._known.append((step, table))
+        return len(self._known) - 1
+
+    def _require_no_time_events(self) -> None:
+        """Refuse effects that need time events, which model exchange does not have here."""
+        if self._p.input_delay_delay > 0.0:
+            raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
+        if self._p.rate_limit_rate < BIG:
+            raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
 
     def _start_requests(self) -> None:
         """Forget all requests and events."""

@@ -9,14 +9,12 @@ from . import servo_axis
 from .axis_equations import PARAMETERS, AxisParameters
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
-from .laws.drive import saturated
-from .parameter_rows import BIG
-from .plant_slave import PlantSlave
+from .plant_slave import T_L, PlantSlave, input_variables, parameter_variable, start_variable
 from .servo_axis import State
 from .servo_axis_modes import UNDECIDED, Indicators, Outputs, after_events, decided, indicators, rates_and_outputs
 from .slave_base import TOO_STIFF, StepRefusedError
 
-U, T_L, THETA_M, OMEGA_M, T_M = range(5)
+THETA_M, OMEGA_M, T_M = range(T_L + 1, T_L + 4)
 FIRST_PARAMETER = T_M + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
 
@@ -28,15 +26,14 @@ class ServoAxis(PlantSlave):
 
     title = "Single axis: one inertia behind the torque lag of its drive"
     table: ClassVar[tuple[FmuVariable, ...]] = (
-        FmuVariable("u", "input", "N.m", 0.0, "Requested torque", -BIG, BIG, nominal=100.0),
-        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the axis", -BIG, BIG, nominal=100.0),
+        *input_variables("", "axis"),
         FmuVariable("theta_m", "output", "rad", None, "Position as measured", starts_from=("theta_m_start", _OFFSET)),
         FmuVariable("omega_m", "output", "rad/s", None, "Speed", starts_from=("omega_m_start",)),
         FmuVariable("T_m", "output", "N.m", None, "Torque of the drive", starts_from=("T_m_start",)),
-        *(FmuVariable(p.name, "parameter", p.unit, p.default, p.description, p.minimum, p.maximum) for p in PARAMETERS),
-        FmuVariable("theta_m_start", "parameter", "rad", 0.0, "Initial position", -1e12, 1e12),
-        FmuVariable("omega_m_start", "parameter", "rad/s", 0.0, "Initial speed", -1e12, 1e12),
-        FmuVariable("T_m_start", "parameter", "N.m", 0.0, "Initial torque of the drive", -1e12, 1e12),
+        *map(parameter_variable, PARAMETERS),
+        start_variable("theta_m_start", "rad", "Initial position"),
+        start_variable("omega_m_start", "rad/s", "Initial speed"),
+        start_variable("T_m_start", "N.m", "Initial torque of the drive"),
     )
     terminals: ClassVar[Terminals] = {
         "shaft": {"angle": "theta_m", "speed": "omega_m", "torque": "T_l"},
@@ -48,8 +45,6 @@ class ServoAxis(PlantSlave):
     _p: AxisParameters
     _end_stop: int
 
-    # The hidden attribute that model exchange integrates, and its items: name, unit, nominal value, meaning.
-    state_attribute: ClassVar[str] = "_x"
     continuous_states: ClassVar[tuple[tuple[str, str, float, str], ...]] = (
         ("state.theta_m", "rad", 1.0, "Position"),
         ("state.omega_m", "rad/s", 10.0, "Speed"),
@@ -58,8 +53,6 @@ class ServoAxis(PlantSlave):
         ("state.y", "N.m", 100.0, "Filtered torque request"),
     )
 
-    # What directional derivatives are of: a function of hidden attributes and inputs by their names, which returns the
-    # derivatives of the states and these outputs.
     response: ClassVar[Callable[..., Any]] = rates_and_outputs
     response_outputs: ClassVar[tuple[str, ...]] = ("theta_m", "omega_m", "T_m")
     # Outputs that follow inputs at once in model exchange; in co-simulation they follow at the end of a step.
@@ -75,29 +68,18 @@ class ServoAxis(PlantSlave):
         self._start_requests()
         self._write()
 
-    def _request(self) -> float:
-        """Return the requested torque within its limit [N.m]."""
-        return saturated(self.real[U], self._p.torque_saturation_limit)
-
-    def _dead_time(self) -> float:
-        """Return how late a request acts [s]."""
-        return self._p.input_delay_delay
-
     def _moved(self, x: State, mode: int, u: float, time: float, step: float) -> tuple[State, int]:
-        """Return state and direction of sliding after a piece of a step."""
         if mode == UNDECIDED:
             mode = servo_axis.initial_mode(x, self._p, u)
         return servo_axis.advance(x, mode, self._p, u, self.real[T_L], step)
 
     def _moved_to_event(self, x: State, mode: int, u: float, time: float, step: float) -> tuple[State, int, float, int]:
-        """Return state and direction of sliding at the first event of a piece, how far it is, and whether it is one."""
         if mode == UNDECIDED:
             mode = servo_axis.initial_mode(x, self._p, u)
         x, mode, taken, event = servo_axis.advance_to_event(x, mode, self._p, u, self.real[T_L], step)
         return (x, mode, taken, 0 if event else NO_EVENT)
 
     def _take(self, x: State, mode: int, acting: float, step: float) -> None:
-        """Take over a state that is finite, or refuse the step."""
         if x[0] != x[0]:
             raise StepRefusedError(f"the step of {step!r} s {TOO_STIFF}")
         if not -LARGEST <= x[0] + x[1] + x[2] <= LARGEST:
@@ -114,18 +96,13 @@ class ServoAxis(PlantSlave):
         return servo_axis.mode_rates(self._x, mode, self._p, u, self.real[T_L])
 
     def output_rates(self) -> Outputs:
-        """Return the derivatives of the outputs that ``response_outputs`` names, with the inputs held.
-
-        Returns:
-            The derivatives, SI units per second; a drive without a lag holds its torque.
-        """
+        """Return the derivatives of the outputs, SI units per second; a drive without a lag holds its torque."""
         r = self.derivatives()
         return (r[0], r[1], r[2] if self._p.tau > 0.0 else 0.0)
 
     def indicators(self) -> Indicators:
         """Return the event indicators, for model exchange."""
-        u = self._request()
-        return indicators(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
+        return indicators(self._x, self._mode, self._end_stop, self._p, self._request(), self.real[T_L])
 
     def update(self, time: float) -> None:
         """Settle state and mode at an event at ``time`` [s], at the inputs of the moment."""
@@ -139,10 +116,7 @@ class ServoAxis(PlantSlave):
 
     def begin_exchange(self) -> None:
         """Settle the drive at what is asked first; effects that need time events are refused in model exchange."""
-        if self._p.input_delay_delay > 0.0:
-            raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
-        if self._p.rate_limit_rate < BIG:
-            raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
+        self._require_no_time_events()
         x = self._x
         self._x = (x[0], x[1], x[2], x[3], self._request())
 

@@ -18,11 +18,11 @@ from pyfmu_sources.drivetrain_slave import (
     THETA_L,
     THETA_M,
     Drivetrain,
-    U,
 )
 from pyfmu_sources.fmu_variables import unit_exponents
 from pyfmu_sources.kalman_slave import KalmanEstimator
 from pyfmu_sources.lqr_slave import LqrController
+from pyfmu_sources.plant_slave import U
 from pyfmu_sources.slave_base import SlaveBase
 
 OUTPUTS = [THETA_M, THETA_L, OMEGA_M, T_M, T_SHAFT]
