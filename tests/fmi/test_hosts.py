@@ -22,12 +22,16 @@ import pytest
 
 from orchestrator.building.build import ensure_built
 from orchestrator.building.launcher import find_toolchain
+from orchestrator.scenarios.scenario import load_scenario, simulate
+from orchestrator.scenarios.ssp.read import open_ssp
+from orchestrator.scenarios.ssp.write import write_ssp
 from tests.support import paired_loop
 from tests.support.fmu_calls import OK, RawFmu
-from tests.support.paired_loop import CONNECTIONS, INSTANCES, RECORDED, START_VALUES, STEP
+from tests.support.paired_loop import CONNECTIONS, INSTANCES, RECORDED, START_VALUES, STEP, Layout
 from tests.support.waiting import HANGS
 
 STEPS = 300
+SOFT_STEP = Path(__file__).resolve().parents[2] / "docs" / "examples" / "soft_step.toml"
 SIGNALS = ("theta_m", "theta_l", "omega_m", "T_shaft")
 pytestmark = pytest.mark.skipif(
     find_toolchain().compiler is None, reason="no C compiler: the FMUs have the stock binary"
@@ -253,17 +257,46 @@ result = master.simulate(0.0, job["steps"] * job["step"], options=options)
 columns = [list(result[models[a]][name]) for a, name in job["recorded"]]
 rows = [[float(value) for value in row] for row in list(zip(*columns))[1:]]
 """
+SSP_IN_ECOS = """
+from ecospy import EcosSimulation
+with EcosSimulation(ssp_path=job["package"], step_size=job["step"]) as simulation:
+    simulation.init(parameter_set="initialValues")
+    for _ in range(job["steps"]):
+        simulation.step()
+        rows.append([simulation.get_real(f"{a}::{name}") for a, name in job["recorded"]])
+    simulation.terminate()
+"""
+SSP_IN_LIBCOSIM = """
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimObserver import CosimObserver
+execution = CosimExecution.from_ssp_file(ssp_path=job["folder"])
+observer = CosimObserver.create_last_value()
+execution.add_observer(observer)
+index = {slave.name.decode(): slave.index for slave in execution.slave_infos()}
+references = {a: {v.name.decode(): v.reference for v in execution.slave_variables(n)} for a, n in index.items()}
+for _ in range(job["steps"]):
+    execution.step(step_count=1)
+    rows.append([observer.last_real_values(index[a], [references[a][name]])[0] for a, name in job["recorded"]])
+"""
 AROUND = (
     "import json, sys\njob = json.load(open(sys.argv[1]))\nrows = []\n{}\njson.dump(rows, open(sys.argv[2], 'w'))\n"
 )
 
 
-def run_in_package(code: str, package: str, fmus: dict[str, Path], folder: Path) -> list[list[float]]:
+def run_in_package(code: str, package: str, job: dict[str, Any], folder: Path) -> np.ndarray:
     if importlib.util.find_spec(package) is None:
         pytest.skip(f"{package} is not installed (`pip install .[hosts]`)")
     probe = subprocess.run([sys.executable, "-c", f"import {package}"], capture_output=True, text=True, check=False)
     if "cannot open shared object file" in probe.stderr:
         pytest.skip(probe.stderr.splitlines()[-1])
+    (folder / "job.json").write_text(json.dumps(job))
+    words = [sys.executable, "-c", AROUND.format(code), str(folder / "job.json"), str(folder / "rows.json")]
+    run = subprocess.run(words, env=without_hints(), capture_output=True, text=True, check=False, timeout=HANGS)
+    assert run.returncode == 0, run.stderr[-500:]
+    return np.array(json.loads((folder / "rows.json").read_text()))
+
+
+def run_paired(code: str, package: str, fmus: dict[str, Path], folder: Path) -> np.ndarray:
     job: dict[str, Any] = {
         "instances": INSTANCES,
         "fmus": {model: str(path) for model, path in fmus.items()},
@@ -274,28 +307,79 @@ def run_in_package(code: str, package: str, fmus: dict[str, Path], folder: Path)
         "step": STEP,
         "steps": STEPS,
     }
-    (folder / "job.json").write_text(json.dumps(job))
-    words = [sys.executable, "-c", AROUND.format(code), str(folder / "job.json"), str(folder / "rows.json")]
-    run = subprocess.run(words, env=without_hints(), capture_output=True, text=True, check=False, timeout=HANGS)
-    assert run.returncode == 0, run.stderr[-500:]
-    rows: list[list[float]] = json.loads((folder / "rows.json").read_text())
-    return rows
+    return run_in_package(code, package, job, folder)
 
 
 def test_ecos_runs_the_paired_loops(fmus: dict[str, Path], tmp_path: Path) -> None:
     """Side by side; ecos reads the outputs once more after it has set the inputs."""
-    rows = run_in_package(ECOS, "ecospy", fmus, tmp_path)
+    rows = run_paired(ECOS, "ecospy", fmus, tmp_path)
     expected = paired_loop.jacobi(fmus, STEPS, read_again=True)
-    np.testing.assert_allclose(np.array(rows), np.array(expected), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(rows, np.array(expected), rtol=0.0, atol=1e-9)
 
 
 def test_pyfmi_runs_the_paired_loops(fmus: dict[str, Path], tmp_path: Path) -> None:
     """Side by side; PyFMI too reads the outputs once more after it has set the inputs."""
-    rows = run_in_package(PYFMI, "pyfmi", fmus, tmp_path)
+    rows = run_paired(PYFMI, "pyfmi", fmus, tmp_path)
     expected = paired_loop.jacobi(fmus, STEPS, read_again=True)
-    np.testing.assert_allclose(np.array(rows), np.array(expected), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(rows, np.array(expected), rtol=0.0, atol=1e-9)
 
 
 def test_libcosim_runs_the_paired_loops(fmus: dict[str, Path], tmp_path: Path) -> None:
-    rows = run_in_package(LIBCOSIM, "libcosimpy", fmus, tmp_path)
-    np.testing.assert_allclose(np.array(rows), np.array(paired_loop.jacobi(fmus, STEPS)), rtol=0.0, atol=1e-9)
+    rows = run_paired(LIBCOSIM, "libcosimpy", fmus, tmp_path)
+    np.testing.assert_allclose(rows, np.array(paired_loop.jacobi(fmus, STEPS)), rtol=0.0, atol=1e-9)
+
+
+# The compensated loop, from its scenario as an SSP file -----------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def compensated(
+    build_native: Callable[..., dict[str, Path]], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Layout, dict[str, Path], Path, np.ndarray]:
+    """Layout and FMUs of the example, its SSP file, and our Jacobi run of that: at each step a row of real signals."""
+    folder = tmp_path_factory.mktemp("compensated")
+    text = SOFT_STEP.read_text(encoding="utf-8")
+    for model, path in build_native(["Drivetrain", "BacklashEstimator", "BacklashCompensator"]).items():
+        text = text.replace(f'fmu = "{model}"', f'fmu = "{path}"')
+    (folder / "soft_step.toml").write_text(text.replace('"plant.contact", ', ""), encoding="utf-8")
+    scenario = load_scenario(folder / "soft_step.toml")
+    ours = simulate(scenario)
+    for version in ("2.0", "1.0"):
+        write_ssp(folder / "soft_step.ssp", scenario, version)
+        with open_ssp(folder / "soft_step.ssp", simultaneous=True) as again:
+            run = simulate(again)
+        assert all(np.array_equal(run[name], ours[name]) for name in scenario.record)
+    layout, fmus = paired_loop.layout_of(scenario)
+    return layout, fmus, folder / "soft_step.ssp", np.array([ours[name] for name in scenario.record]).T
+
+
+def job_of(layout: Layout, package: Path, steps: int) -> dict[str, Any]:
+    shutil.unpack_archive(package, package.with_suffix(""), "zip")
+    places = {"package": str(package), "folder": str(package.with_suffix(""))}
+    return {**places, "recorded": layout.recorded, "step": layout.step, "steps": steps}
+
+
+def settles_softly(rows: np.ndarray, layout: Layout) -> bool:
+    """Whether the load comes to its reference, by crossings of the gap on the way."""
+    angle, crossing = (layout.recorded.index(name) for name in (("plant", "theta_l"), ("compensator", "crossing")))
+    return bool(abs(rows[-1, angle] - 0.5) < 5e-3 and np.sum(np.diff(rows[:, crossing]) > 0.0) >= 3)
+
+
+def test_libcosim_runs_the_compensated_loop_to_our_bits(
+    compensated: tuple[Layout, dict[str, Path], Path, np.ndarray], tmp_path: Path
+) -> None:
+    layout, _, package, ours = compensated
+    assert settles_softly(ours, layout)
+    rows = run_in_package(SSP_IN_LIBCOSIM, "libcosimpy", job_of(layout, package, len(ours) - 1), tmp_path)
+    np.testing.assert_array_equal(rows, ours[1:])
+
+
+def test_ecos_runs_the_compensated_loop_as_plain_calls_do(
+    compensated: tuple[Layout, dict[str, Path], Path, np.ndarray], tmp_path: Path
+) -> None:
+    layout, fmus, package, ours = compensated
+    steps = len(ours) - 1
+    assert paired_loop.jacobi(fmus, 100, layout=layout) == ours[1:101].tolist()
+    rows = run_in_package(SSP_IN_ECOS, "ecospy", job_of(layout, package, steps), tmp_path)
+    np.testing.assert_array_equal(rows, paired_loop.jacobi(fmus, steps, read_again=True, layout=layout))
+    assert settles_softly(rows, layout)

@@ -1,10 +1,17 @@
-"""The paired loops by plain FMI calls, in the schemes that other hosts use: what their trajectories are compared with.
+"""Loops by plain FMI calls, in the schemes that other hosts use: what their trajectories are compared with.
 
-Instances are ``plant_gap``, ``estimator_gap``, ``controller_gap`` and the same with ``_ideal``.
+The paired loops' instances are ``plant_gap``, ``estimator_gap``, ``controller_gap`` and the same with ``_ideal``. Any
+scenario of FMI 2.0 with constant sources is a layout as well.
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.fmi.instances import FmuFactory
+from orchestrator.master.signals import Constant
+from orchestrator.master.system import split
+from orchestrator.scenarios.definition import Scenario
 from tests.support.fmu_calls import OK, RawFmu
 
 HALF_GAP = 0.02
@@ -36,56 +43,92 @@ RECORDED = tuple(
 )
 
 
-class Loops:
-    """Six instances in the state in which a host has them after initialization."""
+@dataclass(frozen=True)
+class Layout:
+    """A loop: model of each instance, connections in the order of the signal flow, start values, what is recorded."""
 
-    def __init__(self, fmus: dict[str, Path]) -> None:
-        self.models = {model: RawFmu(fmus[model]) for model in MODELS.values()}
-        self.instances = {name: self.models[model].instantiate() for name, model in INSTANCES.items()}
-        for (instance, variable), value in START_VALUES.items():
+    instances: Mapping[str, str]
+    connections: Sequence[tuple[str, str, str, str]]
+    starts: Mapping[tuple[str, str], float]
+    recorded: Sequence[tuple[str, str]]
+    step: float
+
+
+PAIRED = Layout(INSTANCES, CONNECTIONS, START_VALUES, RECORDED, STEP)
+
+
+def layout_of(scenario: Scenario) -> tuple[Layout, dict[str, Path]]:
+    """Return the layout of a scenario, and its FMUs by the names of their instances."""
+    system = scenario.system
+    starts = {(i.name, name): float(value) for i in system.instances for name, value in i.start.items()}
+    for source in system.sources:
+        assert isinstance(source.signal, Constant)
+        starts[split(source.target)] = source.signal.value
+    fmus = {}
+    for instance in system.instances:
+        assert isinstance(instance.create, FmuFactory)
+        fmus[instance.name] = instance.create.path
+    connections = [(*split(c.source), *split(c.target)) for c in system.connections]
+    recorded = [split(name) for name in scenario.record or ()]
+    names = {name: name for name in fmus}
+    return Layout(names, connections, starts, recorded, scenario.algorithm.step), fmus
+
+
+class Loops:
+    """Instances in the state in which a host has them after initialization."""
+
+    def __init__(self, fmus: dict[str, Path], layout: Layout = PAIRED) -> None:
+        self.layout = layout
+        self.models = {model: RawFmu(fmus[model]) for model in set(layout.instances.values())}
+        self.instances = {name: self.models[model].instantiate() for name, model in layout.instances.items()}
+        for (instance, variable), value in layout.starts.items():
             self._set(instance, variable, value)
         self._each("fmi2EnterInitializationMode", setup=True)
         self.pass_on()
         self._each("fmi2ExitInitializationMode")
 
+    def _model(self, instance: str) -> RawFmu:
+        return self.models[self.layout.instances[instance]]
+
     def _each(self, function: str, setup: bool = False) -> None:
-        for name, model in INSTANCES.items():
+        for name, model in self.layout.instances.items():
             raw = self.models[model]
             assert not setup or raw.setup(self.instances[name]) == OK
             assert getattr(raw.library, function)(self.instances[name]) == OK
 
     def _set(self, instance: str, variable: str, value: float) -> None:
-        assert self.models[INSTANCES[instance]].set_real(self.instances[instance], [variable], [value]) == OK
+        assert self._model(instance).set_real(self.instances[instance], [variable], [value]) == OK
 
     def get(self, instance: str, variable: str) -> float:
         """Return one value."""
-        status, values = self.models[INSTANCES[instance]].get_real(self.instances[instance], [variable])
+        status, values = self._model(instance).get_real(self.instances[instance], [variable])
         assert status == OK
         return values[0]
 
     def step(self, instance: str, n: int) -> None:
         """Do step number ``n``."""
-        assert self.models[INSTANCES[instance]].step(self.instances[instance], n * STEP, STEP) == OK
+        h = self.layout.step
+        assert self._model(instance).step(self.instances[instance], n * h, h) == OK
 
     def pass_on(self, source: str | None = None) -> None:
         """Pass values on connection by connection, in the order of the signal flow."""
-        for a, output, b, entry in CONNECTIONS:
+        for a, output, b, entry in self.layout.connections:
             if source is None or a == source:
                 self._set(b, entry, self.get(a, output))
 
     def exchange(self) -> None:
         """Read all outputs, then set all inputs."""
-        values = [self.get(a, output) for a, output, _, _ in CONNECTIONS]
-        for (_, _, b, entry), value in zip(CONNECTIONS, values, strict=True):
+        values = [self.get(a, output) for a, output, _, _ in self.layout.connections]
+        for (_, _, b, entry), value in zip(self.layout.connections, values, strict=True):
             self._set(b, entry, value)
 
     def record(self) -> list[float]:
         """Return the recorded values."""
-        return [self.get(instance, variable) for instance, variable in RECORDED]
+        return [self.get(instance, variable) for instance, variable in self.layout.recorded]
 
     def close(self) -> None:
         """Free the instances."""
-        for name, model in INSTANCES.items():
+        for name, model in self.layout.instances.items():
             self.models[model].library.fmi2FreeInstance(self.instances[name])
 
 
@@ -101,19 +144,19 @@ def gauss_seidel(fmus: dict[str, Path], steps: int) -> list[list[float]]:
     return rows
 
 
-def jacobi(fmus: dict[str, Path], steps: int, read_again: bool = False) -> list[list[float]]:
+def jacobi(fmus: dict[str, Path], steps: int, read_again: bool = False, layout: Layout = PAIRED) -> list[list[float]]:
     """All side by side, then the exchange; ``read_again``: outputs are read once more after the inputs were set."""
-    loops, rows = Loops(fmus), []
+    loops, rows = Loops(fmus, layout), []
     if read_again:
         loops.record()
     for n in range(steps):
-        for instance in INSTANCES:
+        for instance in layout.instances:
             loops.step(instance, n)
         before = loops.record()
         loops.exchange()
         rows.append(loops.record() if read_again else before)
         if read_again:
-            for a, output, _, _ in CONNECTIONS:
+            for a, output, _, _ in layout.connections:
                 loops.get(a, output)
     loops.close()
     return rows
