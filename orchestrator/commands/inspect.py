@@ -2,7 +2,9 @@
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -21,15 +23,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument("record", type=Path, metavar="DATA", help=f"measured record ({FORMATS})")
     parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the machine, as far as it is known")
-    text = "print what each column would be taken from, or an FMU's variables, as JSON, and stop"
+    text = "print what each column would be taken from, or the variables of an FMU or SSP file, as JSON, and stop"
     parser.add_argument("--columns", action="store_true", help=text)
     add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Look at the record, print what it holds, write JSON, picture, report and a model file to start from."""
-    if args.columns and args.record.suffix.lower() == ".fmu":
-        sys.stdout.write(msgspec.json.encode(preview_fmu(args.record)).decode() + "\n")
+    if args.columns and (preview := _preview_of(args.record.suffix.lower())):
+        sys.stdout.write(msgspec.json.encode(preview(args.record)).decode() + "\n")
         return 0
     model = None if args.model is None else read_model(args.model)
     if args.columns:
@@ -54,3 +56,14 @@ def run(args: argparse.Namespace) -> int:
         f"Model file to start from: {args.out / STARTER}\nWritten to {args.out}: report.html, inspect.json\n"
     )
     return 0
+
+
+def _preview_of(ending: str) -> Callable[[Path], Any] | None:
+    """Return what shows the interface of FMUs and SSP files; None: it is a log."""
+    if ending == ".fmu":
+        return preview_fmu
+    if ending == ".ssp":
+        from orchestrator.scenarios.ssp.preview import preview_ssp  # the master: half a second to import
+
+        return preview_ssp
+    return None

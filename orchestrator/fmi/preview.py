@@ -1,11 +1,13 @@
 """What an FMU offers, for a program to show: variables with units, starts and limits. Nothing of it is loaded."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import msgspec
 
 from orchestrator.fmi.model_description import read_description
-from orchestrator.master.protocol import Unit, Value
+from orchestrator.master.protocol import ModelInterface, Unit, Value
 
 
 class VariableShown(msgspec.Struct, frozen=True):
@@ -43,15 +45,23 @@ def preview_fmu(path: Path) -> FmuPreview:
     """
     described = read_description(path)
     model = described.model
-    shown = tuple(
+    kind = "co-simulation" if described.exchange is None else "model exchange"
+    shown = shown_variables(model)
+    return FmuPreview(path.name, described.version, kind, model.has_events, described.left_out, shown)
+
+
+def shown_variables(
+    model: ModelInterface, prefix: str = "", starts: Mapping[str, Value] = MappingProxyType({})
+) -> tuple[VariableShown, ...]:
+    """Return the variables of a model, ``prefix`` before each name; ``starts`` set others."""
+    return tuple(
         VariableShown(
-            one.name, one.causality, one.type, one.unit or "", _quantity(model.units.get(one.unit or "")),
-            one.variability, one.start, one.minimum, one.maximum, tuple(name for name, _ in one.items), one.description,
+            prefix + one.name, one.causality, one.type, one.unit or "", _quantity(model.units.get(one.unit or "")),
+            one.variability, starts.get(one.name, one.start), one.minimum, one.maximum,
+            tuple(name for name, _ in one.items), one.description,
         )
         for one in model.variables.values()
     )  # fmt: skip
-    kind = "co-simulation" if described.exchange is None else "model exchange"
-    return FmuPreview(path.name, described.version, kind, model.has_events, described.left_out, shown)
 
 
 def _quantity(unit: Unit | None) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import InputError
+from orchestrator.records.units import ANGLES
 from orchestrator.reporting import Facts, Plot, Report, ReportTable, Series, TableColumn
 from orchestrator.workbench.session import is_name
 
@@ -36,7 +37,7 @@ class ResultNumber:
     def words(self) -> str:
         """Return value and interval in words."""
         between = "" if self.interval is None else f" ({self.interval[0]:.5g} to {self.interval[1]:.5g})"
-        return f"{self.value:.5g}{between} {self.unit}".strip()
+        return f"{self.value:.5g} {self.unit}".strip() + between
 
 
 def compare_results(first: Path, second: Path) -> Report:
@@ -76,6 +77,7 @@ def compare_results(first: Path, second: Path) -> Report:
         summary,
         (*(t for t in tables if t.rows), *plots, facts),
         badge,  # type: ignore[arg-type]
+        angle_unit=_angle_unit(documents[0].get("results")),
     )
 
 
@@ -84,7 +86,8 @@ def quantities(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber
     if isinstance(results, Mapping):
         value = next((results[key] for key in ("value", "alpha") if _is_number(results.get(key))), None)
         if value is not None:
-            interval, unit = _interval(results.get("interval")), str(results.get("unit") or "")
+            interval = _interval(results.get("interval"))
+            unit = str(results.get("unit") or ("rad" if "alpha" in results else ""))
             yield path.strip() or "the half-gap", ResultNumber(float(value), interval, unit)
         for name, entry in results.items():
             if name in _BESIDE or (value is not None and name in ("value", "alpha", "interval", "standard_error")):
@@ -99,6 +102,14 @@ def quantities(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber
                 yield from quantities(entry, f"{path} {place + 1}")
     elif _is_number(results):
         yield path.strip(), ResultNumber(float(results))
+
+
+def _angle_unit(results: Any) -> str:
+    """Return the unit in which the first result's log has angles."""
+    if not isinstance(results, Mapping):
+        return "rad"
+    found = results.get("angle_unit") or _angle_unit(results.get("record"))
+    return found if found in ANGLES else "rad"
 
 
 def _is_number(value: Any) -> bool:

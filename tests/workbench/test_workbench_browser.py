@@ -8,6 +8,7 @@ import pytest
 
 from orchestrator.building.build import ensure_built
 from orchestrator.scenarios.scenario import load_scenario
+from orchestrator.scenarios.ssp.write import write_ssp
 from tests.support.browser import browser, missing, set_screen
 from tests.support.workbench import HANGS, Served, drive_log, workbench
 
@@ -221,6 +222,18 @@ def test_a_drawn_curve_and_its_scenario_outlast_a_reload(inspected: Any, served:
     drawn = served.folder / "files" / "drawn.csv"
     wait(inspected, lambda d: drawn.exists() and drawn.read_text().endswith("\n1,0\n"))
     assert drawn.read_text().splitlines() == ["time,value", "0,0", "0.5,-1.25", "1,0"]
+
+
+def test_an_ssp_file_is_a_tree(inspected: Any, served: Served) -> None:
+    choose_tab(inspected, "fmus")
+    system = served.folder / "drawn.ssp"
+    write_ssp(system, load_scenario(served.folder / "files" / "scenario.toml"))
+    find(inspected, "#panel-fmus input[type=file]").send_keys(str(system))
+    said = "System of 2 FMUs until 1 s: drivetrain (Drivetrain), kalmanestimator (KalmanEstimator)"
+    wait(inspected, lambda d: said in d.find_element("id", "panel-fmus").text)
+    branches = [one.text for one in inspected.find_elements("css selector", "#panel-fmus details summary")]
+    assert "Connections (1)" in branches
+    assert any(text.startswith("drivetrain (") for text in branches)
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (390, "light"), (1280, "dark")])

@@ -46,6 +46,20 @@ def test_what_differs_beyond_the_intervals(tmp_path: Path) -> None:
     assert "diagnose-2" in render(report)
 
 
+def test_angles_are_shown_in_the_unit_of_the_log(tmp_path: Path) -> None:
+    first, second = result(tmp_path / "diagnose-1", 0.01, 0.001), result(tmp_path / "diagnose-2", 0.02, 0.001)
+    path = first / "diagnose.json"
+    document = json.loads(path.read_text())
+    document["results"]["angle_unit"] = "deg"
+    path.write_text(json.dumps(document))
+    page = render(compare_results(first, second))
+    assert 'data-angle="deg"' in page
+    assert '<span data-unit="rad">0.02 rad (0.019 to 0.021)</span>' in page
+    document["results"]["angle_unit"] = '"><script>'
+    path.write_text(json.dumps(document))
+    assert 'data-angle="rad"' in render(compare_results(first, second))
+
+
 def test_values_within_their_intervals_do_not_differ(tmp_path: Path) -> None:
     report = compare_results(
         result(tmp_path / "diagnose-1", 0.01, 0.001), result(tmp_path / "diagnose-2", 0.0115, 0.001, 250.0, "none")
@@ -74,4 +88,4 @@ def test_quantities_take_intervals_and_leave_flags() -> None:
     found = dict(
         quantities({"alpha": 1.0, "interval": [0.5, 2.0], "visible": True, "more": [1.0, {"x": None, "y": 3}]})
     )
-    assert found == {"the half-gap": ResultNumber(1.0, (0.5, 2.0)), "more 2 y": ResultNumber(3.0)}
+    assert found == {"the half-gap": ResultNumber(1.0, (0.5, 2.0), "rad"), "more 2 y": ResultNumber(3.0)}

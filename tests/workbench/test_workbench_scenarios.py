@@ -1,6 +1,9 @@
 """A scenario that was drawn: its TOML, its run, and drawings that are no scenario."""
 
+import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,6 +12,7 @@ from orchestrator.building.build import ensure_built
 from orchestrator.errors import InputError
 from orchestrator.fmi.preview import preview_fmu
 from orchestrator.scenarios.scenario import load_scenario
+from orchestrator.scenarios.ssp.write import write_ssp
 from orchestrator.workbench.scenario_text import scenario_text
 from orchestrator.workbench.session import open_session
 
@@ -79,3 +83,27 @@ def test_the_interface_of_an_fmu(session) -> None:
     assert (seen.version, seen.kind, shown["u"].causality, shown["u"].unit) == ("2.0", "co-simulation", "input", "N.m")
     assert shown["u"].quantity == shown["T_shaft"].quantity != shown["theta_m"].quantity
     assert "nordin" in shown["backlash_model"].items
+
+
+def test_what_an_ssp_file_holds(session) -> None:
+    file, system = session.files / "scenario.toml", session.files / "system.ssp"
+    drawn = {**DRAWN, "sources": [{"to": "plant.u", "kind": "constant", "value": 2.0}]}
+    file.write_text(scenario_text(session, drawn))
+    write_ssp(system, load_scenario(file))
+    command = [sys.executable, "-m", "orchestrator", "inspect", str(system), "--columns"]
+    seen = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+    assert seen["components"] == {"plant": "Drivetrain", "filter": "KalmanEstimator"}
+    assert (seen["connections"], seen["stop"]) == ([["plant.theta_m", "filter.theta_m"]], 0.1)
+    shown = {one["name"]: one for one in seen["variables"]}
+    assert (shown["plant.alpha"]["start"], shown["plant.alpha"]["unit"]) == (0.01, "rad")
+    assert shown["filter.theta_m_hat"]["causality"] == "output"
+
+
+def test_a_file_that_is_no_system_is_refused(session) -> None:
+    wrong = session.files / "wrong.ssp"
+    wrong.write_text("no archive")
+    command = [sys.executable, "-m", "orchestrator", "inspect", str(wrong), "--columns"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "wrong.ssp" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,5 +1,5 @@
 import { fileAddress, get, post, upload } from "./api.js";
-import { check, choice, field, fill, make, numberIn, numberInput } from "./dom.js";
+import { check, choice, field, fill, make, numberIn, numberInput, plain } from "./dom.js";
 import { Graph, fits, inputsOf, outputsOf, place } from "./graph.js";
 import { action, dropZone, fileChoice, isFmu, isLog, jobView, message } from "./parts.js";
 import { choices, choose, refresh, start } from "./state.js";
@@ -39,7 +39,7 @@ export function build(panel) {
     choose({});
     said.say("");
     fill(tree);
-    if (!/\.fmu$/i.test(file)) return;
+    if (!file) return;
     try {
       const found = await variablesOf(file);
       if (file === fmu) drawTree(found);
@@ -54,9 +54,16 @@ export function build(panel) {
       fill(place, branch(shown, 0, text !== ""), shown.length ? null : make("p", { class: "note" }, "no variable has these words"));
     };
     fill(tree,
-      make("p", { class: "note" }, `FMI ${found.version}, ${found.kind}, ${found.variables.length} variables${found.left_out ? `; ${found.left_out}` : ""}`),
+      make("p", { class: "note" }, found.components ? ofSystem(found) : `FMI ${found.version}, ${found.kind}, ${found.variables.length} variables${found.left_out ? `; ${found.left_out}` : ""}`),
+      ...(found.components ? [...found.remarks.map((text) => make("p", { class: "note" }, plain(text))), make("details", {}, make("summary", {}, `Connections (${found.connections.length})`),
+        make("ul", { class: "files" }, found.connections.map(([from, to]) => make("li", {}, `${from} → ${to}`))))] : []),
       field("Find a variable", words), place);
     list();
+  }
+
+  function ofSystem(found) {
+    const parts = Object.entries(found.components).map(([name, model]) => `${name} (${model})`);
+    return `System of ${parts.length} FMUs until ${found.stop} s: ${parts.join(", ")}`;
   }
 
   // Variables by the parts of their names; of a large branch what stands below it comes when it is opened.
