@@ -28,7 +28,8 @@ from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import make_slave
 from orchestrator.shared.cache import cache_directory
 
-NATIVE, PYTHON = "native", "Python"
+NATIVE = "native"
+PYTHON = "Python"
 PROBE_STEPS = 60
 """Steps of each comparison: enough for several contacts at the probe's inputs."""
 _PROBE_STEP = 1e-3
