@@ -30,6 +30,7 @@ COMMANDS = {
     "workbench": "all of it in the browser, on this machine alone",
     "report": "rebuild the HTML report of a result directory",
 }
+PICTURED = frozenset({"simulate", "inspect", "estimate", "diagnose"})
 
 
 def build_parser(command: str | None, every: bool = False) -> argparse.ArgumentParser:
@@ -50,6 +51,9 @@ def build_parser(command: str | None, every: bool = False) -> argparse.ArgumentP
         module = importlib.import_module(f"orchestrator.commands.{name}")
         module.add_arguments(sub)
         add_progress_argument(sub)
+        if name in PICTURED:
+            text = "draw the plots of the page as PNG files too"
+            sub.add_argument("--pictures", action="store_true", help=text)
         if name != "report":  # it writes into the directory that it is given
             sub.add_argument(
                 "--out",

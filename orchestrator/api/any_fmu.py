@@ -44,7 +44,7 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         delivered: the corrected system, once it has been written.
     """
 
-    replaces: ClassVar[tuple[str, ...]] = ("corrected.ssp",)
+    replaces: ClassVar[tuple[str, ...]] = ("corrected.ssp", "diagnose_signals.png")
     signal_word: ClassVar[str] = "output"
     diagnosis: FmuDiagnosis
     validation: TestMisfit | None
@@ -98,9 +98,9 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         problem, row = first_test(self.diagnosis.workings)
         return float(problem.data.time[row]) if row < len(problem.data.time) else None
 
-    def write_files(self, folder: Path) -> None:
-        """Write measured and simulated outputs, a figure and the corrected system."""
-        super().write_files(folder)
+    def write_files(self, folder: Path, pictures: bool = False) -> None:
+        """Write measured and simulated outputs, a picture where it is asked for, and the corrected system."""
+        super().write_files(folder, pictures)
         if self.verdict != "unknown":
             workings = self.diagnosis.workings
             self.delivered[:] = [write_corrected(folder / "corrected.ssp", workings.problem, workings.final)]

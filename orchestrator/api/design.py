@@ -46,6 +46,7 @@ class DesignResult(PlottedResult):
     """
 
     command: ClassVar[str] = "estimate"
+    replaces: ClassVar[tuple[str, ...]] = ("design.png",)
     size: float
     time: NDArray[np.float64]
     candidates: tuple[Excitation, ...]

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import msgspec
 
@@ -45,6 +45,9 @@ class DiagnosisResult(AnyDiagnosisResult):
         with_law: the corrected FMU has the learned law, off until ``effects.learned_law.on`` is 1.
     """
 
+    replaces: ClassVar[tuple[str, ...]] = tuple(
+        f"diagnose_{name}.png" for name in ("signals", "candidates", "missing_torque", "blocks", "learned_law")
+    )
     diagnosis: Diagnosis
     record: Record
     validation: TestMisfit | None
@@ -165,12 +168,12 @@ class DiagnosisResult(AnyDiagnosisResult):
         """File name of the corrected FMU."""
         return f"{fmu_name(self.diagnosis.model.plant.name, self.record.source)}.fmu"
 
-    def write_files(self, folder: Path) -> None:
-        """Write the corrected FMU, its model file ``corrected.toml``, ``diagnose.csv`` and the figures."""
+    def write_files(self, folder: Path, pictures: bool = False) -> None:
+        """Write the corrected FMU, its model file ``corrected.toml``, ``diagnose.csv`` and the pictures asked for."""
         fmu = self.build(folder)
         if "_simulation" not in self.__dict__:  # else it would be built again
             self.__dict__["_simulation"] = self._co_simulated(fmu)
-        super().write_files(folder)
+        super().write_files(folder, pictures)
 
     def write_data(self, folder: Path) -> None:
         """Write ``diagnose.csv`` and ``corrected.toml``."""

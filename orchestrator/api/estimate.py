@@ -62,6 +62,10 @@ class EstimateResult(PlottedResult):
     """
 
     command: ClassVar[str] = "estimate"
+    replaces: ClassVar[tuple[str, ...]] = (
+        *(f"estimate_{name}.png" for name in ("fit", "profile", "online", "flanks")),
+        *(f"{DIAGNOSIS}/{name}" for name in DiagnosisResult.replaces),
+    )
     record: Record
     model: Model
     methods: tuple[MethodResult, ...]
@@ -192,27 +196,31 @@ class EstimateResult(PlottedResult):
             settings=as_tables(self.settings),
         )
 
-    def write_diagnosis(self, folder: Path, place: Path) -> None:
+    def write_diagnosis(self, folder: Path, place: Path, pictures: bool = False) -> None:
         """Write the diagnosis, if there is one, as a folder of its own.
 
         Args:
             folder: the folder of the estimate.
             place: the folder that it will be moved to.
+            pictures: whether to draw the plots of the page as PNG files too.
         """
         if self.diagnosis is not None:
             (folder / DIAGNOSIS).mkdir()
-            self.diagnosis.write(folder / DIAGNOSIS, place / DIAGNOSIS)
+            self.diagnosis.write(folder / DIAGNOSIS, place / DIAGNOSIS, pictures=pictures)
 
-    def write(self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None) -> None:
-        """Write data, figures, ``estimate.json``, ``report.html`` and the diagnosis into a folder that exists.
+    def write(
+        self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None, pictures: bool = False
+    ) -> None:
+        """Write data, ``estimate.json``, ``report.html`` and the diagnosis into a folder that exists.
 
         Args:
             folder: that gets the files, made when missing.
             place: the folder that they will be moved to.
             arguments: what was asked for (default: the arguments of the call).
+            pictures: whether to draw the plots of the page as PNG files too.
         """
-        self.write_diagnosis(folder, place)
-        super().write(folder, place, arguments)
+        self.write_diagnosis(folder, place, pictures)
+        super().write(folder, place, arguments, pictures)
 
     def write_data(self, folder: Path) -> None:
         """Write a table of curves for each method that has some."""

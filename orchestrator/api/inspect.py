@@ -68,6 +68,7 @@ class InspectResult(PlottedResult):
     """
 
     command: ClassVar[str] = "inspect"
+    replaces: ClassVar[tuple[str, ...]] = ("inspect_record.png",)
     record: Record
     model: Model
     channels: tuple[Channel, ...]

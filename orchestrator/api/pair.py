@@ -41,6 +41,7 @@ class PairResult(PlottedResult):
     """
 
     command: ClassVar[str] = "simulate"
+    replaces: ClassVar[tuple[str, ...]] = ("simulate.png",)
     alpha: float
     experiment: Experiment
     run: PairRun

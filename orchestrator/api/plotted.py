@@ -84,14 +84,16 @@ class PlottedResult(Result):
         """
         raise ScenarioError(f"`path` must be absent, but is {path}: this result has plots and no picture", "path")
 
-    def write_files(self, folder: Path) -> None:
-        """Write data and pictures.
+    def write_files(self, folder: Path, pictures: bool = False) -> None:
+        """Write data, and pictures where they are asked for.
 
         Args:
             folder: where to; it exists.
+            pictures: whether to draw the plots of the page as PNG files too.
         """
         self.write_data(folder)
-        self.draw_files(folder)
+        if pictures:
+            self.draw_files(folder)
 
     def plot(self, path: Path | str | None = None) -> Figures:
         """Return the plots, and draw the main picture where a path is given.

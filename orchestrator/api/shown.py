@@ -63,33 +63,38 @@ class Result:
         """
         raise NotImplementedError
 
-    def write_files(self, folder: Path) -> None:
-        """Write data and figures.
+    def write_files(self, folder: Path, pictures: bool = False) -> None:
+        """Write data, and pictures where they are asked for.
 
         Args:
             folder: where to; it exists.
+            pictures: whether to draw the plots of the page as PNG files too.
         """
 
-    def write(self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None) -> None:
-        """Write data, figures, ``COMMAND.json`` and ``report.html`` into a folder that exists.
+    def write(
+        self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None, pictures: bool = False
+    ) -> None:
+        """Write data, ``COMMAND.json`` and ``report.html`` into a folder that exists.
 
         Args:
             folder: that gets the files, made when missing.
             place: the folder that they will be moved to, which the JSON file names.
             arguments: what was asked for, as the JSON file says it (default: the arguments of the call).
+            pictures: whether to draw the plots of the page as PNG files too.
         """
-        self.write_files(folder)
+        self.write_files(folder, pictures)
         from orchestrator.reporting import write_report  # 0.3 s that a command without result need not take
 
         given = self.arguments if arguments is None else arguments
         write_result(folder, self.command, given, self.seed, self.results(place))
         write_report(folder, self.command)
 
-    def save(self, out: Path | str) -> Path:
-        """Write data, figures, JSON and ``report.html`` into a folder, all of them or none.
+    def save(self, out: Path | str, pictures: bool = False) -> Path:
+        """Write data, JSON and ``report.html`` into a folder, all of them or none.
 
         Args:
             out: the folder; made when it does not exist.
+            pictures: whether to draw the plots of the page as PNG files too.
 
         Returns:
             The path of ``report.html``.
@@ -99,7 +104,7 @@ class Result:
         """
         place = Path(out)
         with stage_output(place, self.replaces) as folder:
-            self.write(folder, place)
+            self.write(folder, place, pictures=pictures)
         return place / "report.html"
 
     def __str__(self) -> str:

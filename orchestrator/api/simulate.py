@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,7 @@ class SimulationResult(PlottedResult):
         arguments: what was asked for.
     """
 
+    replaces: ClassVar[tuple[str, ...]] = ("simulate.png",)
     run: master.Recording
     title: str
     isolation: WallsFound | None = None

@@ -151,8 +151,12 @@ class SweepResult(AnySweepResult):
             fmu_kind=self.fmu_kind,
         )
 
+    def write_files(self, folder: Path, pictures: bool = True) -> None:
+        """Write the table, and the pictures: of all results a sweep's have them always."""
+        super().write_files(folder, True)
+
     def draw_files(self, folder: Path) -> None:
-        """Write the table and the figures."""
+        """Draw estimates and errors against size, and a pair of loops."""
         a, plan = self.arrays, self.plan
         if not len(a.actual):
             return

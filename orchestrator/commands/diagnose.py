@@ -7,6 +7,7 @@ from pathlib import Path
 
 from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnose import comparable_record, diagnose
+from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
@@ -55,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU."""
+    """Diagnose, print what was found, write JSON, CSV, report and the corrected FMU."""
     if args.fmu is not None or args.scenario is not None:
         return _any_fmu(args)
     if args.map is not None or args.draft_map:
@@ -71,13 +72,13 @@ def run(args: argparse.Namespace) -> int:
     files = {"record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}
     files["test"] = args.test
     given = {name: path and str(path) for name, path in files.items()}
-    with stage_output(args.out) as folder:
+    with stage_output(args.out, DiagnosisResult.replaces) as folder:
         with _show_stages(sum(record.size for record in records)) as progress:
             found = diagnose(
                 records, model, validate=other, test=tested, settings=settings, search=not args.no_search,
                 with_law=args.with_law, time_limit=args.time_limit, progress=progress,
             )  # fmt: skip
-        found.write(folder, args.out, given)
+        found.write(folder, args.out, given, args.pictures)
         fmu = args.out / found.fmu_name
     print_blocks([*what_was_read(records if other is None else [*records, other]), *found.blocks()])
     print_blocks(
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
             f"Corrected FMU: {fmu}, for any FMI 2.0 tool: variables as before, corrected values as start values",
             f"Its model file: {args.out / 'corrected.toml'}; `diagnose NEW.csv --no-search --model` with it judges "
             "a new record",
-            f"Written to {args.out}: report.html, diagnose.json, figures",
+            f"Written to {args.out}: report.html, diagnose.json, diagnose.csv",
         ]
     )
     return 0
@@ -118,11 +119,11 @@ def _any_fmu(args: argparse.Namespace) -> int:
             search=not args.no_search, time_limit=args.time_limit, progress=lambda done, expected, what: say(what),
         )  # fmt: skip
         try:
-            found.write(folder, args.out)
+            found.write(folder, args.out, pictures=args.pictures)
         finally:
             found.close()
         print_blocks(found.blocks())
-    print_blocks([f"Written to {args.out}: report.html, diagnose.json, diagnose.csv, figure"])
+    print_blocks([f"Written to {args.out}: report.html, diagnose.json, diagnose.csv"])
     return 0
 
 

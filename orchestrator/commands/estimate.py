@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orchestrator.api.arguments import choose_settings
-from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
+from orchestrator.api.design import DEFAULT_SIZE, RANGES, DesignResult, check_design, design
 from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.estimate import (
     DEFAULT_METHOD,
@@ -111,7 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Estimate or design, print tables, write JSON, CSV, figures and report."""
+    """Estimate or design, print tables, write JSON, CSV and report."""
     options = _design_options(args)
     model = read_model(args.model)
     require_linear(model)
@@ -123,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     if args.design:
         check_design(model, args.size, **options)
-    with stage_output(args.out) as folder:
+    with stage_output(args.out, (*EstimateResult.replaces, *DesignResult.replaces)) as folder:
         results = EstimateFound()
         blocks: list[Block] = []
         found: EstimateResult | None = None
@@ -145,8 +145,8 @@ def run(args: argparse.Namespace) -> int:
                 )
             interrupted = budget.interrupted
             blocks += found.blocks()
-            found.write_files(folder)
-            found.write_diagnosis(folder, args.out)
+            found.write_files(folder, args.pictures)
+            found.write_diagnosis(folder, args.out, args.pictures)
             results = found.results(args.out)
         if args.design and not interrupted:
             size = args.size if args.size is not None else _design_size(found)
@@ -158,10 +158,10 @@ def run(args: argparse.Namespace) -> int:
                     f"No excitation within these limits shows a half-gap of {size:g} rad: raise `--torque-limit`, "
                     "`--speed-limit` or `--duration`"
                 )
-            plan.write_files(folder)
+            plan.write_files(folder, args.pictures)
             results = msgspec.structs.replace(results, design=plan.entries())
         given = {"record": str(args.records[0]) if args.records else None}
-        given |= {k: _plain(v) for k, v in vars(args).items() if k not in ("run", "command")}
+        given |= {k: _plain(v) for k, v in vars(args).items() if k not in ("run", "command", "pictures")}
         write_result(folder, "estimate", given, None, results)
         write_report(folder, "estimate")
     print_blocks([*blocks, f"Written to {args.out}"])

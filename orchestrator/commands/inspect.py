@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look at the record, print what it holds, write JSON, picture, report and a model file to start from."""
+    """Look at the record, print what it holds, write JSON, report and a model file to start from."""
     if args.columns and (preview := _preview_of(args.record.suffix.lower())):
         sys.stdout.write(msgspec.json.encode(preview(args.record)).decode() + "\n")
         return 0
@@ -45,11 +45,12 @@ def run(args: argparse.Namespace) -> int:
         stages.begin("looking at the record", USUAL)
         found = inspect(args.record, model, **reading_of(args))
     given = {"record": str(args.record), "model": args.model and str(args.model)}
-    with stage_output(args.out) as folder:
+    with stage_output(args.out, found.replaces) as folder:
         found.write(
             folder,
             args.out,
             given | {"part": args.part, "resample": args.resample, "rate": args.rate, "header": args.header},
+            args.pictures,
         )
     print_blocks(found.blocks())
     sys.stdout.write(

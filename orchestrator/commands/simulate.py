@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.api.pair import run_pair
+from orchestrator.api.pair import PairResult, run_pair
 from orchestrator.api.shown import Result
 from orchestrator.api.simulate import simulate
 from orchestrator.commands._console import print_blocks
@@ -24,14 +24,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run, print a table, write CSV, JSON and figure."""
+    """Run, print a table, write CSV, JSON and page."""
     if arguments.scenario is not None:
         refuse_with_scenario(arguments, {"alpha": 0.02, "noise": 0.0, "seed": 0})
-    with stage_output(arguments.out) as folder:
+    with stage_output(arguments.out, PairResult.replaces) as folder:
         result = _run(arguments)
-        result.write(folder, arguments.out)
+        result.write(folder, arguments.out, pictures=arguments.pictures)
     print_blocks(result.blocks())
-    print_blocks([f"Written to {arguments.out}: report.html, simulate.csv, simulate.json, simulate.png"])
+    picture = ", simulate.png" if arguments.pictures else ""
+    print_blocks([f"Written to {arguments.out}: report.html, simulate.csv, simulate.json{picture}"])
     return 0
 
 

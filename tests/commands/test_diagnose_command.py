@@ -22,7 +22,7 @@ def result(tmp_path_factory) -> tuple[Path, dict]:
         write_csv(folder / f"{name}.csv", columns)
     out = folder / "out"
     arguments = ["diagnose", str(folder / "loose gear.csv"), "--validate", str(folder / "other.csv"), "--out", str(out)]
-    assert main(arguments) == 0
+    assert main([*arguments, "--pictures"]) == 0
     return out, json.loads((out / "diagnose.json").read_text())
 
 

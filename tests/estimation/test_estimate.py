@@ -262,7 +262,8 @@ def csv_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_command_writes_everything(csv_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["estimate", str(csv_file), "--method", "all", "--out", str(tmp_path / "out")]) == 0
+    words = ["estimate", str(csv_file), "--method", "all", "--pictures", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
     document = json.loads((tmp_path / "out" / "estimate.json").read_text())
     results = document["results"]
     assert json.loads(json.dumps(as_plain(read(results, EstimateFound)))) == results

@@ -2,7 +2,10 @@
 
 import csv
 import json
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +20,8 @@ from orchestrator.paired.pair import run_pair
 from orchestrator.paired.sizes import Sizes, read_sizes
 from orchestrator.shared.isolation.jail import Jail
 from tests.support.monolithic_loop import monolithic_loop
+
+RECORD = Path(__file__).parents[2] / "docs" / "examples" / "machine.csv"
 
 
 @pytest.mark.parametrize("model", ["dead_zone", "nordin"])
@@ -87,15 +92,30 @@ def test_simulate_command(tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["simulate", "--alpha", "0.02", "--noise", "1e-4", "--out", str(out)]) == 0
     assert "estimated half-gap" in capsys.readouterr().out
-    assert sorted(p.name for p in out.iterdir() if p.suffix != ".html") == [
-        "simulate.csv",
-        "simulate.json",
-        "simulate.png",
-    ]
+    assert sorted(p.name for p in out.iterdir()) == ["report.html", "simulate.csv", "simulate.json"]
     results = json.loads((out / "simulate.json").read_text())["results"]
     assert results["estimate"]["lower"] <= 0.02 <= results["estimate"]["upper"]
     rows = (out / "simulate.csv").read_text().splitlines()
     assert len(rows) == 2002
+
+
+def test_pictures_are_drawn_where_they_are_asked_for_and_an_older_one_does_not_stay(tmp_path, capsys):
+    words, picture = ["simulate", "--alpha", "0.02", "--out", str(tmp_path)], tmp_path / "simulate.png"
+    assert main([*words, "--pictures"]) == 0
+    assert "simulate.png" in capsys.readouterr().out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert main(words) == 0
+    assert "simulate.png" not in capsys.readouterr().out
+    assert not picture.exists()
+
+
+@pytest.mark.parametrize("words", [["simulate"], ["inspect", str(RECORD)]], ids=lambda words: words[0])
+def test_what_no_picture_is_asked_of_loads_no_matplotlib(words, tmp_path):
+    code = "import sys; from orchestrator.cli import main; main(sys.argv[1:]); print('matplotlib' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words, "--out", str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "False"
 
 
 def test_sweep_command_is_reproducible_and_complete(tmp_path, capsys):

@@ -104,7 +104,7 @@ def test_without_a_search_the_fmu_is_judged_as_it_stands(made):
 def test_the_command_delivers_a_system_that_reproduces_the_fit(made, tmp_path):
     _, record_path, fmu, map_path = made(SPRING, ("quadratic_drag",))
     out = tmp_path / "out"
-    words = ["diagnose", str(record_path), "--fmu", str(fmu), "--map", str(map_path), "--out", str(out)]
+    words = ["diagnose", str(record_path), "--fmu", str(fmu), "--map", str(map_path), "--pictures", "--out", str(out)]
     assert main(words) == 0
     results = json.loads((out / "diagnose.json").read_text())["results"]
     assert [e["name"] for e in results["effects"]] == ["quadratic_drag"]

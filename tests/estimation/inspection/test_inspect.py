@@ -94,7 +94,7 @@ def _edited(text: str) -> str:
 def test_the_page_and_the_picture_are_written(columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = tmp_path / "data.csv", tmp_path / "out"
     write_csv(path, columns)
-    assert main(["inspect", str(path), "--out", str(out)]) == 0
+    assert main(["inspect", str(path), "--pictures", "--out", str(out)]) == 0
     assert "Model file to start from" in capsys.readouterr().out
     assert (out / "inspect_record.png").stat().st_size > 10_000
     assert "Inspection of a record" in (out / "report.html").read_text()
