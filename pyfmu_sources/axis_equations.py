@@ -89,23 +89,20 @@ def start(position: float, speed: float, drive: float, p: Parameters) -> State:
 def friction(x: State, p: Parameters) -> float:
     """Return the magnitude of dry friction [N.m] at the axis's speed and position."""
     level = sliding_friction(
-        x[1],
-        p.coulomb_friction_motor_torque,
-        p.stribeck_friction_motor_coulomb,
-        p.stribeck_friction_motor_breakaway,
+        x[1], p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway,
         p.stribeck_friction_motor_stribeck_speed,
-    )
+    )  # fmt: skip
+    return dependent(level, x, p)
+
+
+def dependent(level: float, x: State, p: Parameters) -> float:
+    """Return a ``level`` of dry friction [N.m] with what depends on the position."""
     if p.periodic_friction_motor_amplitude == 0.0:
         return level
     return dependent_friction(
-        level,
-        0.0,
-        0.0,
-        x[0],
-        p.periodic_friction_motor_amplitude,
-        p.periodic_friction_motor_cycles_per_rev,
+        level, 0.0, 0.0, x[0], p.periodic_friction_motor_amplitude, p.periodic_friction_motor_cycles_per_rev,
         p.periodic_friction_motor_phase,
-    )
+    )  # fmt: skip
 
 
 def filtered(p: Parameters) -> bool:
@@ -180,17 +177,7 @@ def breakaway_torque(p: Parameters) -> float:
 
 def capacity(x: State, p: Parameters) -> float:
     """Return the breakaway torque [N.m] below which an axis that stands still keeps standing."""
-    if p.periodic_friction_motor_amplitude == 0.0:
-        return breakaway_torque(p)
-    return dependent_friction(
-        breakaway_torque(p),
-        0.0,
-        0.0,
-        x[0],
-        p.periodic_friction_motor_amplitude,
-        p.periodic_friction_motor_cycles_per_rev,
-        p.periodic_friction_motor_phase,
-    )
+    return dependent(breakaway_torque(p), x, p)
 
 
 def builds_up(p: Parameters) -> bool:

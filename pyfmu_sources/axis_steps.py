@@ -22,6 +22,7 @@ from .parameter_rows import BIG, TINY
 
 SHARE = 0.05  # of the time in which the fastest rate acts: a step
 AHEAD = 0.05  # of the time in which a sliding axis would stop: a step that comes no nearer to where friction falls
+SLOWS, BREAKS, MEETS = range(3)
 THERE = 1e-14  # of the torque: a drive that is no farther from its request has come there
 
 
@@ -143,18 +144,6 @@ def smooth_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: flo
     return driven(x, after, p, u, h)
 
 
-def slowing_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float, least: float) -> float:
-    """Return when within ``h`` [s] an axis that slides falls to the speed ``least`` [rad/s] (bisection)."""
-    low, high = 0.0, h
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        if smooth_step(x, mode, p, u, T_l, middle)[1] * mode > least:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
 def held(x: State, p: Parameters, u: float, T_l: float, h: float) -> State:
     """Return the state after ``h`` [s] at rest: the drive's torque alone moves."""
     if filtered(p):
@@ -162,25 +151,27 @@ def held(x: State, p: Parameters, u: float, T_l: float, h: float) -> State:
     return driven(x, (x[0], 0.0, x[2], x[3], x[4]), p, u, h)
 
 
-def breaking_time(x: State, p: Parameters, u: float, T_l: float, h: float) -> float:
-    """Return when within ``h`` [s] the growing torque of the drive breaks an axis away that sticks (bisection)."""
+def is_before(what: int, x: State, mode: int, p: Parameters, u: float, T_l: float, h: float, least: float) -> bool:
+    """Tell whether an event, one of ``SLOWS``, ``BREAKS``, ``MEETS``, is still to come after ``h`` [s]."""
+    if what == BREAKS:
+        return slip_at_rest(held(x, p, u, T_l, h), p, u, T_l) == 0
+    after = smooth_step(x, mode, p, u, T_l, h)
+    if what == SLOWS:
+        return after[1] * mode > least
+    return past_stop(after, p) == past_stop(x, p)
+
+
+def event_time(what: int, x: State, mode: int, p: Parameters, u: float, T_l: float, h: float, least: float) -> float:
+    """Return when within ``h`` [s] an event falls, by bisection.
+
+    Args:
+        what: ``SLOWS``: an axis that slides falls to the speed ``least`` [rad/s]; ``BREAKS``: the growing torque of the
+            drive breaks one away that sticks; ``MEETS``: it reaches or leaves an end stop.
+    """
     low, high = 0.0, h
     for _ in range(50):
         middle = 0.5 * (low + high)
-        if slip_at_rest(held(x, p, u, T_l, middle), p, u, T_l) == 0:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
-def stop_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> float:
-    """Return when within ``h`` [s] an axis reaches or leaves an end stop (bisection)."""
-    low, high = 0.0, h
-    begin = past_stop(x, p)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        if past_stop(smooth_step(x, mode, p, u, T_l, middle), p) == begin:
+        if is_before(what, x, mode, p, u, T_l, middle, least):
             low = middle
         else:
             high = middle

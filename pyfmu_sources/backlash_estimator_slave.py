@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from . import backlash_estimator as source
 from .backlash_estimator import Filters, Model, SettingValues
+from .controller_variables import ENCODERS, ESTIMATED, MEASURED
 from .fmu_variables import FmuVariable, Terminals
 from .sampled_slave import SampledSlave
 
@@ -16,14 +17,7 @@ SAMPLE_TIME = FIRST_SETTING + 9
 OFFSET_HAT = SAMPLE_TIME + 1
 
 _MEASURED = ("theta_m", "theta_l")
-_STATES = (
-    ("theta_m_hat", "rad", "motor angle"),
-    ("omega_m_hat", "rad/s", "motor speed"),
-    ("theta_l_hat", "rad", "load angle"),
-    ("omega_l_hat", "rad/s", "load speed"),
-    ("T_m_hat", "N.m", "motor torque"),
-    ("T_l_hat", "N.m", "load torque"),
-)
+_STATES = (*ESTIMATED[:4], ESTIMATED[5], ESTIMATED[4])
 _MODEL = (
     ("J_m", "kg.m2", 0.4, "Motor inertia"),
     ("J_l", "kg.m2", 5.6, "Load inertia"),
@@ -56,9 +50,7 @@ class BacklashEstimator(SampledSlave):
     title = "Online estimator of the half-gap, its standard deviation, the flank and the state"
     sample_time_reference = SAMPLE_TIME
     table: ClassVar[tuple[FmuVariable, ...]] = (
-        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque, held since the last sample", nominal=100.0),
-        FmuVariable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
-        FmuVariable("theta_l", "input", "rad", 0.0, "Measured load angle"),
+        *MEASURED,
         *(
             FmuVariable(
                 name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED, starts_from=_BEGINNING
@@ -85,7 +77,7 @@ class BacklashEstimator(SampledSlave):
             depends_on=_MEASURED,
         ),
     )  # fmt: skip
-    terminals: ClassVar[Terminals] = {"encoder": {"motor": "theta_m", "load": "theta_l"}}
+    terminals: ClassVar[Terminals] = ENCODERS
 
     _model: Model
     _settings: SettingValues

@@ -7,9 +7,20 @@ teeth do not.
 In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
 """
 
-from .equations import Mode, Parameters, State, elastic_torque, friction_l, friction_m, is_rigid, lever_arm
+from .equations import (
+    Mode,
+    Parameters,
+    State,
+    dependent_l,
+    dependent_m,
+    elastic_torque,
+    friction_l,
+    friction_m,
+    is_rigid,
+    lever_arm,
+)
 from .laws.bristles import bent_sign, has_settled, leaving_speed
-from .laws.friction import breakaway, bristle_rate, dependent_friction
+from .laws.friction import breakaway, bristle_rate
 
 
 def unloaded_m(p: Parameters) -> float:
@@ -52,48 +63,24 @@ def has_friction_l(p: Parameters) -> bool:
 
 def capacity_m(x: State, contact: int, p: Parameters) -> float:
     """Return the breakaway torque [N.m] of the motor."""
-    level = unloaded_m(p)
-    if p.load_dependent_friction_motor_coefficient == 0.0 and p.periodic_friction_motor_amplitude == 0.0:
-        return level
-    return dependent_friction(
-        level,
-        carried_m(x, contact, p),
-        p.load_dependent_friction_motor_coefficient,
-        x[0],
-        p.periodic_friction_motor_amplitude,
-        p.periodic_friction_motor_cycles_per_rev,
-        p.periodic_friction_motor_phase,
-    )
+    return dependent_m(unloaded_m(p), x, carried_m(x, contact, p), p)
 
 
 def capacity_l(x: State, contact: int, p: Parameters) -> float:
     """Return the breakaway torque [N.m] of the load."""
-    level = unloaded_l(p)
-    if p.load_dependent_friction_load_coefficient == 0.0 and p.periodic_friction_load_amplitude == 0.0:
-        return level
-    return dependent_friction(
-        level,
-        carried_l(x, contact, p),
-        p.load_dependent_friction_load_coefficient,
-        x[2],
-        p.periodic_friction_load_amplitude,
-        p.periodic_friction_load_cycles_per_rev,
-        p.periodic_friction_load_phase,
-    )
+    return dependent_l(unloaded_l(p), x, carried_l(x, contact, p), p)
 
 
 def carried_m(x: State, contact: int, p: Parameters) -> float:
     """Return the shaft's torque on the motor [N.m] that its friction depends on; rigid teeth leave it out."""
-    return (
-        0.0
-        if is_rigid(p) or p.load_dependent_friction_motor_coefficient == 0.0
-        else elastic_torque(x, contact, p) * lever_arm(x, p)
-    )
+    if p.load_dependent_friction_motor_coefficient == 0.0 or is_rigid(p):
+        return 0.0
+    return elastic_torque(x, contact, p) * lever_arm(x, p)
 
 
 def carried_l(x: State, contact: int, p: Parameters) -> float:
     """Return the shaft's torque on the load [N.m] that its friction depends on; rigid teeth leave it out."""
-    return 0.0 if is_rigid(p) or p.load_dependent_friction_load_coefficient == 0.0 else elastic_torque(x, contact, p)
+    return 0.0 if p.load_dependent_friction_load_coefficient == 0.0 or is_rigid(p) else elastic_torque(x, contact, p)
 
 
 def rest_m(p: Parameters) -> float:

@@ -10,7 +10,7 @@ In all functions: ``h``: length of the step [s]; ``u``: requested torque [N.m], 
 from math import exp
 
 from .backlash_models import NONE
-from .contact import consistent_start, initial_contact
+from .contact import asked, consistent_start, initial_contact
 from .dry_friction import shaft_torque, slips
 from .equations import (
     DEFAULTS,
@@ -26,7 +26,7 @@ from .equations import (
     twist_rate,
 )
 from .event_numbers import NO_EVENT, TOO_MUCH
-from .laws.drive import UNASKED, ramp_end, ramp_target, ramp_time
+from .laws.drive import UNASKED, ramp
 from .linear_mode import law_of
 from .linear_steps import Table, advance_linear, leap, linear_to_event
 from .parameter_rows import BIG
@@ -83,7 +83,7 @@ def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float,
     """Return state and mode after ``h`` [s], positive, with the inputs held."""
     if table[4]:
         if x[11] == UNASKED and (p.drive_filter_time_constant > 0.0 or p.rate_limit_rate < BIG):
-            x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
+            x = asked(x, u)
         if p.rate_limit_rate < BIG:
             return advance_ramp(x, mode, p, u, T_l, h)
         return advance_smooth(x, mode, p, u, T_l, h)
@@ -96,17 +96,13 @@ def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float,
 
 def advance_ramp(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, Mode]:
     """Return state and mode after ``h`` [s] of a drive limited in its rate; the end of a ramp is met exactly."""
-    before = x[11]
-    ramp = min(h, ramp_time(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
-    if ramp > 0.0:
-        x, mode = advance_smooth(
-            x, mode, p, ramp_target(before, u, p.drive_filter_time_constant, p.rate_limit_rate, ramp), T_l, ramp
-        )
-    if ramp < h:
-        if ramp > 0.0:
-            end = ramp_end(before, u, p.drive_filter_time_constant, p.rate_limit_rate)
-            x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], end)
-        x, mode = advance_smooth(x, mode, p, u, T_l, h - ramp)
+    duration, target, end = ramp(x[11], u, p.drive_filter_time_constant, p.rate_limit_rate, h)
+    if duration > 0.0:
+        x, mode = advance_smooth(x, mode, p, target, T_l, duration)
+    if duration < h:
+        if duration > 0.0:
+            x = asked(x, end)
+        x, mode = advance_smooth(x, mode, p, u, T_l, h - duration)
     return (x, mode)
 
 
@@ -123,7 +119,7 @@ def advance_to_event(
     """
     if table[4]:
         if x[11] == UNASKED and (p.drive_filter_time_constant > 0.0 or p.rate_limit_rate < BIG):
-            x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
+            x = asked(x, u)
         if p.rate_limit_rate < BIG:
             return ramp_to_event(x, mode, p, u, T_l, h)
         return advance_smooth_to_event(x, mode, p, u, T_l, h)
@@ -138,19 +134,12 @@ def advance_to_event(
 def ramp_to_event(
     x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float
 ) -> tuple[State, Mode, float, int]:
-    """Return :func:`advance_ramp` up to the first event.
-
-    Returns:
-        State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
-    """
-    before = x[11]
-    ramp = min(h, ramp_time(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
-    if ramp > 0.0:
-        target = ramp_target(before, u, p.drive_filter_time_constant, p.rate_limit_rate, ramp)
-        x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, target, T_l, ramp)
-        if which != NO_EVENT or ramp >= h:
+    """Return :func:`advance_ramp` up to the first event, as :func:`advance_to_event` does."""
+    duration, target, end = ramp(x[11], u, p.drive_filter_time_constant, p.rate_limit_rate, h)
+    if duration > 0.0:
+        x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, target, T_l, duration)
+        if which != NO_EVENT or duration >= h:
             return (x, mode, elapsed, which)
-        end = ramp_end(before, u, p.drive_filter_time_constant, p.rate_limit_rate)
-        x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], end)
-    x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, u, T_l, h - ramp)
-    return (x, mode, ramp + elapsed, which)
+        x = asked(x, end)
+    x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, u, T_l, h - duration)
+    return (x, mode, duration + elapsed, which)

@@ -29,29 +29,24 @@ class DrivetrainWithLaw(WithLaw, Drivetrain):
     _piece: float
 
     def _begin_with(self, p: Parameters) -> None:
-        """Start at the initial state with other parameters."""
         x = self._x
         self._p = p
         self._x = drivetrain.consistent_start((x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7]), p)
         self._mode = drivetrain.initial_mode(self._x, p)
 
     def _rubbed(self, p: Parameters) -> Parameters:
-        """Return parameters with the law's dry friction added to the body's own."""
         dry = self._law[L_DRY]
         if kind_of(self._law) == LOAD_SPEED:
             return p._replace(coulomb_friction_load_torque=p.coulomb_friction_load_torque + dry)
         return p._replace(coulomb_friction_motor_torque=p.coulomb_friction_motor_torque + dry)
 
     def _inertias(self) -> tuple[float, float, float]:
-        """Return the inertias of motor and load [kg.m2] and the ratio of the gear."""
         return (self._p.J_m, self._p.J_l, self._p.i)
 
     def _motion(self, x: State, u: float) -> Motion:
-        """Return what a law is a function of."""
         return (x[1], x[3], x[2], x[0] / self._p.i - x[2], x[4])
 
     def _mode_of(self, x: State, mode: Mode, p: Parameters, u: float) -> Mode:
-        """Return the mode in which friction that sets in finds the plant."""
         _, slip_m, slip_l = drivetrain.initial_mode(x, p)
         return (mode[0], slip_m, slip_l)
 

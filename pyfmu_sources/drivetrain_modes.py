@@ -57,11 +57,6 @@ def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Ind
     )
 
 
-def asked_first(x: State, u: float) -> State:
-    """Return a state whose drive has settled at what is asked first."""
-    return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
-
-
 def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Outputs:
     """Return the derivatives of the outputs of :func:`rates_and_outputs`; that of T_shaft is a central difference.
 

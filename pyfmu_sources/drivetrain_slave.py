@@ -7,13 +7,13 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
 from . import drivetrain
+from .contact import asked
 from .drivetrain import Mode, Parameters, State, Table
 from .drivetrain_modes import (
     QUIET,
     Indicators,
     Outputs,
     after_events,
-    asked_first,
     indicators,
     output_rates,
     rates_and_outputs,
@@ -194,7 +194,7 @@ class Drivetrain(PlantSlave):
     def begin_exchange(self) -> None:
         """Settle the drive at what is asked first; effects that need time events are refused in model exchange."""
         self._require_no_time_events()
-        self._x = asked_first(self._x, self._request())
+        self._x = asked(self._x, self._request())
 
     def observe(self) -> None:
         """Write the outputs at the inputs of the moment, for model exchange."""

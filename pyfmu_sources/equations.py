@@ -202,45 +202,39 @@ def elastic_torque(x: State, contact: int, p: Parameters) -> float:
 def friction_m(x: State, transmitted: float, p: Parameters) -> float:
     """Return the magnitude of the motor's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it."""
     level = sliding_friction(
-        x[1],
-        p.coulomb_friction_motor_torque,
-        p.stribeck_friction_motor_coulomb,
-        p.stribeck_friction_motor_breakaway,
-        p.stribeck_friction_motor_stribeck_speed,
-    )
+        x[1], p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb,
+        p.stribeck_friction_motor_breakaway, p.stribeck_friction_motor_stribeck_speed,
+    )  # fmt: skip
+    return dependent_m(level, x, transmitted, p)
+
+
+def dependent_m(level: float, x: State, transmitted: float, p: Parameters) -> float:
+    """Return a ``level`` of the motor's dry friction [N.m] with what depends on the shaft's torque and the angle."""
     if p.load_dependent_friction_motor_coefficient == 0.0 and p.periodic_friction_motor_amplitude == 0.0:
         return level
     return dependent_friction(
-        level,
-        transmitted,
-        p.load_dependent_friction_motor_coefficient,
-        x[0],
-        p.periodic_friction_motor_amplitude,
-        p.periodic_friction_motor_cycles_per_rev,
-        p.periodic_friction_motor_phase,
-    )
+        level, transmitted, p.load_dependent_friction_motor_coefficient, x[0], p.periodic_friction_motor_amplitude,
+        p.periodic_friction_motor_cycles_per_rev, p.periodic_friction_motor_phase,
+    )  # fmt: skip
 
 
 def friction_l(x: State, transmitted: float, p: Parameters) -> float:
     """Return the magnitude of the load's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it."""
     level = sliding_friction(
-        x[3],
-        p.coulomb_friction_load_torque,
-        p.stribeck_friction_load_coulomb,
-        p.stribeck_friction_load_breakaway,
-        p.stribeck_friction_load_stribeck_speed,
-    )
+        x[3], p.coulomb_friction_load_torque, p.stribeck_friction_load_coulomb,
+        p.stribeck_friction_load_breakaway, p.stribeck_friction_load_stribeck_speed,
+    )  # fmt: skip
+    return dependent_l(level, x, transmitted, p)
+
+
+def dependent_l(level: float, x: State, transmitted: float, p: Parameters) -> float:
+    """Return a ``level`` of the load's dry friction [N.m] with what depends on the shaft's torque and the angle."""
     if p.load_dependent_friction_load_coefficient == 0.0 and p.periodic_friction_load_amplitude == 0.0:
         return level
     return dependent_friction(
-        level,
-        transmitted,
-        p.load_dependent_friction_load_coefficient,
-        x[2],
-        p.periodic_friction_load_amplitude,
-        p.periodic_friction_load_cycles_per_rev,
-        p.periodic_friction_load_phase,
-    )
+        level, transmitted, p.load_dependent_friction_load_coefficient, x[2], p.periodic_friction_load_amplitude,
+        p.periodic_friction_load_cycles_per_rev, p.periodic_friction_load_phase,
+    )  # fmt: skip
 
 
 def ripple(theta_m: float, p: Parameters) -> float:
@@ -261,6 +255,14 @@ def motor_torque(x: State, transmitted: float, sign_m: float, p: Parameters) -> 
     return torque
 
 
+def follower_torque(x: State, p: Parameters) -> float:
+    """Return the torque [N.m] that drives the inertia of ``extra_resonance``."""
+    return resonance_torque(
+        x[2] - x[5], x[3] - x[6], p.extra_resonance_inertia, p.extra_resonance_frequency,
+        p.extra_resonance_damping_ratio,
+    )  # fmt: skip
+
+
 def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l: float) -> float:
     """Return the torque on the load [N.m] without the shaft's: external, friction, gravity, drag, springs, stops."""
     against = T_l + p.load_torque_torque + p.b_l * x[3] + sign_l * friction_l(x, transmitted, p)
@@ -268,13 +270,7 @@ def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l:
         x[3], p.quadratic_drag_coefficient
     )
     if p.extra_resonance_inertia > 0.0:
-        against += resonance_torque(
-            x[2] - x[5],
-            x[3] - x[6],
-            p.extra_resonance_inertia,
-            p.extra_resonance_frequency,
-            p.extra_resonance_damping_ratio,
-        )
+        against += follower_torque(x, p)
     if p.directional_friction_load_difference != 0.0:
         against += directional_friction(x[3], p.directional_friction_load_difference)
     if p.spring_load_stiffness != 0.0 or p.spring_load_cubic != 0.0:
@@ -343,14 +339,7 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
         wound_rate = -torque / shaft_damping(p)
     follower = 0.0
     if p.extra_resonance_inertia > 0.0:
-        pull = resonance_torque(
-            x[2] - x[5],
-            x[3] - x[6],
-            p.extra_resonance_inertia,
-            p.extra_resonance_frequency,
-            p.extra_resonance_damping_ratio,
-        )
-        follower = pull / p.extra_resonance_inertia
+        follower = follower_torque(x, p) / p.extra_resonance_inertia
     lag = (u - x[4]) / p.tau
     follows = 0.0
     if p.drive_filter_time_constant > 0.0 or p.rate_limit_rate < BIG:

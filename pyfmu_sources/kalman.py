@@ -8,14 +8,8 @@ the held input of the past sample, then correct (Anderson and Moore, Optimal Fil
 
 Vector6 = tuple[float, float, float, float, float, float]
 Matrix6 = tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6]
-Gain = tuple[
-    tuple[float, float],
-    tuple[float, float],
-    tuple[float, float],
-    tuple[float, float],
-    tuple[float, float],
-    tuple[float, float],
-]
+Pair = tuple[float, float]
+Gain = tuple[Pair, Pair, Pair, Pair, Pair, Pair]
 Weight = tuple[float, float, float]
 Update = tuple[Vector6, float, float, float]
 

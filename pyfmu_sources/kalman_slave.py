@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from . import kalman
+from .controller_variables import ENCODERS, ESTIMATED, MEASURED
 from .fmu_variables import FmuVariable, Terminals
 from .kalman import Gain, Matrix6, Vector6, Weight
 from .sampled_slave import SampledSlave
@@ -17,14 +18,6 @@ FIRST_B = FIRST_A + 36
 FIRST_K = FIRST_B + 6
 FIRST_S = FIRST_K + 12
 
-_STATES = (
-    ("theta_m_hat", "rad", "motor angle"),
-    ("omega_m_hat", "rad/s", "motor speed"),
-    ("theta_l_hat", "rad", "load angle"),
-    ("omega_l_hat", "rad/s", "load speed"),
-    ("T_l_hat", "N.m", "load torque"),
-    ("T_m_hat", "N.m", "motor torque"),
-)
 _QUOTIENTS = {
     ("rad", "rad/s"): "s",
     ("rad", "N.m"): "rad/(N.m)",
@@ -42,7 +35,7 @@ def _quotient(above: str, below: str) -> str:
 
 def _matrices() -> list[FmuVariable]:
     rows = range(6)
-    units = [unit for _, unit, _ in _STATES]
+    units = [unit for _, unit, _ in ESTIMATED]
     entries = [
         (f"A_d[{r + 1},{c + 1}]", _quotient(units[r], units[c]), "Discrete state matrix") for r in rows for c in rows
     ]
@@ -58,21 +51,13 @@ class KalmanEstimator(SampledSlave):
     title = "Sampled-data Kalman filter of the drivetrain's state and of its load torque"
     sample_time_reference = SAMPLE_TIME
     table: ClassVar[tuple[FmuVariable, ...]] = (
-        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque, held since the last sample", nominal=100.0),
-        FmuVariable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
-        FmuVariable("theta_l", "input", "rad", 0.0, "Measured load angle"),
+        *MEASURED,
         *(
             FmuVariable(
-                name,
-                "output",
-                unit,
-                None,
-                f"Estimated {text}",
-                variability="discrete",
-                depends_on=_MEASURED,
+                name, "output", unit, None, f"Estimated {text}", variability="discrete", depends_on=_MEASURED,
                 starts_from=(f"{name}_start",),
             )
-            for name, unit, text in _STATES
+            for name, unit, text in ESTIMATED
         ),
         *(
             FmuVariable(name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED)
@@ -85,11 +70,11 @@ class KalmanEstimator(SampledSlave):
         FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
         *(
             FmuVariable(f"{name}_start", "parameter", unit, 0.0, f"Initially estimated {text}")
-            for name, unit, text in _STATES
+            for name, unit, text in ESTIMATED
         ),
         *_matrices(),
-    )
-    terminals: ClassVar[Terminals] = {"encoder": {"motor": "theta_m", "load": "theta_l"}}
+    )  # fmt: skip
+    terminals: ClassVar[Terminals] = ENCODERS
 
     _A: Matrix6
     _B: Vector6
@@ -103,13 +88,8 @@ class KalmanEstimator(SampledSlave):
         values = self.real
         n = FIRST_A
         self._A = (
-            self._six(n),
-            self._six(n + 6),
-            self._six(n + 12),
-            self._six(n + 18),
-            self._six(n + 24),
-            self._six(n + 30),
-        )
+            self._six(n), self._six(n + 6), self._six(n + 12), self._six(n + 18), self._six(n + 24), self._six(n + 30),
+        )  # fmt: skip
         self._B = self._six(FIRST_B)
         k = self._six(FIRST_K)
         m = self._six(FIRST_K + 6)

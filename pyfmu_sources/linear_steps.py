@@ -49,20 +49,8 @@ def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, 
     left = x[7] * table[3]
     if abs(left) < NEGLIGIBLE_TWIST:
         left = 0.0
-    moved = (
-        theta_m,
-        next_m,
-        theta_l,
-        next_l,
-        T_m + (lag[3] * T_m + lag[4] * u),
-        x[5],
-        x[6],
-        left,
-        x[8],
-        x[9],
-        x[10],
-        x[11],
-    )
+    torque = T_m + (lag[3] * T_m + lag[4] * u)
+    moved = (theta_m, next_m, theta_l, next_l, torque, x[5], x[6], left, x[8], x[9], x[10], x[11])
     if model == NONE:
         return (moved, True)
     wound_next = theta_m / i - theta_l - offset
@@ -76,10 +64,10 @@ def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, 
         return (moved, min(contact * wound, contact * wound_next) > reach)
     stiffness = shaft_stiffness(p)
     damping = shaft_damping(p)
-    torque = contact * (stiffness * wound + damping * speed)
-    torque_next = contact * (stiffness * wound_next + damping * speed_next)
+    pressed = contact * (stiffness * wound + damping * speed)
+    pressed_next = contact * (stiffness * wound_next + damping * speed_next)
     swing = stiffness * reach + 2.0 * damping * abs(speed_next - speed)
-    return (moved, min(torque, torque_next) > swing)
+    return (moved, min(pressed, pressed_next) > swing)
 
 
 def advance_linear(

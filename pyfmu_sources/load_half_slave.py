@@ -97,11 +97,7 @@ class LoadHalf(SlaveBase):
         self._take(x, contact, NO_EVENT, step)
 
     def advance_to_event(self, time: float, step: float) -> float:
-        """Move on with the inputs held, up to the first event.
-
-        Returns:
-            How far it is [s].
-        """
+        """Move on with the inputs held, up to the first event, and return how far it is [s]."""
         self._check(step)
         motion = held_motion(self.real[THETA_M], self.real[OMEGA_M])
         x, taken, event = load_half.advance_to_event(self._x, self._contact, self._p, motion, self.real[T_L], 0.0, step)
@@ -119,11 +115,7 @@ class LoadHalf(SlaveBase):
             self._end = motion
 
     def advance_along(self, time: float, step: float, to_event: bool) -> float:
-        """Move on along the motion through the three nodes, and leave its last point as the inputs.
-
-        Returns:
-            How far it is [s].
-        """
+        """Move on along the motion through the three nodes, leave its end as the inputs, return how far it is [s]."""
         self._check(step)
         half = 0.5 * step
         first = cubic_motion(self._begin[0], self._begin[1], self._middle[0], self._middle[1], half)
@@ -178,11 +170,7 @@ class LoadHalf(SlaveBase):
         return r
 
     def output_rates(self) -> Outputs:
-        """Return the derivatives of the outputs that ``response_outputs`` names, while the motor keeps its speed.
-
-        Returns:
-            The derivatives, SI units per second.
-        """
+        """Return the derivatives of the outputs, while the motor keeps its speed, SI units per second."""
         r = self.derivatives()
         p = self._p
         rate = p.k * (self.real[OMEGA_M] / p.i - self._x[1]) - p.c * r[1] if self._contact != 0 else 0.0

@@ -26,35 +26,23 @@ class LqrController(SampledSlave):
     table: ClassVar[tuple[FmuVariable, ...]] = (
         *(FmuVariable(name, "input", unit, 0.0, text) for name, unit, text in INPUTS),
         FmuVariable(
-            "u",
-            "output",
-            "N.m",
-            None,
-            "Requested motor torque",
-            nominal=100.0,
-            variability="discrete",
-            depends_on=_INPUT_NAMES,
-            starts_from=(*_INPUT_NAMES, *_PARAMETER_NAMES),
+            "u", "output", "N.m", None, "Requested motor torque", nominal=100.0, variability="discrete",
+            depends_on=_INPUT_NAMES, starts_from=(*_INPUT_NAMES, *_PARAMETER_NAMES),
         ),
         *(FmuVariable(name, "parameter", unit, 0.0, text) for name, unit, text in GAINS),
         FmuVariable("i", "parameter", "1", 3.984, "Gear ratio: motor angle over load angle", 1e-9, 1e12),
         FmuVariable("compliance", "parameter", "rad/(N.m)", 1.0 / 3300.0, "Compliance of the shaft", 0.0, 1e12),
         FmuVariable("u_max", "parameter", "N.m", 1e4, "Torque limit", 0.0, 1e12),
         FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
-    )
+    )  # fmt: skip
 
     _gains: Gains
 
     def take_parameters(self) -> None:
         """Collect the gains."""
         real = self.real
-        self._gains = (
-            real[FIRST_GAIN],
-            real[FIRST_GAIN + 1],
-            real[FIRST_GAIN + 2],
-            real[FIRST_GAIN + 3],
-            real[FIRST_GAIN + 4],
-        )
+        n = FIRST_GAIN
+        self._gains = (real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4])
 
     def begin(self) -> None:
         """Compute the first torque request."""

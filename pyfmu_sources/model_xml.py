@@ -101,11 +101,9 @@ def _types(root: Element, table: tuple[FmuVariable, ...]) -> None:
 
 
 def _scalar_variable(reference: int, variable: FmuVariable) -> Element:
-    default = {"parameter": "fixed", "input": "continuous", "output": "continuous", "local": "continuous"}[
-        variable.causality
-    ]
-    if variable.type != "Real" and variable.causality != "parameter":
-        default = "discrete"
+    default = "continuous" if variable.type == "Real" else "discrete"
+    if variable.causality == "parameter":
+        default = "fixed"
     element = Element(
         "ScalarVariable",
         {

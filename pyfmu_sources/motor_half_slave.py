@@ -76,11 +76,7 @@ class MotorHalf(SlaveBase):
         self._write()
 
     def advance_to_event(self, time: float, step: float) -> float:
-        """Move on: nothing happens to a motor by itself.
-
-        Returns:
-            How far it is [s].
-        """
+        """Move on, and return how far it is [s]: nothing happens to a motor by itself."""
         self.advance(time, step)
         return step
 
@@ -90,11 +86,7 @@ class MotorHalf(SlaveBase):
         return r
 
     def output_rates(self) -> Outputs:
-        """Return the derivatives of the outputs that ``response_outputs`` names, with the inputs held.
-
-        Returns:
-            The derivatives, SI units per second.
-        """
+        """Return the derivatives of the outputs, inputs held, SI units per second."""
         return self.derivatives()
 
     def update(self, time: float) -> None:

@@ -26,8 +26,8 @@ from .axis_equations import (
     slip_at_rest,
     start,
 )
-from .axis_steps import breaking_time, held, longest_step, slowing_time, smooth_step, stop_time
-from .laws.drive import UNASKED, ramp_end, ramp_target, ramp_time
+from .axis_steps import BREAKS, MEETS, SLOWS, event_time, held, longest_step, smooth_step
+from .laws.drive import UNASKED, ramp
 from .parameter_rows import BIG
 
 __all__ = [
@@ -52,16 +52,13 @@ def advance(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) 
         x = (x[0], x[1], x[2], x[3], u)
     if p.rate_limit_rate >= BIG:
         return advance_request(x, mode, p, u, T_l, h)
-    before = x[4]
-    ramp = min(h, ramp_time(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
-    if ramp > 0.0:
-        x, mode = advance_request(
-            x, mode, p, ramp_target(before, u, p.drive_filter_time_constant, p.rate_limit_rate, ramp), T_l, ramp
-        )
-    if ramp < h:
-        if ramp > 0.0:
-            x = (x[0], x[1], x[2], x[3], ramp_end(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
-        x, mode = advance_request(x, mode, p, u, T_l, h - ramp)
+    duration, target, end = ramp(x[4], u, p.drive_filter_time_constant, p.rate_limit_rate, h)
+    if duration > 0.0:
+        x, mode = advance_request(x, mode, p, target, T_l, duration)
+    if duration < h:
+        if duration > 0.0:
+            x = (x[0], x[1], x[2], x[3], end)
+        x, mode = advance_request(x, mode, p, u, T_l, h - duration)
     return (x, mode)
 
 
@@ -88,18 +85,16 @@ def advance_to_event(
     """
     if x[4] == UNASKED and filtered(p):
         x = (x[0], x[1], x[2], x[3], u)
-    ramp = 0.0
+    duration = 0.0
     if p.rate_limit_rate < BIG:
-        before = x[4]
-        ramp = min(h, ramp_time(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
-        if ramp > 0.0:
-            target = ramp_target(before, u, p.drive_filter_time_constant, p.rate_limit_rate, ramp)
-            x, mode, elapsed, _, event = request_to_event(x, mode, p, target, T_l, ramp, 0.0, 0)
-            if event or ramp >= h:
+        duration, target, end = ramp(x[4], u, p.drive_filter_time_constant, p.rate_limit_rate, h)
+        if duration > 0.0:
+            x, mode, elapsed, _, event = request_to_event(x, mode, p, target, T_l, duration, 0.0, 0)
+            if event or duration >= h:
                 return (x, mode, elapsed, event)
-            x = (x[0], x[1], x[2], x[3], ramp_end(before, u, p.drive_filter_time_constant, p.rate_limit_rate))
-    x, mode, elapsed, _, event = request_to_event(x, mode, p, u, T_l, h - ramp, 0.0, 0)
-    return (x, mode, ramp + elapsed, event)
+            x = (x[0], x[1], x[2], x[3], end)
+    x, mode, elapsed, _, event = request_to_event(x, mode, p, u, T_l, h - duration, 0.0, 0)
+    return (x, mode, duration + elapsed, event)
 
 
 def request_to_event(
@@ -131,7 +126,7 @@ def request_to_event(
                 stays = held(x, p, u, T_l, step)
                 breaks = slip_at_rest(stays, p, u, T_l) != 0
                 if breaks:
-                    step = breaking_time(x, p, u, T_l, step)
+                    step = event_time(BREAKS, x, mode, p, u, T_l, step, least)
                     stays = held(x, p, u, T_l, step)
                 x = stays
                 elapsed += step
@@ -141,10 +136,10 @@ def request_to_event(
         moved = smooth_step(x, mode, p, u, T_l, step)
         meets = past_stop(x, p) != past_stop(moved, p)
         if meets:
-            step = stop_time(x, mode, p, u, T_l, step)
+            step = event_time(MEETS, x, mode, p, u, T_l, step, least)
             moved = smooth_step(x, mode, p, u, T_l, step)
         if dry and mode != 0 and moved[1] * mode < least:
-            step = slowing_time(x, mode, p, u, T_l, step, least)
+            step = event_time(SLOWS, x, mode, p, u, T_l, step, least)
             moved = smooth_step(x, mode, p, u, T_l, step)
             if bends:
                 x = (moved[0], moved[1], moved[2], mode * reach(moved, p), moved[4])

@@ -25,26 +25,21 @@ class ServoAxisWithLaw(WithLaw, ServoAxis):
     _piece: float
 
     def _begin_with(self, p: AxisParameters) -> None:
-        """Start at the initial state with other parameters."""
         real = self.real
         self._p = p
         self._x = servo_axis.start(real[FIRST_START], real[FIRST_START + 1], real[FIRST_START + 2], p)
         self._mode = UNDECIDED
 
     def _rubbed(self, p: AxisParameters) -> AxisParameters:
-        """Return parameters with the law's dry friction added to the body's own."""
         return p._replace(coulomb_friction_motor_torque=p.coulomb_friction_motor_torque + self._law[L_DRY])
 
     def _inertias(self) -> tuple[float, float, float]:
-        """Return the inertia [kg.m2], as that of motor and of load, and the ratio of no gear."""
         return (self._p.J, self._p.J, 1.0)
 
     def _motion(self, x: State, u: float) -> Motion:
-        """Return what a law is a function of."""
         return (x[1], x[1], x[0], 0.0, servo_axis.drive_torque(x, self._p, u))
 
     def _mode_of(self, x: State, mode: int, p: AxisParameters, u: float) -> int:
-        """Return the mode in which friction that sets in finds the axis."""
         return servo_axis.initial_mode(x, p, u)
 
     def _pushed(

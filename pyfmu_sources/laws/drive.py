@@ -57,15 +57,15 @@ def ramp_time(request: float, u: float, time_constant: float, limit: float) -> f
     return max(0.0, abs(u - request) / limit - time_constant)
 
 
-def ramp_target(request: float, u: float, time_constant: float, limit: float, duration: float) -> float:
-    """Return a request [N.m] so far away that what follows it changes at its ``limit`` for ``duration`` [s]."""
+def ramp(request: float, u: float, time_constant: float, limit: float, h: float) -> tuple[float, float, float]:
+    """Return how long [s] of ``h`` a request that follows ``u`` [N.m] changes at its ``limit`` [N.m/s], and two:
+    one so far away that what follows it goes on at the limit, and the one at which that ends.
+    """
+    duration = min(h, ramp_time(request, u, time_constant, limit))
     reach = 2.0 * limit * (duration + max(time_constant, RAMP_END))
-    return request + reach if u > request else request - reach
-
-
-def ramp_end(request: float, u: float, time_constant: float, limit: float) -> float:
-    """Return the request [N.m] at which a ramp towards ``u`` [N.m] ends."""
-    return u - limit * time_constant if u > request else u + limit * time_constant
+    if u > request:
+        return (duration, request + reach, u - limit * time_constant)
+    return (duration, request - reach, u + limit * time_constant)
 
 
 def followed_request(request: float, u: float, time_constant: float, limit: float, h: float) -> tuple[float, float]:
