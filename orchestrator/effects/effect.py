@@ -157,7 +157,7 @@ class Effect:
         remembers: it matters what the signal was before the record.
         scan: scales -> values in order, so close that the best of them leads a fit to the right one: more than an FMU
             is run for, looked through where it is linear.
-        passive: no value of it that is possible makes energy: what it takes from the motion it keeps or burns.
+        motion: what it does to the motion, in words of a drive engineer; "": nothing is said.
     """
 
     name: str
@@ -186,7 +186,7 @@ class Effect:
     law: int = 0
     remembers: bool = False
     scan: Callable[[Any], tuple[float, ...]] = lambda scales: ()
-    passive: bool = False
+    motion: str = ""
 
     @property
     def label(self) -> str:

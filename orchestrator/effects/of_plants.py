@@ -69,7 +69,8 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         "coulomb_friction", site, "friction", group("coulomb_friction", f"{site}.torque"), "torque",
         lambda s: {"torque": small(s), "presliding": SMALL_LOGARITHM}, lambda s: {"presliding": (distance(s),)},
         ("torque",), signed=False, priors=build_up, unreported=unreported,
-        possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed", passive=True,
+        possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed",
+        motion="a torque of one size against every motion; at a reversal the axis sticks",
     )  # fmt: skip
     stribeck = Effect(
         "stribeck_friction", site, "friction",
@@ -82,14 +83,16 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         possible=lambda v, s: 1.02 * v["coulomb"] < v["breakaway"] < 1.5 * _largest_torque(s, site)
         and v["coulomb"] > LEAST_COULOMB * v["breakaway"]
         and v["stribeck_speed"] > 0.01 * s.rms_speed(site),
-        contains="coulomb_friction", against="speed", passive=True,
+        contains="coulomb_friction", against="speed",
+        motion="a torque against every motion that is largest at a crawl: stick-slip at low speed",
     )  # fmt: skip
     loaded = Effect(
         "load_dependent_friction", site, "friction", group("load_dependent_friction", f"{site}.coefficient"),
         "coefficient", lambda s: {"coefficient": 0.01, "presliding": SMALL_LOGARITHM},
         lambda s: {"presliding": (distance(s),)}, ("coefficient",), signed=False,
         bounds=lambda s: {"coefficient": (0.0, 0.9)}, priors=build_up, unreported=unreported,
-        possible=lambda v, s: v["coefficient"] < 0.5, against="speed", passive=True,
+        possible=lambda v, s: v["coefficient"] < 0.5, against="speed",
+        motion="a torque against every motion that grows with what the gear transmits: lost efficiency",
     )  # fmt: skip
     return coulomb, stribeck, loaded
 
@@ -99,14 +102,15 @@ def _directional_friction(site: str) -> Effect:
         "directional_friction", site, "speed", group("directional_friction", f"{site}.difference"), "difference",
         lambda s: {"difference": 0.01 * s.torque_at(site) / s.rms_speed(site)}, amplitudes=("difference",),
         possible=lambda v, s: abs(v["difference"]) <= v["viscous"], against="speed",
+        motion="the axis is braked more in one direction than in the other",
     )  # fmt: skip
 
 
-def _timing(name: str, parameter: str, top: Callable[[SignalScales], float]) -> Effect:
+def _timing(name: str, parameter: str, top: Callable[[SignalScales], float], motion: str) -> Effect:
     return Effect(
         name, "actuator", "timing", group(name, parameter), parameter, lambda s: {parameter: 0.3 * s.step},
         lambda s: {parameter: times(s, top(s))}, bounds=lambda s: {parameter: (0.0, top(s))},
-        possible=lambda v, s: is_within(v[parameter], s, top(s)), takes_drive=True,
+        possible=lambda v, s: is_within(v[parameter], s, top(s)), takes_drive=True, motion=motion,
     )  # fmt: skip
 
 
@@ -156,7 +160,7 @@ def _is_gap(values: Mapping[str, float], scales: SignalScales) -> bool:
     return not scales.twist_is_measured or values["alpha"] < 0.95 * float(np.abs(scales.twist).max())
 
 
-def _wave(name: str, site: str, small: str) -> Effect:
+def _wave(name: str, site: str, small: str, motion: str) -> Effect:
     """Return the row of a wave over the motor's angle; ``small`` says what its amplitude is measured by."""
 
     def least(scales: SignalScales) -> float:
@@ -168,6 +172,7 @@ def _wave(name: str, site: str, small: str) -> Effect:
         lambda s: {"amplitude": sizes[small](s), "cycles_per_rev": 0.02 / s.turns}, amplitudes=("amplitude",),
         phase="phase", bounds=lambda s: {"cycles_per_rev": (least(s), math.inf)},
         possible=lambda v, s: v["cycles_per_rev"] > 1.03 * least(s), wave_site="motor", angular=True,
+        motion=motion,
     )  # fmt: skip
 
 
@@ -193,49 +198,59 @@ def _end_stop(side: str) -> Effect:
         {"angle": f"effects.end_stop.{side}", "stiffness": "effects.end_stop.stiffness"}, "stiffness",
         lambda s: {"angle": 1e-3 * float(np.ptp(s.angles["load"])), "stiffness": stiffness(s)},
         lambda s: {"angle": angles(s)}, ("stiffness",), signed=False, possible=is_touched, against="position",
-        passive=True,
+        motion=f"the axis runs into a stop at the {side} end and bounces",
     )  # fmt: skip
 
 
+_OFFSET = "the encoders' zeros are not where the model has them: no motion, but a biased twist"
 DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "backlash", "shaft", "gap", {"alpha": "alpha"}, "alpha", lambda s: {"alpha": _small_twist(s)},
         lambda s: {"alpha": _gaps(s)}, possible=_is_gap,
+        motion="between the flanks the motor turns alone; the load follows late, and each contact is an impact",
     ),
     *_dry_friction("motor"),
     *_dry_friction("load"),
     _end_stop("lower"),
     _end_stop("upper"),
-    _timing("input_delay", "delay", longest_time),
-    _timing("drive_filter", "time_constant", longest_lag),
+    _timing("input_delay", "delay", longest_time, "the torque comes late, which takes phase from every control loop"),
+    _timing("drive_filter", "time_constant", longest_lag,
+            "the torque comes late and smoothed, which takes phase from every control loop"),
     Effect(
         "torque_saturation", "actuator", "limit", group("torque_saturation", "limit"), "limit",
         lambda s: {"limit": 0.02 * _largest_request(s)}, lambda s: {"limit": _limits(s)},
         bounds=lambda s: {"limit": (_middle_request(s), BIG)},
         possible=lambda v, s: _middle_request(s) < v["limit"] < 0.999 * _largest_request(s), takes_drive=True,
+        motion="requests beyond the limit are not delivered: the axis lags when it must accelerate most",
     ),
     Effect(
         "rate_limit", "actuator", "timing", group("rate_limit", "rate"), "rate",
         lambda s: {"rate": 0.02 * float(np.max(np.abs(np.diff(s.requests)))) / s.step}, lambda s: {"rate": _rates(s)},
         bounds=lambda s: {"rate": (1e-3 * float(np.max(_changes(s), initial=1.0)), BIG)},
         possible=lambda v, s: _is_reached(v["rate"], s) and not s.torque_raster, takes_drive=True,
+        motion="the torque cannot follow fast requests: steps become ramps, and the axis answers late",
     ),
     Effect(
         "hardening_stiffness", "shaft", "gap", group("hardening_stiffness", "cubic", "sharpness"), "cubic",
         lambda s: {"cubic": 0.05 * s.stiffness / s.typical_twist**2, "sharpness": 0.3},
         lambda s: {"sharpness": (0.0, 0.6, 1.2)}, ("cubic",), signed=False,
         bounds=lambda s: {"sharpness": (0.0, 5.0)}, priors=lambda s: {"sharpness": (0.6, 0.6)},
+        motion="the shaft is soft for small twists and stiff for large ones: its resonance moves with load",
     ),
-    _wave("torque_ripple", "motor", "torque"),
-    _wave("gear_eccentricity", "shaft", "twist"),
+    _wave("torque_ripple", "motor", "torque",
+          "a torque that repeats with the motor's angle: speed ripple at constant request"),
+    _wave("gear_eccentricity", "shaft", "twist",
+          "the load's angle wanders about the motor's once in each cycle of the gear"),
     Effect(
         "load_torque", "load", "constant", group("load_torque", "torque"), "torque",
-        lambda s: {"torque": 0.01 * s.torque_at("load")}, amplitudes=("torque",), passive=True,
+        lambda s: {"torque": 0.01 * s.torque_at("load")}, amplitudes=("torque",),
+        motion="a constant torque pulls the load to one side",
     ),
     Effect(
         "gravity_load", "load", "position", group("gravity_load", "amplitude", "phase"), "amplitude",
         lambda s: {"amplitude": 0.01 * s.torque_at("load")}, amplitudes=("amplitude",), phase="phase", angular=True,
-        against="angle", passive=True,
+        against="angle",
+        motion="a torque that turns with the load's angle: it helps on one side and hinders on the other",
     ),
     Effect(
         "extra_resonance", "load", "resonance",
@@ -246,19 +261,23 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         ("inertia",), signed=False, bounds=lambda s: {"frequency": (0.1, 2.0 * np.pi * s.cutoff),
                                                       "damping_ratio": (0.0, 1.0)},
         priors=lambda s: {"damping_ratio": (0.03, 0.03)}, memory=True,
+        motion="a part of the load swings on its own: a further resonance and its notch",
     ),
     Effect(
         "quadratic_drag", "load", "speed", group("quadratic_drag", "coefficient"), "coefficient",
         lambda s: {"coefficient": 0.01 * s.torque_at("load") / s.rms_speed("load") ** 2},
-        amplitudes=("coefficient",), signed=False, against="speed", passive=True,
+        amplitudes=("coefficient",), signed=False, against="speed",
+        motion="a brake that grows with the square of the speed",
     ),
     Effect(
         "sensor_offset", "motor", "constant", group("sensor_offset", "motor.offset"), "offset",
         lambda s: {"offset": _small_twist(s) * s.ratio}, amplitudes=("offset",), both_encoders=True,
+        motion=_OFFSET,
     ),
     Effect(
         "sensor_offset", "load", "constant", group("sensor_offset", "load.offset"), "offset",
         lambda s: {"offset": _small_twist(s)}, amplitudes=("offset",), both_encoders=True,
+        motion=_OFFSET,
     ),
     _directional_friction("motor"),
     _directional_friction("load"),
@@ -267,11 +286,12 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: {"stiffness": 0.01 * s.torque_at("load") / rms(s.angles["load"] - s.angles["load"].mean()),
                    "angle": 0.05},
         lambda s: {"angle": (float(s.angles["load"].mean()),)}, ("stiffness",), signed=False, against="position",
-        passive=True,
+        motion="the load is pulled back to one position, the more the farther it is from it",
     ),
     Effect(
         "varying_inertia", "load", "position", group("varying_inertia", "amplitude", "phase"), "amplitude",
         lambda s: {"amplitude": 0.02 * s.inertia}, amplitudes=("amplitude",), phase="phase", angular=True,
+        motion="the load is heavier at some angles than at others",
     ),
     Effect(
         "shaft_hysteresis", "shaft", "gap", group("shaft_hysteresis", "torque", "twist"), "torque",
@@ -279,5 +299,6 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: {"twist": tuple(f * s.typical_twist for f in (0.1, 0.4, 1.2))}, ("torque",), signed=False,
         bounds=lambda s: {"twist": (0.02 * s.typical_twist, 5.0 * s.typical_twist)},
         possible=lambda v, s: v["twist"] < 4.75 * s.typical_twist, memory=True,
+        motion="the twist depends on where the torque came from: lost motion without a free gap",
     ),
 )  # fmt: skip

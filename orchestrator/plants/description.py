@@ -157,6 +157,10 @@ class Plant:
             raise ValueError(f"{name!r} is not a parameter of {self.name}")
         return self._index[name]
 
+    def effect(self, label: str) -> Effect:
+        """Return the row of the bank that has this label, ``name@site``."""
+        return next(row for row in self.bank if row.label == label)
+
     def value(self, p: Array, name: str) -> float:
         """Return the value of a parameter."""
         return float(p[self.index(name)])

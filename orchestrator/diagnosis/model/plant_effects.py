@@ -102,7 +102,7 @@ def _wave_scan(row: Effect, scales: SignalScales, channels: Sequence[str], names
 
 def effect_parameters(plant: Plant, effect: CandidateEffect, values: Values) -> Mapping[str, float]:
     """Return an effect's values by name in the plant's table; sine and cosine as amplitude and phase."""
-    row = next(row for row in plant.bank if row.label == effect.label)
+    row = plant.effect(effect.label)
     given = dict(zip(effect.values, values, strict=True))
     if row.phase:
         sine, cosine = given.pop(SINE), given.pop(COSINE)

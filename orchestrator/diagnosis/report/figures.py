@@ -10,9 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from orchestrator.diagnosis.report.corrected import BeforeAfter
-from orchestrator.diagnosis.report.missing_torque import effect_row, missing_torques
-from orchestrator.diagnosis.report.words import effect_words
+from orchestrator.diagnosis.report.missing_torque import missing_torques
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect
+from orchestrator.effects.words import effect_words
 from orchestrator.shared.drawing import BLUE, GREY, ORANGE
 
 DPI = 130
@@ -105,7 +105,7 @@ def _draw_blocks(path: Path, diagnosis: Diagnosis) -> None:
 
 
 def _sizes(effect: GradedEffect, diagnosis: Diagnosis) -> list[str]:
-    row = effect_row(effect, diagnosis)
+    row = diagnosis.model.plant.effect(effect.label)
     return [name for name in effect.block_values if name == row.size or name in row.amplitudes]
 
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestrator.diagnosis.model.interface import ModelPoint
-from orchestrator.diagnosis.report.words import list_effects
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, SignalMisfit, TestMisfit
 from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.effects.words import list_effects
 from orchestrator.records.model_file import ModelParameter
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 

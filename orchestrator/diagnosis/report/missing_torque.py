@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect
-from orchestrator.effects.effect import Effect
 
 Array = NDArray[np.float64]
 BINS = 40
@@ -45,11 +44,6 @@ def missing_torques(diagnosis: Diagnosis) -> Iterator[MissingTorque]:
     return (_missing_torque(diagnosis, effect) for effect in diagnosis.effects if effect.label in labels)
 
 
-def effect_row(effect: GradedEffect, diagnosis: Diagnosis) -> Effect:
-    """Return an effect's row of the plant's bank."""
-    return next(row for row in diagnosis.model.plant.bank if row.label == effect.label)
-
-
 def _missing_torque(diagnosis: Diagnosis, effect: GradedEffect) -> MissingTorque:
     balance, found = diagnosis.workings.balances[0], diagnosis.workings.search
     point = found.problem.record_points(found.final.point)[0]
@@ -81,7 +75,7 @@ def _missing_torque(diagnosis: Diagnosis, effect: GradedEffect) -> MissingTorque
 def _abscissa(diagnosis: Diagnosis, effect: GradedEffect, channel: int) -> tuple[Array, str]:
     balance, row, unit = (
         diagnosis.workings.balances[0],
-        effect_row(effect, diagnosis),
+        diagnosis.model.plant.effect(effect.label),
         diagnosis.test[0].signals[0].unit,
     )
     scales = balance.scales

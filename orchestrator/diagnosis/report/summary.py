@@ -5,40 +5,15 @@ next.
 import math
 from collections.abc import Iterator
 
-from orchestrator.diagnosis.report.words import effect_words, list_effects
 from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, Nuisance, ValueEstimate
 from orchestrator.diagnosis.selection.grading import GRADE_RULES
 from orchestrator.diagnosis.selection.outcome import Grade
+from orchestrator.effects.words import effect_words, list_effects
 from orchestrator.plants.description import Plant
 from orchestrator.shared.play import Play
 
 BODIES = {"motor": "the motor", "load": "the load"}
 SIGNALS = {"theta_m": "the motor", "theta_l": "the load"}
-# What each effect does to the motion.
-MOTION = {
-    "backlash": "between the flanks the motor turns alone; the load follows late, and each contact is an impact",
-    "coulomb_friction": "a torque of one size against every motion; at a reversal the axis sticks",
-    "stribeck_friction": "a torque against every motion that is largest at a crawl: stick-slip at low speed",
-    "directional_friction": "the axis is braked more in one direction than in the other",
-    "quadratic_drag": "a brake that grows with the square of the speed",
-    "input_delay": "the torque comes late, which takes phase from every control loop",
-    "drive_filter": "the torque comes late and smoothed, which takes phase from every control loop",
-    "torque_saturation": "requests beyond the limit are not delivered: the axis lags when it must accelerate most",
-    "rate_limit": "the torque cannot follow fast requests: steps become ramps, and the axis answers late",
-    "load_dependent_friction": "a torque against every motion that grows with what the gear transmits: lost efficiency",
-    "lower_end_stop": "the axis runs into a stop at the lower end and bounces",
-    "upper_end_stop": "the axis runs into a stop at the upper end and bounces",
-    "hardening_stiffness": "the shaft is soft for small twists and stiff for large ones: its resonance moves with load",
-    "shaft_hysteresis": "the twist depends on where the torque came from: lost motion without a free gap",
-    "torque_ripple": "a torque that repeats with the motor's angle: speed ripple at constant request",
-    "gear_eccentricity": "the load's angle wanders about the motor's once in each cycle of the gear",
-    "load_torque": "a constant torque pulls the load to one side",
-    "gravity_load": "a torque that turns with the load's angle: it helps on one side and hinders on the other",
-    "extra_resonance": "a part of the load swings on its own: a further resonance and its notch",
-    "sensor_offset": "the encoders' zeros are not where the model has them: no motion, but a biased twist",
-    "spring_load": "the load is pulled back to one position, the more the farther it is from it",
-    "varying_inertia": "the load is heavier at some angles than at others",
-}
 # Experiments that tell effects apart, by their kind.
 EXPERIMENTS = {
     "friction": "constant speeds in both directions, from a crawl to the highest",
@@ -141,8 +116,8 @@ def _effect(effect: GradedEffect, diagnosis: Diagnosis) -> Iterator[str]:
     yield f"    {sureness(effect)}"
     if math.isfinite(effect.evidence.share):
         yield f"    It explains {percent(effect.evidence.share)} of the missing torque{words_on_test_data(effect)}."
-    if effect.name in MOTION:
-        yield f"    In the motion: {MOTION[effect.name]}"
+    if motion := diagnosis.model.plant.effect(effect.label).motion:
+        yield f"    In the motion: {motion}"
 
 
 def sizes_line(effect: GradedEffect) -> str:

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
+from orchestrator.effects.words import place_words
 from orchestrator.reporting.model import Badge, Cell, Facts, Fold, Plot, Report, Section, Series, Span, Text
 from orchestrator.reporting.pages.diagnosis_answer import (
     answer_table,
     headline,
     in_words,
     next_steps,
-    place_words,
     worth_on_test_data,
 )
 from orchestrator.reporting.pages.generic import sections_of

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.effects.words import place_words
 from orchestrator.reporting.model import (
     Badge,
     Bar,
@@ -31,7 +32,6 @@ from orchestrator.reporting.pages.diagnosis_answer import (
     headline,
     in_words,
     next_steps,
-    place_words,
     worth_on_test_data,
 )
 from orchestrator.reporting.pages.generic import sections_of

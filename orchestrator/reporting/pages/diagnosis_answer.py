@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
+from orchestrator.effects.words import place_words
 from orchestrator.reporting.model import Plot, ReportTable, Section, Series, Span, TableColumn, Text
 from orchestrator.reporting.source import Array, words
 from orchestrator.shared.results.diagnose import EffectFound, NuisanceFound, SignalMisfitFound, TestFound, ValueFound
 
-SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the drive"}
 SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
 SIZES = {"alpha": "half-gap"}
 NEXT = "Next: "
@@ -71,12 +71,6 @@ def in_words(summary: Sequence[str]) -> list[Section]:
     """Return the rest of a summary."""
     lines = tuple(line.strip() for line in summary[1:] if not line.strip().startswith(NEXT))
     return [Text("In words", lines)] if lines else []
-
-
-def place_words(name: str, site: str) -> str:
-    """Return an effect at its site in words."""
-    name = words(name).replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
-    return f"{name} {SITES.get(site, f'at {site}')}"
 
 
 def quantity(p: ValueFound) -> str:

@@ -15,6 +15,12 @@ def effect_words(label: str) -> str:
     return words if site in parts else f"{words} {SITES.get(site, site)}".strip()
 
 
+def place_words(name: str, site: str) -> str:
+    """Return an effect and where it is in words, whatever the place."""
+    words = " ".join(PROPER.get(word, word) for word in name.split("_"))
+    return f"{words} {SITES.get(site, f'at {site}')}"
+
+
 def list_effects(labels: Sequence[str]) -> str:
     """Return effects in words, as a list in a sentence."""
     words = [effect_words(label) for label in labels]
