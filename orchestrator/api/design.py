@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
 from orchestrator.api.estimable import require_linear
-from orchestrator.api.estimate import UNSEEN
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, table
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.estimation import design as designing
+from orchestrator.estimation.apply import UNSEEN
 from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, MachineLimits
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import LONGEST_STEP, natural_frequency

@@ -22,10 +22,9 @@ from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.report.summary import play_of
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
-from orchestrator.estimation import cramer_rao
+from orchestrator.estimation.apply import WITHOUT_TORQUE, apply_method, default_method, error_bound
 from orchestrator.estimation.effort import Stop, StoppedError, never
-from orchestrator.estimation.methods import maximum_likelihood, two_encoders
-from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
+from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError
 from orchestrator.estimation.repeats import in_words, repeats_of
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.estimation.tables import write_tables
@@ -38,11 +37,7 @@ from orchestrator.shared.results.estimate import EstimateFound, MethodFound, Rep
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Level, Trust
 
-DEFAULT_METHOD = FITTED
-WITHOUT_TORQUE = "two_encoders"  # the method of records that have none
 DIAGNOSIS = "diagnosis"  # the row of a corrected model's half-gap, and the folder of its diagnosis
-SKIPS_MISSING = ("maximum_likelihood", "ekf", WITHOUT_TORQUE)
-UNSEEN = 1.0  # rad, bound from which on a record says nothing
 
 
 @dataclass(frozen=True, repr=False)
@@ -299,14 +294,15 @@ def estimate(
     if any((other.theta_l is None) != (measured.theta_l is None) for other in more):
         raise ScenarioError("`record` must be records with the same encoders, or `motor_only`", "record", "motor_only")
     method = method or default_method([measured, *more])
+    options = {"time_limit": time_limit, "settings": chosen, "stop": stop}
     found: list[MethodResult] = []
     for name in METHODS if method == "all" else (method,):
         begun = time.perf_counter()
         try:
             with numeric_errors(f"{measured.source}: `{name}` finds no solution for this record"):
                 progress(name, name.replace("_", " "), 0.0)
-                fitted = _estimate_by(name, measured, more, model, time_limit, chosen, partial(progress, name), stop)
-                bound = _error_bound(measured, model, [*(m.estimate for m in found if m.estimate is not None), fitted])
+                fitted = apply_method(name, [measured, *more], model, options | {"report": partial(progress, name)})
+                bound = error_bound(measured, model, [*(m.estimate for m in found if m.estimate is not None), fitted])
         except NotApplicableError as error:
             found.append(MethodResult(name, None, math.inf, time.perf_counter() - begun, str(error)))
         else:
@@ -321,11 +317,6 @@ def estimate(
     first = () if missing is None else _of_diagnosis(missing)
     repeats = repeats_of([measured, *more])
     return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen, why)
-
-
-def default_method(records: Sequence[Record]) -> str:
-    """Return the method for records when none is asked for."""
-    return DEFAULT_METHOD if all(record.has_torque for record in records) else WITHOUT_TORQUE
 
 
 def _compare_diagnosis(estimates: Sequence[Estimate]) -> str:
@@ -373,40 +364,3 @@ def _of_diagnosis(diagnosis: DiagnosisResult) -> tuple[MethodResult, ...]:
         return ()
     estimate = Estimate(DIAGNOSIS, gap.value, gap.standard_error, gap.interval)
     return (MethodResult(DIAGNOSIS, estimate, math.inf, diagnosis.seconds, trust=diagnosis.trust),)
-
-
-def _estimate_by(
-    name: str,
-    record: Record,
-    more: Sequence[Record],
-    model: Model,
-    time_limit: float,
-    settings: EstimationSettings,
-    report: Callable[[str, float], None],
-    stop: Stop,
-) -> Estimate:
-    """Return the estimate of one method; all but the likelihood take one whole record."""
-    if name != WITHOUT_TORQUE and not all(one.has_torque for one in (record, *more)):
-        raise NotApplicableError("needs the torque `u`, which the record does not have")
-    if name == DEFAULT_METHOD:
-        return maximum_likelihood.estimate(
-            record, model, more=more, time_limit=time_limit, report=report, settings=settings, stop=stop
-        )
-    if more:
-        raise NotApplicableError("takes one record; several are fitted together by maximum_likelihood")
-    if record.n_missing and name not in SKIPS_MISSING:
-        raise NotApplicableError(f"takes records without missing samples, but {record.n_missing} rows have some")
-    if name == WITHOUT_TORQUE:
-        return two_encoders.estimate(record, model, settings.flanks)
-    return estimator(name)(record, model)
-
-
-def _error_bound(record: Record, model: Model, estimates: Sequence[Estimate]) -> float:
-    """Return the record's Cramer-Rao bound: at the fit of the likelihood, or else at the newest estimate."""
-    for estimate in estimates:
-        if "cramer_rao" in estimate.diagnostics:
-            return float(estimate.diagnostics["cramer_rao"])
-    if not (record.has_torque and estimates[-1].visible):
-        return math.inf
-    bound = cramer_rao.error_bound_at(record, model, estimates[-1].alpha)
-    return bound if bound < UNSEEN else math.inf

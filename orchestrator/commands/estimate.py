@@ -16,14 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from orchestrator.api.arguments import choose_settings
 from orchestrator.api.design import DEFAULT_SIZE, RANGES, DesignResult, check_design, design
 from orchestrator.api.estimable import plausible_record, require_linear
-from orchestrator.api.estimate import (
-    DEFAULT_METHOD,
-    DIAGNOSIS,
-    WITHOUT_TORQUE,
-    EstimateResult,
-    default_method,
-    estimate,
-)
+from orchestrator.api.estimate import DIAGNOSIS, EstimateResult, estimate
 from orchestrator.api.records import read_model
 from orchestrator.api.shown import Block
 from orchestrator.commands._budget import Budget
@@ -32,9 +25,11 @@ from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.errors import ScenarioError
+from orchestrator.estimation.apply import WITHOUT_TORQUE, default_method
 from orchestrator.estimation.cost import fit_seconds
 from orchestrator.estimation.protocol import METHODS
 from orchestrator.estimation.settings import EstimationSettings
+from orchestrator.estimation.trust import FITTED
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.reporting import write_report
@@ -90,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--method",
         choices=[*METHODS, "all"],
-        help=f"{listed} (default: {DEFAULT_METHOD}; {WITHOUT_TORQUE} without a torque)",
+        help=f"{listed} (default: {FITTED}; {WITHOUT_TORQUE} without a torque)",
     )
     parser.add_argument("--motor-only", action="store_true", help="leave the load encoder out")
     parser.add_argument("--time-limit", type=float, metavar="S", help="give up after this time (default: never)")
@@ -170,7 +165,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _tell_cost(records: list[Record], model: Model, args: argparse.Namespace, settings: EstimationSettings) -> float:
     """Say what a fit will cost before it starts, and return its processor time [s]; 0.0 where nothing is fitted."""
-    fitted = (args.method or default_method(records)) in (DEFAULT_METHOD, "all")
+    fitted = (args.method or default_method(records)) in (FITTED, "all")
     if not fitted or not all(record.has_torque for record in records):
         return 0.0
     rows = sum(record.size for record in records)
@@ -225,7 +220,7 @@ def _show_stages(records: list[Record], seconds: float, budget: Budget) -> Itera
     with Stages() as stages:
         stages.begin("preparing", seconds)
         budget.begin(seconds or math.inf)
-        known = [DEFAULT_METHOD]
+        known = [FITTED]
 
         def show(work: str, stage: str, share: float) -> None:
             if work not in known:

@@ -59,13 +59,13 @@ class Estimate:
 
 
 class Estimator(Protocol):
-    """An estimator: a function of a record and a model.
+    """An estimator: a function of a record, a model, and the options that :mod:`orchestrator.estimation.apply` names.
 
     Raises:
         NotApplicableError: the record lacks what the method needs.
     """
 
-    def __call__(self, record: Record, model: Model) -> Estimate:
+    def __call__(self, record: Record, model: Model, **options: Any) -> Estimate:
         """Return the estimate."""
 
 

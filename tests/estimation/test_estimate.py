@@ -323,7 +323,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_is_computed(
 ) -> None:
     out = tmp_path / "out"
     out.write_text("a file")
-    monkeypatch.setattr("orchestrator.api.estimate.estimator", lambda name: pytest.fail("computed"))
+    monkeypatch.setattr("orchestrator.estimation.apply.estimator", lambda name: pytest.fail("computed"))
     assert main(["estimate", str(csv_file), "--out", str(out)]) == 2
     assert "`--out` must be a writable directory" in capsys.readouterr().err
     assert out.read_text() == "a file"

@@ -13,7 +13,7 @@ import numpy as np
 from orchestrator.estimation.flanks.fit import ALPHA, FlankProblem, best_fit, jackknife
 from orchestrator.estimation.flanks.points import points_of
 from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
-from orchestrator.estimation.settings import DEFAULT_SETTINGS, FlankSettings
+from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
@@ -22,16 +22,17 @@ RETURNED = 2  # traversals: a flank that is left and met again is no slip
 WOUND_UP = "without a torque, what the shaft winds up when its torque changes sign cannot be told from a gap"
 
 
-def estimate(record: Record, model: Model, settings: FlankSettings = DEFAULT_SETTINGS.flanks) -> Estimate:
+def estimate(record: Record, model: Model, settings: EstimationSettings = DEFAULT_SETTINGS) -> Estimate:
     """Return half the distance between the two flanks in the load's angle against the motor's."""
+    limits = settings.flanks
     if record.theta_l is None:
         raise NotApplicableError("the load's angle `theta_l` must be in the record")
-    points = points_of(record, settings.latest, settings.most_points)
+    points = points_of(record, limits.latest, limits.most_points)
     if points.time.size < LEAST_POINTS:
         raise NotApplicableError(
             f"the load's angle must change in at least {LEAST_POINTS} rows, but does in {points.time.size}"
         )
-    problem = FlankProblem(points, settings)
+    problem = FlankProblem(points, limits)
     fit = best_fit(problem)
     noise = math.sqrt(fit.variance)
     flanks = np.argmax(fit.share, axis=1) - 1
@@ -40,8 +41,8 @@ def estimate(record: Record, model: Model, settings: FlankSettings = DEFAULT_SET
     separate = fit.alpha / noise
     touching = float(1.0 - fit.share[:, 1].mean())
     count = max(points.count, points.motor.count / abs(fit.ratio))
-    apart = separate >= settings.separate and fit.alpha >= settings.least_counts * count
-    two = apart and touching >= settings.least_touching
+    apart = separate >= limits.separate and fit.alpha >= limits.least_counts * count
+    two = apart and touching >= limits.least_touching
     diagnostics: dict[str, Any] = {
         "traversals": traversals,
         "level": LEVEL,
@@ -56,7 +57,7 @@ def estimate(record: Record, model: Model, settings: FlankSettings = DEFAULT_SET
     if not two or traversals < RETURNED:
         return _unseen(diagnostics, curves, traversals if two else 0)
     deviations, quantile = jackknife(problem, fit)
-    shape = settings.shape * noise
+    shape = limits.shape * noise
     error = math.hypot(max(deviations.alpha, math.sqrt(fit.covariance[ALPHA, ALPHA])), shape)
     reach = quantile * error
     diagnostics |= {
