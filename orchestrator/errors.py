@@ -90,13 +90,24 @@ class ChildError(SimulationError):
 
     Attributes:
         reason: ``exit``, ``signal``, ``time``, ``memory``, ``disk``, ``threads`` or ``protocol``.
-        code: exit code or number of the signal.
+        code: exit code, number of the signal, or the time that there was [s].
         said: the last line that it printed, untrusted.
     """
 
-    def __init__(self, text: str, reason: str = "exit", code: int = 0, said: str = "") -> None:
+    def __init__(self, text: str, reason: str = "exit", code: float = 0, said: str = "") -> None:
         super().__init__(text)
         self.reason, self.code, self.said = reason, code, said
+
+    def explain(self, what: str) -> str:
+        """Return what was to be and why it is not, where users say by `time_limit` how long ``what`` may take."""
+        if self.reason == "time":
+            return f"{what} must take at most {self.code:g} s (`time_limit`), but takes longer"
+        return f"{what} must come to its end, but {self}{word_printed(self.said)}"
+
+
+def word_printed(said: str) -> str:
+    """Return the last line that a child process printed, as an addition to a text; empty for none."""
+    return f" (it printed: {said})" if said else ""
 
 
 class ConvergenceError(SimulationError):

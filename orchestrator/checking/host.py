@@ -6,9 +6,9 @@ own to choose anyway.
 
 import ctypes
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
-from typing import Any
+from typing import Any, NamedTuple
 
 from orchestrator.checking.probing.varargs import LOGGER, fill_in
 
@@ -27,6 +27,38 @@ _UPDATE = ctypes.CFUNCTYPE(
 )  # fmt: skip
 _CLOCK_UPDATE = ctypes.CFUNCTYPE(None, c_void_p)
 _LOCK = ctypes.CFUNCTYPE(None)
+
+
+class Made(NamedTuple):
+    """An instance by number (None: the FMU returned null), and what it logged."""
+
+    number: int | None
+    messages: list[str]
+
+
+class Returned(NamedTuple):
+    """What a function returned, what its output arguments hold, what was logged, how many of that as errors, and the
+    exception of Python that it left behind.
+    """
+
+    status: int
+    values: list[Any]
+    messages: list[str]
+    errors: int
+    left: str
+
+
+class Update(NamedTuple):
+    """An intermediate update: the function under way, its time [s] and flags, and statuses of reading and setting."""
+
+    function: str
+    time: float
+    wants: bool
+    gives: bool
+    done: bool
+    early: bool
+    read: int | None
+    written: int | None
 
 
 class _Callbacks(ctypes.Structure):
@@ -75,7 +107,7 @@ class Host:
         self._updating = False
         self._function = ""
         self._left = ""
-        self._updates: list[list[Any]] = []
+        self._updates: list[Update] = []
         self._plan: list[Any] = [0, [], [], [], -1]
         self._locks = 0
         # Kept here, for the library keeps pointers to them.
@@ -100,9 +132,9 @@ class Host:
         if text:
             self._messages = [*self._messages[1 - _MESSAGES :], text[:200]]
 
-    def notes(self) -> list[Any]:
+    def notes(self) -> tuple[int, str]:
         """How many messages with the status OK there were since the last call, and the first of them."""
-        found, self._noted = [self._noted, self._note], 0
+        found, self._noted = (self._noted, self._note), 0
         return found
 
     def _count(self, change: int) -> None:
@@ -121,19 +153,16 @@ class Host:
         getattr(self._handle, freer).restype = None
         return ""
 
-    def text(self, function: str) -> str | None:
-        """Call a function without arguments that returns a text; None: a null pointer."""
+    def text(self, function: str) -> str:
+        """Call a function without arguments that returns a text; "null": a null pointer."""
         value = self._foreign(function)
-        return None if value is None else value[:_LONGEST_TEXT].decode("utf-8", "replace")
+        return "null" if value is None else value[:_LONGEST_TEXT].decode("utf-8", "replace")
 
-    def instantiate_2(self, name: str, kind: int, guid: str, resources: str, logging: bool = True) -> list[Any]:
-        """Make an instance of FMI 2.0; return its number (``None``: the FMU returned null) and what it logged.
+    def instantiate_2(self, name: str, kind: int, guid: str, resources: str, logging: bool = True) -> Made:
+        """Make an instance of FMI 2.0.
 
         Args:
             kind: 0 for model exchange, 1 for co-simulation.
-
-        Returns:
-            Number (or None) and messages.
         """
         memory = ctypes.CDLL("msvcrt" if sys.platform == "win32" else None)
         allocate, free = ctypes.cast(memory.calloc, c_void_p), ctypes.cast(memory.free, c_void_p)
@@ -146,12 +175,8 @@ class Host:
     def instantiate_3(
         self, function: str, name: str, token: str, resources: str | None, flags: list[bool], required: list[int],
         logging: bool = True,
-    ) -> list[Any]:  # fmt: skip
-        """Make an instance of FMI 3.0; return its number (``None``: the FMU returned null) and what it logged.
-
-        Returns:
-            Number (or None) and messages.
-        """
+    ) -> Made:  # fmt: skip
+        """Make an instance of FMI 3.0."""
         self._messages, self._function = [], function
         head: tuple[Any, ...] = (
             name.encode(),
@@ -171,12 +196,12 @@ class Host:
         component = self._foreign(function, *head, c_void_p(), self._log3, *rest)
         return self._make(component, rest)
 
-    def _make(self, component: int | None, number: Any) -> list[Any]:
+    def _make(self, component: int | None, callbacks: Any) -> Made:
         if not component:
-            return [None, self._messages]
+            return Made(None, self._messages)
         self._number += 1
-        self._instances[self._number] = (c_void_p(component), number)
-        return [self._number, self._messages]
+        self._instances[self._number] = (c_void_p(component), callbacks)
+        return Made(self._number, self._messages)
 
     def free(self, instance: int, function: str) -> None:
         """Free an instance."""
@@ -215,51 +240,46 @@ class Host:
         """
         self._plan = [instance, reads, writes, values, early]
 
-    def updates(self) -> list[Any]:
-        """What the intermediate updates since the last call were."""
+    def updates(self) -> tuple[list[Update], int]:
+        """The intermediate updates since the last call, and locks of preemption that are open."""
         found, self._updates = self._updates, []
-        return [found, self._locks]
+        return found, self._locks
 
     def _intermediate(
         self, _environment: int, time: float, wants: bool, gives: bool, done: bool, early: bool, asked: Any, when: Any
     ) -> None:
         instance, reads, writes, values, at = self._plan
-        row = [self._function, time, wants, gives, done, early, None, None]
+        read = written = None
         if instance in self._instances and not done and not self._updating:
             self._updating = True  # an update that comes of these calls does no calls of its own
             component = self._instances[instance][0]
             if gives and reads:
                 buffer = (c_double * len(reads))()
-                row[6] = self._access("fmi3GetFloat64", component, reads, buffer)
+                read = self._access("fmi3GetFloat64", component, reads, buffer)
             if wants and writes:
-                row[7] = self._access("fmi3SetFloat64", component, writes, (c_double * len(values))(*values))
+                written = self._access("fmi3SetFloat64", component, writes, (c_double * len(values))(*values))
             self._updating = False
         asked[0] = early and at == len(self._updates)
         if asked[0]:
             when[0] = time
         if len(self._updates) < _MOST_UPDATES:
-            self._updates.append(row)
+            self._updates.append(Update(self._function, time, wants, gives, done, early, read, written))
 
     def _access(self, function: str, component: c_void_p, references: list[int], buffer: Any) -> int:
         numbers = (c_uint * len(references))(*references)
         size = c_size_t(len(buffer))
         return self._status(function, component, numbers, c_size_t(len(references)), buffer, size)
 
-    def call(self, instance: int, function: str, arguments: list[Any]) -> list[Any]:
-        """Call a function.
-
-        Returns:
-            Status, what the output arguments hold, what was logged, how many of that as errors, and the exception of
-            Python that was left behind.
-        """
+    def call(self, instance: int, function: str, arguments: Sequence[Sequence[Any]]) -> Returned:
+        """Call a function."""
         self._messages, self._errors, self._function, self._left = [], 0, function, ""
         made = [self._argument(*a) for a in arguments]
         values = [value for group, _ in made for value in group]
         status = self._status(function, self._instances[instance][0], *values)
         found = [read() for _, read in made if read is not None]
-        return [status, found, self._messages, self._errors, self._left]
+        return Returned(status, found, self._messages, self._errors, self._left)
 
-    def calls(self, instance: int, requests: list[list[Any]]) -> list[Any]:
+    def calls(self, instance: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]) -> list[Returned]:
         """Call several functions, up to the first that returns neither OK nor Warning.
 
         Returns:
@@ -268,7 +288,7 @@ class Host:
         done = []
         for function, arguments in requests:
             done.append(self.call(instance, function, arguments))
-            if done[-1][0] not in (0, 1):
+            if done[-1].status not in (0, 1):
                 break
         return done
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from orchestrator.shared.isolation.jail import Jail
+from orchestrator.shared.isolation.jail import Answer, Jail
 
 
 class Process:
@@ -27,17 +27,9 @@ class Process:
     def __exit__(self, *_: object) -> None:
         self.jail.close()
 
-    def call(self, request: Any) -> Any:
+    def call(self, request: Any, answer: type[Answer]) -> Answer:
         """Return what ``checking.host.Host`` returns."""
-        return self.jail.call(request, self.most)
-
-    def resident(self) -> int:
-        """Resident memory of the child in bytes; 0 where the system does not tell."""
-        return self.jail.resident()
-
-    def processor_time(self) -> float:
-        """How long the child has had a processor [s]; 0 where the system does not tell."""
-        return self.jail.processor_time()
+        return self.jail.call(request, answer, self.most)
 
     def renew(self) -> None:
         """End the child and start another one."""

@@ -7,7 +7,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from orchestrator.plain_text import plain_text
+
 Value = float | int | str | None
+MESSAGE_LENGTH = 300
 
 
 class Status(StrEnum):
@@ -69,7 +72,7 @@ class Outcome:
 
     Attributes:
         index: the case's index.
-        message: one line, empty when it went well.
+        message: one line of plain text, empty when it went well.
         values: one per result column when ``status`` is ``DONE``, else empty.
     """
 
@@ -77,6 +80,9 @@ class Outcome:
     status: Status
     message: str = ""
     values: tuple[Value, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "message", plain_text(self.message[:MESSAGE_LENGTH]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,24 +15,18 @@ from dataclasses import dataclass
 
 from orchestrator.engine.cases import Case, Outcome, Status
 from orchestrator.engine.work import Work
-from orchestrator.engine.worker import BATCH_TIME, Assignment, count_finished, read_answer
-from orchestrator.errors import ChildError, SimulationError
+from orchestrator.engine.worker import BATCH_TIME, Answer, Assignment, count_finished
+from orchestrator.errors import ChildError, SimulationError, word_printed
 from orchestrator.shared.isolation.jail import Jail
-from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
+from orchestrator.shared.isolation.limits import BOUNDLESS, MEBIBYTE, Limits
 from orchestrator.shared.operating_system import KILLED
 
 ATTEMPTS = 2
 KILLS = 5  # SIGKILL comes from others, on a busy or full machine more than once
 PREPARATION_LIMIT = 600.0
 LARGEST_ANSWER = 64 * MEBIBYTE
-_BOUNDLESS = 1 << 50
 _ENTRY = "orchestrator.engine.worker:open_worker"
-_BEYOND = {
-    "memory": "used too much memory",
-    "disk": "wrote too many files",
-    "threads": "started too many threads",
-    "protocol": "the worker process did not keep to the protocol",
-}
+_DEATHS = ("exit", "signal")  # of which a case may be innocent
 
 
 class LaneClosedError(Exception):
@@ -104,24 +98,25 @@ class Lane:
     def _exchange(self, jail: Jail, cases: Sequence[Case]) -> Sequence[Outcome] | Death:
         """Return outcomes; when the process died, of what."""
         limit = self._assignment.time_limit + (BATCH_TIME if len(cases) > 1 else 0.0)
-        reason, killed = "protocol", False
         try:
-            message = jail.call(cases, limit, LARGEST_ANSWER)
-            answer = read_answer(message, cases, self._assignment.columns)
-            if answer is not None:
-                if answer.spent:
-                    self._discard()
-                return answer.outcomes
+            answer = jail.call(cases, Answer, limit, LARGEST_ANSWER)
+            if not answer.is_of(cases, self._assignment.columns):
+                raise ChildError("the process answered with other cases", "protocol")
+            if answer.spent:
+                self._discard()
+            return answer.outcomes
         except ChildError as error:
-            reason, killed = error.reason, error.reason == "signal" and error.code == KILLED
-        except SimulationError:  # it had no memory left to answer with
-            reason = "exit"
+            end = error
+        except SimulationError as error:  # it had no memory left to answer with
+            end = ChildError(str(error))
         place = min(count_finished(jail.scratch / "tmp"), len(cases) - 1)
         index = cases[place].index
         self._discard()
-        if reason == "time":
+        if end.reason == "time":
             return [Outcome(index, Status.TIME_LIMIT, f"took more than {self._assignment.time_limit:g} s")]
-        return [Outcome(index, Status.CRASH, _BEYOND[reason])] if reason in _BEYOND else Death(place, killed)
+        if end.reason in _DEATHS:
+            return Death(place, end.reason == "signal" and end.code == KILLED)
+        return [Outcome(index, Status.CRASH, str(end))]
 
     def _ready(self) -> Jail:
         said = ""
@@ -131,9 +126,7 @@ class Lane:
             try:
                 self._start()
             except ChildError as error:
-                said = f": {error.said}" if error.said else ""
-                if error.reason == "time":
-                    said = ": preparing took too long"
+                said = f": {error}{word_printed(error.said)}"
                 self._discard()
             except BaseException:
                 self._discard()
@@ -175,8 +168,6 @@ class Lane:
 def _limits(assignment: Assignment) -> Limits:
     """Limits of the process; work of ours is bounded by time, and by memory from within, as cases are."""
     if not assignment.walls:
-        return Limits(
-            assignment.time_limit, _BOUNDLESS, _BOUNDLESS, math.inf, _BOUNDLESS, _BOUNDLESS, _BOUNDLESS, 1 << 16
-        )
-    memory = 1024 * MEBIBYTE + 2 * assignment.memory if assignment.memory else _BOUNDLESS
+        return Limits.of_time(assignment.time_limit)
+    memory = 1024 * MEBIBYTE + 2 * assignment.memory if assignment.memory else BOUNDLESS
     return Limits(assignment.time_limit, memory, 64 * MEBIBYTE, math.inf, 256 * MEBIBYTE)

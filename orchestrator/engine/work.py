@@ -11,8 +11,6 @@ from typing import Any
 from orchestrator.engine.cases import Case, Outcome, ResultColumn, Status, Value
 from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 
-MESSAGE_LENGTH = 300
-
 
 @dataclass(frozen=True)
 class Work:
@@ -66,8 +64,7 @@ def evaluate(work: Work, prepared: Any, case: Case) -> tuple[Outcome, bool]:
         return Outcome(case.index, Status.ERROR, one_line(error)), sound
     bad = [c.name for c, v in zip(work.columns, values, strict=True) if isinstance(v, float) and not math.isfinite(v)]
     if bad:
-        message = f"not finite: {', '.join(bad)}"
-        return Outcome(case.index, Status.NON_FINITE, message[:MESSAGE_LENGTH]), True
+        return Outcome(case.index, Status.NON_FINITE, f"not finite: {', '.join(bad)}"), True
     return Outcome(case.index, Status.DONE, "", values), True
 
 
@@ -87,4 +84,4 @@ def one_line(error: BaseException) -> str:
     text = " ".join(str(error).split())
     name = type(error).__name__
     line = f"{name}: {text}" if text else name
-    return re.sub(r"0x[0-9a-fA-F]+", "0x…", line)[:MESSAGE_LENGTH]
+    return re.sub(r"0x[0-9a-fA-F]+", "0x…", line)

@@ -1,8 +1,7 @@
 """Inside a worker process: prepares once, then runs batches of cases, one case after the other.
 
-The process is a jail's child, so its end of the pipe and its limits are the jail's. An answer is plain data:
-``[[[index, status, message, values], ...], spent]``, for the first cases of the batch. How many are finished stands in
-a file, so that the case of which a process dies has a name.
+The process is a jail's child, so its end of the pipe and its limits are the jail's. How many cases are finished stands
+in a file, so that the case of which a process dies has a name.
 """
 
 import faulthandler
@@ -13,12 +12,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from orchestrator.engine.cases import Case, Outcome, Status, Value
-from orchestrator.engine.work import MESSAGE_LENGTH, Work, evaluate, one_line
+from orchestrator.engine.cases import Case, Outcome, Status
+from orchestrator.engine.work import Work, evaluate, one_line
 from orchestrator.errors import OrchestratorError, SimulationError
-from orchestrator.plain_text import plain_text
 from orchestrator.shared.isolation.limits import PATIENCE
 from orchestrator.shared.operating_system import memory_usage, set_limits, write_at
 
@@ -28,7 +25,6 @@ BATCH_TIME = 0.5
 
 _FINISHED = "finished"
 _COUNT = struct.Struct("<Q")
-_WORDS = frozenset(Status)
 
 
 @dataclass(frozen=True)
@@ -59,13 +55,16 @@ class Answer:
     outcomes: tuple[Outcome, ...]
     spent: bool
 
+    def is_of(self, cases: Sequence[Case], columns: int) -> bool:
+        """Whether these are outcomes of the first cases of a batch, at least of one, with values for all columns."""
+        return 0 < len(self.outcomes) <= len(cases) and all(
+            found.index == case.index and len(found.values) == (columns if found.status is Status.DONE else 0)
+            for found, case in zip(self.outcomes, cases, strict=False)
+        )
 
-def open_worker(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
-    """Prepare the work and return what runs a batch of cases.
 
-    Returns:
-        A function from cases to the outcomes of as many of them as ``BATCH_TIME`` allows, as plain data.
-    """
+def open_worker(assignment: Assignment) -> Callable[[Sequence[Case]], Answer]:
+    """Prepare the work and return what runs a batch of cases, as many of them as ``BATCH_TIME`` allows."""
     work: Work = pickle.loads(assignment.work)
     try:
         prepared = work.prepare(work.payload, assignment.files)
@@ -82,20 +81,20 @@ def open_worker(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]
 
     place = os.open(Path(os.environ["TMPDIR"]) / _FINISHED, os.O_WRONLY | os.O_CREAT, 0o600)
 
-    def run(cases: Sequence[Case]) -> list[Any]:
-        found: list[list[Any]] = []
+    def run(cases: Sequence[Case]) -> Answer:
+        found: list[Outcome] = []
         spent, begin = False, time.monotonic()
         limit = PATIENCE * (assignment.time_limit + BATCH_TIME) + ORPHAN_MARGIN
         faulthandler.dump_traceback_later(limit, exit=True, file=silence)
         for case in cases:
             write_at(place, _COUNT.pack(len(found)), 0)
             outcome, sound = evaluate(work, prepared, case)
-            found.append([outcome.index, outcome.status.value, outcome.message, list(outcome.values)])
+            found.append(outcome)
             spent = not sound or (bool(assignment.memory) and memory_usage() - base > assignment.memory // 2)
             if spent or time.monotonic() - begin > BATCH_TIME:
                 break
         faulthandler.cancel_dump_traceback_later()
-        return [found, spent]
+        return Answer(tuple(found), spent)
 
     return run
 
@@ -110,29 +109,3 @@ def count_finished(temporary: Path) -> int:
         return int(_COUNT.unpack((temporary / _FINISHED).read_bytes())[0])
     except (OSError, struct.error):
         return 0
-
-
-def read_answer(message: Any, cases: Sequence[Case], columns: int) -> Answer | None:
-    """Return what a worker answered to a batch; ``None`` when it is no such answer.
-
-    Returns:
-        Outcomes of at least one case, and whether the process must be replaced.
-    """
-    match message:
-        case [list() as found, bool() as spent] if 0 < len(found) <= len(cases):
-            outcomes = [_outcome(entry, case, columns) for entry, case in zip(found, cases, strict=False)]
-            kept = tuple(outcome for outcome in outcomes if outcome is not None)
-            return Answer(kept, spent) if len(kept) == len(found) else None
-    return None
-
-
-def _outcome(entry: Any, case: Case, columns: int) -> Outcome | None:
-    match entry:
-        case [int() as index, str() as word, str() as text, list() as values] if (
-            index == case.index and word in _WORDS and len(text) <= MESSAGE_LENGTH
-        ):
-            status = Status(word)
-            wanted = columns if status is Status.DONE else 0
-            if len(values) == wanted and all(v is None or isinstance(v, Value) for v in values):
-                return Outcome(index, status, plain_text(text), tuple(values))
-    return None

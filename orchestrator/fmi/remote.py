@@ -3,15 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.errors import ChildError, SlaveError
-from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import FmuDescription
-from orchestrator.fmi.model_exchange import ExchangeSlave
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.protocol import (
     EventSlave,
@@ -25,14 +24,23 @@ from orchestrator.master.protocol import (
     Transfer,
     Value,
 )
-from orchestrator.master.result import RunRemark, read_remarks
-from orchestrator.shared.isolation.jail import Jail
+from orchestrator.master.result import MOST_REMARKS, RunRemark
+from orchestrator.shared.isolation.jail import Answer, Jail
 from orchestrator.shared.isolation.limits import Limits
 
-DONE, DISCARDED, ENDED = range(3)
+Array = NDArray[np.float64]
+NOTHING = type(None)
 
 
-def open_instance(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, list[Any]]], Any]:
+class Undone(NamedTuple):
+    """Why a step was not done; see ``StepDiscardedError``, and ``RunEndedError`` where ``how`` is not empty."""
+
+    text: str
+    time: float
+    how: str = ""
+
+
+def open_instance(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, tuple[Any, ...]]], Any]:
     """Make the instance in the child, and return what calls it.
 
     Returns:
@@ -64,39 +72,14 @@ class _Host:
         transfer()
 
     def receive(self, number: int, values: Signals) -> Signals:
-        transfer, buffer = self._transfers[number]
-        buffer[:] = values  # variables of clocks keep their values between ticks
-        transfer()
-        return buffer
+        self.send(number, values)  # variables of clocks keep their values between ticks
+        return self._transfers[number][1]
 
-    def do_step(self, time: float, step: float) -> list[Any]:
-        return self._outcome_of(lambda: self._slave.do_step(time, step))
-
-    def step(self, time: float, step: float) -> list[Any]:
-        assert isinstance(self._slave, (EventFmuSlave, ExchangeSlave))
-        slave, found = self._slave, [StepOutcome(time, False)]
-        said = self._outcome_of(lambda: found.append(slave.step(time, step)))
-        return [said, found[-1].reached, found[-1].event, found[-1].ends_run]
-
-    @staticmethod
-    def _outcome_of(advance: Callable[[], None]) -> list[Any]:
-        """Do a step; return how it went: a code, what was said, when, and how the run is to end."""
+    def advance(self, method: str, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
         try:
-            advance()
-        except RunEndedError as error:
-            return [ENDED, str(error), error.time, error.how]
+            return getattr(self._slave, method)(time, step), None
         except StepDiscardedError as error:
-            return [DISCARDED, str(error), error.time, ""]
-        return [DONE, "", 0.0, ""]
-
-    def update_discrete_states(self) -> list[Any]:
-        assert isinstance(self._slave, (EventFmuSlave, ExchangeSlave))
-        update = self._slave.update_discrete_states()
-        return [update.again, update.next_event, update.ends_run]
-
-    def active_clocks(self) -> list[str]:
-        assert isinstance(self._slave, (EventFmuSlave, ExchangeSlave))
-        return sorted(self._slave.active_clocks())
+            return None, Undone(str(error), error.time, getattr(error, "how", ""))
 
     def get_state(self) -> int:
         number = max(self._states, default=0) + 1
@@ -108,9 +91,6 @@ class _Host:
 
     def free_state(self, number: int) -> None:
         self._slave.free_state(self._states.pop(number))
-
-    def remarks(self) -> list[list[Any]]:
-        return [[r.instance, r.text, r.count] for r in self._slave.take_remarks()]
 
 
 class RemoteSlave(Slave):
@@ -131,73 +111,69 @@ class RemoteSlave(Slave):
             self._jail.close()
             raise
 
-    def _ask(self, method: str, *arguments: Any) -> Any:
+    def _ask(self, answer: type[Answer], method: str, *arguments: Any) -> Answer:
         try:
-            return self._jail.call((method, list(arguments)))
-        except SlaveError as error:
-            raise SlaveError(f"{error}{self._jail.describe_printed()}") from None
+            return self._jail.call((method, arguments), answer)
         except ChildError as error:
-            raise SlaveError(f"{self.name}: {method} must come to its end, but {error}") from None
+            raise SlaveError(f"{self.name}: {error.explain(method)}", "time_limit") from None
 
     def set(self, values: Mapping[str, Value]) -> None:
-        self._ask("set", dict(values))
+        self._ask(NOTHING, "set", dict(values))
 
     def get(self, names: Sequence[str]) -> list[Value]:
-        return list(self._ask("get", list(names)))
+        return self._ask(list[Value], "get", list(names))
 
     def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        number = self._ask("bind", "sends", list(names))
-        return lambda: self._ask("send", number, buffer.copy())
+        number = self._ask(int, "bind", "sends", list(names))
+        return lambda: self._ask(NOTHING, "send", number, buffer)
 
     def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        number = self._ask("bind", "receives", list(names))
+        number = self._ask(int, "bind", "receives", list(names))
 
         def receive() -> None:
-            values = self._ask("receive", number, buffer.copy())
-            if not (isinstance(values, np.ndarray) and values.shape == buffer.shape and values.dtype == np.float64):
+            values = self._ask(Array, "receive", number, buffer)
+            if values.shape != buffer.shape:
                 raise SlaveError(f"{self.name}: its process must return {len(names)} values, but does not")
             buffer[:] = values
 
         return receive
 
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        self._ask("begin", start, stop, tolerance)
+        self._ask(NOTHING, "begin", start, stop, tolerance)
 
     def start(self) -> None:
-        self._ask("start")
+        self._ask(NOTHING, "start")
 
     def do_step(self, time: float, step: float) -> None:
-        self._judge(self._ask("do_step", time, step))
+        self._advance("do_step", time, step)
 
-    def _judge(self, said: Any) -> None:
-        """Raise for a step that was not done, by what the child says of it."""
-        match said:
-            case [int() as status, str() as text, float() as reached, str() as how]:
-                if status == ENDED:
-                    raise RunEndedError(text, self.name, reached, how)
-                if status != DONE:
-                    raise StepDiscardedError(text, self.name, reached)
-            case _:
-                raise SlaveError(f"{self.name}: its process must say how a step went, but does not")
+    def _advance(self, method: str, time: float, step: float) -> StepOutcome | None:
+        """Do a step; return its outcome, where it has one."""
+        outcome, undone = self._ask(tuple[StepOutcome | None, Undone | None], "advance", method, time, step)
+        if undone is None:
+            return outcome
+        if undone.how:
+            raise RunEndedError(undone.text, self.name, undone.time, undone.how)
+        raise StepDiscardedError(undone.text, self.name, undone.time)
 
-    def get_state(self) -> Any:
-        return self._ask("get_state")
+    def get_state(self) -> int:
+        return self._ask(int, "get_state")
 
-    def set_state(self, state: Any) -> None:
-        self._ask("set_state", state)
+    def set_state(self, state: int) -> None:
+        self._ask(NOTHING, "set_state", state)
 
-    def free_state(self, state: Any) -> None:
-        self._ask("free_state", state)
+    def free_state(self, state: int) -> None:
+        self._ask(NOTHING, "free_state", state)
 
     def terminate(self) -> None:
-        self._ask("terminate")
+        self._ask(NOTHING, "terminate")
 
     def reset(self) -> None:
-        self._ask("reset")
+        self._ask(NOTHING, "reset")
 
     def take_remarks(self) -> list[RunRemark]:
         """Return warnings and shortened steps since this was last asked."""
-        return list(read_remarks(self._ask("remarks")))
+        return self._ask(list[RunRemark], "take_remarks")[:MOST_REMARKS]
 
     def shorten_steps(self) -> bool:
         """Do steps that the FMU discards in shorter ones, from the next run on.
@@ -205,7 +181,7 @@ class RemoteSlave(Slave):
         Returns:
             Whether the FMU can, and this is new.
         """
-        return bool(self._ask("shorten_steps"))
+        return self._ask(bool, "shorten_steps")
 
     def close(self) -> None:
         self._jail.close()
@@ -215,36 +191,32 @@ class EventRemoteSlave(RemoteSlave, EventSlave):
     """One instance with events; see ``EventSlave``. Its inputs are held over a step, for a step is one call here."""
 
     def step(self, time: float, step: float) -> StepOutcome:
-        match self._ask("step", time, step):
-            case [list() as said, float() as reached, bool() as event, str() as ends_run]:
-                self._judge(said)
-                return StepOutcome(reached, event, ends_run)
-        raise SlaveError(f"{self.name}: its process must say how a step went, but does not")
+        outcome = self._advance("step", time, step)
+        if outcome is None:
+            raise SlaveError(f"{self.name}: its process must say how a step went, but does not")
+        return outcome
 
     def enter_event_mode(self) -> None:
-        self._ask("enter_event_mode")
+        self._ask(NOTHING, "enter_event_mode")
 
     def tick(self, clocks: Sequence[str]) -> None:
-        self._ask("tick", list(clocks))
+        self._ask(NOTHING, "tick", list(clocks))
 
     def active_clocks(self) -> frozenset[str]:
-        return frozenset(str(name) for name in self._ask("active_clocks"))
+        return self._ask(frozenset[str], "active_clocks")
 
     def update_discrete_states(self) -> EventUpdate:
-        match self._ask("update_discrete_states"):
-            case [bool() as again, (float() | None) as next_event, bool() as ends_run]:
-                return EventUpdate(again, next_event, ends_run)
-        raise SlaveError(f"{self.name}: its process must say what an event led to, but does not")
+        return self._ask(EventUpdate, "update_discrete_states")
 
     def leave_event_mode(self) -> None:
-        self._ask("leave_event_mode")
+        self._ask(NOTHING, "leave_event_mode")
 
     def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
         if values is not None:
             raise SlaveError(f"{self.name}: inputs must be held over steps in a process of its own, but are fed")
 
     def output_rates(self, names: Sequence[str], order: int = 1) -> list[float]:
-        return [float(rate) for rate in self._ask("output_rates", list(names), order)]
+        return self._ask(list[float], "output_rates", list(names), order)
 
 
 def without_feed(description: FmuDescription) -> FmuDescription:

@@ -2,13 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.plain_text import plain_text
 
-LOOPS = PYTHON, MACHINE_CODE = "Python", "machine code"
+PYTHON: Final = "Python"
+MACHINE_CODE: Final = "machine code"
+Loop = Literal["Python", "machine code"]
+MOST_REMARKS, LONGEST_REMARK = 1000, 1000
 
 
 @dataclass(frozen=True)
@@ -25,15 +29,6 @@ class EventStatistics:
     instants: int = 0
     ticks: int = 0
     late: tuple[float, ...] = ()
-
-
-def read_events(claimed: object) -> EventStatistics:
-    """Return the events that a child process sends, as far as they are such."""
-    match claimed:
-        case [list() as times, int() as instants, int() as ticks, list() as late]:
-            numbers = [tuple(t for t in found if isinstance(t, float)) for found in (times, late)]
-            return EventStatistics(numbers[0], instants, ticks, numbers[1])
-    return EventStatistics()
 
 
 @dataclass(frozen=True)
@@ -53,7 +48,7 @@ class Statistics:
     rejected: int
     do_steps: Mapping[str, int]
     sweeps: int
-    loop: str = PYTHON
+    loop: Loop = PYTHON
     events: EventStatistics = EventStatistics()
 
 
@@ -62,7 +57,7 @@ class RunRemark:
     """What is to be known of a run that went on.
 
     Attributes:
-        text: the first of its kind.
+        text: the first of its kind; plain, whatever an FMU had to say.
         count: how many there were.
     """
 
@@ -70,22 +65,11 @@ class RunRemark:
     text: str
     count: int = 1
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "text", plain_text(self.text[:LONGEST_REMARK]))
+
     def __str__(self) -> str:
         return f"{self.instance}: {self.text}" + (f" ({self.count} times)" if self.count > 1 else "")
-
-
-MOST_REMARKS, LONGEST_REMARK = 1000, 1000
-"""What is believed of a child process."""
-
-
-def read_remarks(claimed: object) -> tuple[RunRemark, ...]:
-    """Return the remarks that a child process sends, as far as they are such."""
-    found = []
-    for entry in claimed[:MOST_REMARKS] if isinstance(claimed, list) else ():
-        match entry:
-            case [str() as instance, str() as text, int() as count]:
-                found.append(RunRemark(instance, plain_text(text[:LONGEST_REMARK]), count))
-    return tuple(found)
 
 
 @dataclass(frozen=True)

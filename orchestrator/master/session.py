@@ -21,7 +21,7 @@ from orchestrator.master.layout import Layout, lay_out
 from orchestrator.master.own_steps import own_step_remarks
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import AT_EVENT, RunEndedError, Slave, StepDiscardedError, Value
-from orchestrator.master.result import MACHINE_CODE, PYTHON, EventStatistics, Recording, RunRemark, Statistics
+from orchestrator.master.result import MACHINE_CODE, PYTHON, EventStatistics, Loop, Recording, RunRemark, Statistics
 from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, Quantity, System, split
 from orchestrator.master.wiring import Array, Slots, Wiring, gather, wire
@@ -271,7 +271,7 @@ class Session:
 
     def _run_fixed_step(
         self, wiring: Wiring, table: Array, rows: Array, record: Slots, algorithm: GaussSeidel | Jacobi
-    ) -> str:
+    ) -> Loop:
         """Run, and return what ran the loop, see ``Statistics``."""
         simultaneous = isinstance(algorithm, Jacobi)
         self._do_steps += self.steps * len(wiring.stages)

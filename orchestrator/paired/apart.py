@@ -1,6 +1,5 @@
 """One paired run in a child process, so that its time can be limited. The FMUs are ours: nothing is kept from them."""
 
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,6 @@ from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.pair import PairRun, run_pair
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import Limits
-
-_BOUNDLESS = 1 << 50
 
 
 def run_pair_within(
@@ -28,18 +25,14 @@ def run_pair_within(
     Args:
         time_limit: [s], the start of the child process included.
     """
-    limits = Limits(time_limit, _BOUNDLESS, _BOUNDLESS, math.inf, _BOUNDLESS, _BOUNDLESS, _BOUNDLESS, 1 << 16)
+    limits = Limits.of_time(time_limit)
     argument = (experiment, {name: path.absolute() for name, path in fmus.items()}, alpha, seed, dict(start or {}))
     try:
         with Jail("orchestrator.paired.apart:open_run", argument, limits=limits, walls=False) as jail:
             jail.start(time_limit)
-            found: PairRun = jail.call(None, most=_BOUNDLESS, answer=PairRun)
+            return jail.call(None, PairRun, most=limits.output)
     except ChildError as error:
-        if error.reason == "time":
-            text = f"the run must take at most {time_limit:g} s (`time_limit`), but takes longer"
-            raise SimulationError(text, "time_limit") from None
-        raise SimulationError(f"the run must come to its end, but {error}") from None
-    return found
+        raise SimulationError(error.explain("the run"), "time_limit") from None
 
 
 def open_run(argument: tuple[Any, ...]) -> Callable[[Any], PairRun]:

@@ -7,19 +7,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from orchestrator.errors import ChildError, FmuError, SimulationError, SlaveError
+from orchestrator.errors import ChildError, FmuError, SimulationError
 from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.ours import is_ours
 from orchestrator.fmi.remote import RemoteFactory, without_feed
 from orchestrator.master.algorithms import step_count
 from orchestrator.master.compiled import prepare
-from orchestrator.master.result import LOOPS, Recording, Statistics, read_events, read_remarks
+from orchestrator.master.result import MOST_REMARKS, Recording
 from orchestrator.master.system import System
 from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.scenarios.definition import Scenario
@@ -161,49 +159,20 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
                 "orchestrator.scenarios.inside:open_runs", job, read=[scratch.path], limits=limits, walls=bool(foreign)
             ) as jail:
                 jail.start(time)
-                try:
-                    answer = jail.call({}, most=8 * shape[0] * shape[1] + _SLACK)
-                except SlaveError as error:
-                    raise SlaveError(f"{error}{jail.describe_printed()}") from None
+                claimed = jail.call(None, Recording, most=8 * (shape[0] + 1) * shape[1] + _SLACK)
         except ChildError as error:
-            raise SimulationError(f"{names}: {_word_error(error, time)}", "time_limit") from None
-    return _result(answer, scenario, shape, names)
+            raise SimulationError(f"{names}: {error.explain('the run')}", "time_limit") from None
+    return _check_recording(claimed, scenario, shape, names)
 
 
-def _word_error(error: ChildError, time: float) -> str:
-    if error.reason == "time":
-        return f"the run must take at most {time:g} s (`time_limit`), but takes longer"
-    said = f" (it printed: {error.said})" if error.said else ""
-    return f"the run must come to its end, but {error}{said}"
-
-
-def _result(answer: Any, scenario: Scenario, shape: tuple[int, int], names: str) -> Recording:
-    """Return the result, after a look at what the child claims it to be."""
-    match answer:
-        case [
-            np.ndarray() as values,
-            int() as steps,
-            int() as rejected,
-            dict() as calls,
-            int() as sweeps,
-            str() as loop,
-            list() as remarks,
-            list() as events,
-        ] if _fits(values, shape) and loop in LOOPS:
-            counts = {i.name: c for i in scenario.system.instances if isinstance(c := calls.get(i.name), int)}
-        case _:
-            raise SimulationError(f"{names}: the run must return {shape[0]} signals of {shape[1]} values, but does not")
-    times = scenario.start + scenario.algorithm.step * np.arange(values.shape[1], dtype=np.float64)
+def _check_recording(claimed: Recording, scenario: Scenario, shape: tuple[int, int], names: str) -> Recording:
+    """Return the result, after a look at what the child claims it to be; a run that an FMU ended has fewer values."""
+    given = claimed.values.shape
+    if len(given) != len(shape) or given[0] != shape[0] or not 1 <= given[1] <= shape[1]:
+        raise SimulationError(f"{names}: the run must return {shape[0]} signals of {shape[1]} values, but does not")
+    time = scenario.start + scenario.algorithm.step * np.arange(given[1], dtype=np.float64)
     units = {name: getattr(scenario.system.unit(name), "name", None) for name in scenario.record}
-    statistics = Statistics(steps, rejected, counts, sweeps, loop, read_events(events))
-    return Recording(times, values, scenario.record, units, statistics, read_remarks(remarks))
-
-
-def _fits(values: NDArray[Any], shape: tuple[int, int]) -> bool:
-    """Whether values are of the recorded signals; a run that an FMU ended has fewer of each."""
-    return (
-        values.dtype == np.float64
-        and values.ndim == 2
-        and values.shape[0] == shape[0]
-        and 1 <= values.shape[1] <= shape[1]
-    )
+    instances = {instance.name for instance in scenario.system.instances}
+    calls = {name: count for name, count in claimed.statistics.do_steps.items() if name in instances}
+    statistics = replace(claimed.statistics, do_steps=calls)
+    return Recording(time, claimed.values, scenario.record, units, statistics, claimed.remarks[:MOST_REMARKS])

@@ -52,7 +52,7 @@ def test_diagnose_says_it_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 @pytest.mark.skipif(sys.platform != "linux", reason="strays are found by what Linux says of processes")
 def test_without_walls_a_daemon_is_found_and_killed(tmp_path: Path) -> None:
     with Jail("tests.support.jail_programs:opened", walls=False, adopt=True) as jail:
-        daemon = jail.call(["daemon"])
+        daemon = jail.call(["daemon"], int)
         assert jail.finish()
     with pytest.raises(ProcessLookupError):
         os.kill(daemon, 0)

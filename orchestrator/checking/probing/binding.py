@@ -8,14 +8,18 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
+from orchestrator.checking.host import Made, Returned, Update
 from orchestrator.checking.probing.statuses import ERROR, StatusError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.process import Process
 from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, SimulationError
+from orchestrator.shared.isolation.jail import Answer
 
 _REFERENCE = re.compile(r"#([ribs])(\d+)#")
+_NOTHING = type(None)
 _LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b", "String": "s"}
 
 
@@ -53,24 +57,6 @@ NAMES: Mapping[Version, Names] = {
 }  # fmt: skip
 
 
-class FmiProcess(Protocol):
-    """A child process that does FMI calls, each within ``most`` seconds where that is set."""
-
-    most: float | None
-
-    def call(self, request: Any) -> Any:
-        """Return what ``checking.host.Host`` returns."""
-
-    def resident(self) -> int:
-        """Resident memory of the child in bytes; 0 where the system does not tell."""
-
-    def processor_time(self) -> float:
-        """How long the child has had a processor [s]; 0 where the system does not tell."""
-
-    def renew(self) -> None:
-        """End the child and start another one."""
-
-
 class Library:
     """The shared library of an FMU.
 
@@ -83,12 +69,12 @@ class Library:
 
     def __init__(
         self,
-        host: FmiProcess,
+        process: Process,
         version: Version = "2.0",
         variables: Sequence[ProbedVariable] = (),
         report: Callable[[str, str], None] = lambda _rule, _message: None,
     ) -> None:
-        self._host, self._report = host, report
+        self.process, self._report = process, report
         self.names = NAMES[version]
         self.current = ""
         self.ended = False
@@ -108,20 +94,20 @@ class Library:
         self._path = path
         names = self.names
         freer = f"{names.prefix}FreeInstance"
-        return str(self._ask("loading the library", "load", path, list(names.texts), list(names.makers), freer))
+        return self._ask(str, "loading the library", "load", path, names.texts, names.makers, freer)
 
     def renew(self) -> None:
         """Load the library anew in another process; its instances and states are gone."""
-        self._host.renew()
+        self.process.renew()
         self.ended = False
         self.current = ""
         self.load(self._path)
 
-    def _ask(self, doing: str, *request: Any) -> Any:
+    def _ask(self, kind: type[Answer], doing: str, *request: Any) -> Answer:
         """Let the child do something; where that ends the child, ``current`` keeps what it was."""
         self.current = doing
         try:
-            answer = self._host.call(list(request))
+            answer = self.process.call(request, kind)
         except ChildError:
             self.ended = True
             raise
@@ -137,48 +123,44 @@ class Library:
     @contextmanager
     def limit_calls(self, seconds: float) -> Iterator[None]:
         """Let calls take less time than the limits say."""
-        self._host.most = seconds
+        self.process.most = seconds
         try:
             yield
         finally:
-            self._host.most = None
+            self.process.most = None
 
     def text(self, function: str) -> str:
         """Call a function that returns a text. Return what it returned; "null" for a null pointer."""
         name = self.names.prefix + function
-        value = self._ask(name, "text", name)
-        return "null" if value is None else str(value)
+        return self._ask(str, name, "text", name)
 
     def make(self, function: str, *request: Any) -> int | None:
         """Make an instance; None when the FMU returns null. Return the instance's number, or None."""
-        match self._ask(function, *request):
-            case [number, messages]:
-                self.messages = self._texts(messages)
-                return number if isinstance(number, int) else None
-        raise odd(function)
+        made = self._ask(Made, function, *request)
+        self.messages = self._texts(made.messages)
+        return made.number
 
     def free(self, number: int) -> None:
         """Free an instance."""
         name = f"{self.names.prefix}FreeInstance"
-        self._ask(name, "free", number, name)
+        self._ask(_NOTHING, name, "free", number, name)
 
     def raw(self, number: int, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
         """Call a function of an instance; return its status and what its output arguments hold."""
-        answer = self._ask(function, "call", number, function, [list(a) for a in arguments])
+        answer = self._ask(Returned, function, "call", number, function, arguments)
         return self._check_answer(answer, function, arguments)
 
-    def _check_answer(self, answer: Any, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
-        """An answer that has the shape of one."""
-        match answer:
-            case [int() as status, list() as values, messages, int() as errors, str() as left]:
-                self.messages, self.errors = self._texts(messages), errors
-                if left:
-                    self._report(
-                        "run.python-exception", f"{function} must clear what it catches, but leaves {left[:200]}"
-                    )
-                if len(values) == sum(a[0].startswith(("out", "new", "free", "event")) for a in arguments):
-                    return status, values
-        raise odd(function)
+    def _check_answer(
+        self, answer: Returned, function: str, arguments: Sequence[Sequence[Any]]
+    ) -> tuple[int, list[Any]]:
+        """An answer that has as many values as there are outputs."""
+        self.messages, self.errors = self._texts(answer.messages), answer.errors
+        if answer.left:
+            text = f"{function} must clear what it catches, but leaves {answer.left[:200]}"
+            self._report("run.python-exception", text)
+        if len(answer.values) != sum(a[0].startswith(("out", "new", "free", "event")) for a in arguments):
+            raise odd(function)
+        return answer.status, answer.values
 
     def raw_many(
         self, number: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]
@@ -189,10 +171,10 @@ class Library:
             Status and values of each that was called.
         """
         doing = ", ".join(dict.fromkeys(function for function, _ in requests))
-        answers = self._ask(doing, "calls", number, [[f, [list(a) for a in arguments]] for f, arguments in requests])
+        answers = self._ask(list[Returned], doing, "calls", number, requests)
         done: list[tuple[int, list[Any]]] = []
         self.logged = []
-        if not isinstance(answers, list) or not 1 <= len(answers) <= len(requests):
+        if not 1 <= len(answers) <= len(requests):
             raise odd(doing)
         for answer, (function, arguments) in zip(answers, requests, strict=False):
             done.append(self._check_answer(answer, function, arguments))
@@ -205,31 +187,18 @@ class Library:
         Args:
             early: at which update an early return is asked for; -1 for never.
         """
-        self._ask("", "plan", number, reads, writes, values, early)
+        self._ask(_NOTHING, "", "plan", number, reads, writes, values, early)
 
-    def updates(self) -> tuple[list[list[Any]], int]:
-        """The intermediate updates since the last call, and locks of preemption that are open; see the host."""
-        match self._ask("", "updates"):
-            case [list() as rows, int() as locks] if all(isinstance(r, list) and len(r) == 8 for r in rows):
-                return rows, locks
-        raise odd("an intermediate update")
+    def updates(self) -> tuple[list[Update], int]:
+        """The intermediate updates since the last call, and locks of preemption that are open."""
+        return self._ask(tuple[list[Update], int], "", "updates")
 
     def notes(self) -> tuple[int, str]:
         """Messages that are neither warnings nor errors, since the last call: how many, and the first."""
-        match self._ask("", "notes"):
-            case [int() as count, str() as first]:
-                return count, first[:200]
-        raise odd("the logger")
+        count, first = self._ask(tuple[int, str], "", "notes")
+        return count, first[:200]
 
-    def resident(self) -> int:
-        """Resident memory of the child in bytes, as the system tells; 0 where it does not."""
-        return self._host.resident()
-
-    def processor_time(self) -> float:
-        """How long the child has had a processor [s], as the system tells; 0 where it does not."""
-        return self._host.processor_time()
-
-    def _texts(self, messages: Any) -> list[str]:
+    def _texts(self, messages: Sequence[str]) -> list[str]:
         """Messages with the names of the variables that they refer to."""
-        texts = [str(m)[:200] for m in messages[:4]] if isinstance(messages, list) else []
+        texts = [m[:200] for m in messages[:4]]
         return [_REFERENCE.sub(lambda m: self._known.get((m[1], int(m[2])), m[0]), text) for text in texts]

@@ -243,8 +243,8 @@ def _is_text(value: bytes) -> bool:
 def memory(context: Context) -> None:
     """Resident memory over instances and over steps."""
     bench, job = context.bench, context.bench.job
-    resident = bench.library.resident
-    if not resident():
+    process = bench.library.process  # whose jail may be another for every instance
+    if not process.jail.resident():
         raise SkippedError("the system does not tell the memory of a process")
     budget = Stopwatch(4.0 * job.budget)
     cycles, before = 0, None
@@ -252,11 +252,11 @@ def memory(context: Context) -> None:
         with bench.instance(moved=False):
             pass
         if n == 9:
-            before = resident()
+            before = process.jail.resident()
         cycles += before is not None
         if budget.over:
             break
-    growth = (resident() - (before or 0)) / max(cycles - 1, 1)
+    growth = (process.jail.resident() - (before or 0)) / max(cycles - 1, 1)
     if before is not None and cycles > 5 and growth > _LEAK_PER_INSTANCE:
         context.report(
             "resources.instance-leak", f"an instance must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
@@ -264,9 +264,9 @@ def memory(context: Context) -> None:
     with bench.instance(moved=False) as driver:
         quarter = max(job.steps // 4, 1)
         bench.run(driver, 0, quarter, excited=False, read=False)
-        before = resident()
+        before = process.jail.resident()
         bench.run(driver, quarter, excited=False, read=False)
-        growth = resident() - before
+        growth = process.jail.resident() - before
     if growth > _LEAK_AT_LEAST and growth / max(job.steps - quarter, 1) > _LEAK_PER_STEP:
         per_step = growth / max(job.steps - quarter, 1) / 1024
         context.report("resources.step-leak", f"memory must not grow with steps, but grows by {per_step:.0f} KiB each")

@@ -1,7 +1,9 @@
 """Probes of what FMI 3.0 brings: early return, intermediate updates, clocks, structural parameters."""
 
+from collections.abc import Sequence
 from typing import Any
 
+from orchestrator.checking.host import Update
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
 from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
@@ -53,28 +55,28 @@ def intermediate(context: Context) -> None:
         _probe_early_return(context)
 
 
-def _judge(context: Context, rows: list[list[Any]], begin: float, end: float) -> None:
+def _judge(context: Context, rows: Sequence[Update], begin: float, end: float) -> None:
     """Judge the updates of one step; only below the time of a finished internal step must none of them lie."""
     slack = _SMALL * max(abs(end), end - begin)
     finished = begin
-    for function, time, _, _, done, _, got, was_set in rows:
-        if function != "fmi3DoStep":
-            context.report(
-                "intermediate.unexpected", f"intermediateUpdate must be called in steps only, not in {function}"
-            )
+    for row in rows:
+        time = row.time
+        if row.function != "fmi3DoStep":
+            message = f"intermediateUpdate must be called in steps only, not in {row.function}"
+            context.report("intermediate.unexpected", message)
         elif not begin - slack <= time <= end + slack:
             message = "an intermediate update must lie in its step, but one does not:"
             context.report("intermediate.time", message, when=f"it is at {time:g}, the step from {begin:g} to {end:g}")
         elif time < finished - slack:
             message = "no intermediate update must lie before a finished one, but one does:"
             context.report("intermediate.time", message, when=f"{time:g} follows {finished:g}")
-        if got not in (OK, WARNING, None):
+        if row.read not in (OK, WARNING, None):
             message = "variables with intermediateUpdate must be readable in an update, but are refused"
             context.report("intermediate.access", message)
-        if was_set not in (OK, WARNING, None):
+        if row.written not in (OK, WARNING, None):
             message = "continuous inputs with intermediateUpdate must be settable in an update, but are refused"
             context.report("intermediate.access", message)
-        if done:
+        if row.done:
             finished = max(finished, time)
 
 
@@ -90,7 +92,7 @@ def _probe_early_return(context: Context) -> None:
         )  # fmt: skip
         rows, _ = bench.library.updates()
         bench.library.plan(driver.number, [], [], [], -1)
-    may = bool(rows) and bool(rows[0][5]) and rows[0][1] < job.start + job.step * (1.0 - _SMALL)
+    may = bool(rows) and rows[0].early and rows[0].time < job.start + job.step * (1.0 - _SMALL)
     if may and status in (OK, WARNING) and not found[2][0]:
         message = "a step must end early when an intermediate update asks for it, but goes on"
         context.report("intermediate.early-return", message)

@@ -35,7 +35,7 @@ def inputs(context: Context) -> None:
     if refused is not None:
         context.report("run.input-refused", refused)
         bench.excited = False
-    began = bench.library.processor_time()
+    began = bench.library.process.jail.processor_time()
     try:
         with bench.instance() as driver:
             context.plain = bench.run(driver)
@@ -46,7 +46,7 @@ def inputs(context: Context) -> None:
         bench.excited = False  # the life cycle was possible with the start values
         with bench.instance() as driver:
             context.plain = bench.run(driver)
-    seconds = bench.library.processor_time() - began
+    seconds = bench.library.process.jail.processor_time() - began
     context.trace = context.plain
     search = _Search(context)
     search.find()
@@ -117,7 +117,7 @@ class _Search:
         values = {v: x for v in variables if (x := moved(v, v.start or ())) is not None}
         switched = tuple(v for v in values if v.causality == "input" and not (v.real and v in bench.job.inputs()))
         bench.movement = Movement(values, switched if bench.excited else ())
-        began = bench.library.processor_time()
+        began = bench.library.process.jail.processor_time()
         try:
             with bench.instance() as driver:
                 trace = bench.run(driver, 0, steps)
@@ -132,7 +132,7 @@ class _Search:
             bench.library.renew()
             return False
         self.context.trace = trace
-        self.seconds = bench.library.processor_time() - began
+        self.seconds = bench.library.process.jail.processor_time() - began
         return True
 
 

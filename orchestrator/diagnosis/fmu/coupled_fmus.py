@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from orchestrator.fmi.model_description import read_description
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.fmi.slave3 import Fmu3Slave
 from orchestrator.master.protocol import NativeTransfer, Value
-from orchestrator.master.result import RunRemark
+from orchestrator.master.result import MOST_REMARKS, RunRemark
 from orchestrator.master.system import split
 
 Array = NDArray[np.float64]
@@ -81,27 +81,39 @@ class Batch:
     fresh: bool = False
 
 
-def open_fmus(request: LoadRequest) -> Callable[[Batch], list[Any]]:
-    """Return what runs batches: results (arrays, or None), reasons of failures, the time taken [s], and remarks."""
+class Ran(NamedTuple):
+    """What became of one run: what was read (steps + 1, reads), or why it failed."""
+
+    rows: Array | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class RanBatch:
+    """What became of the runs of a batch, in their order, the time taken [s], and what was to be remarked."""
+
+    runs: tuple[Ran, ...]
+    seconds: float
+    remarks: tuple[RunRemark, ...]
+
+
+def open_fmus(request: LoadRequest) -> Callable[[Batch], RanBatch]:
+    """Return what runs batches."""
     fmus = CoupledFmus(request)
 
-    def run(batch: Batch) -> list[Any]:
-        begun = time.monotonic()
-        results: list[Array | None] = []
-        reasons = []
-        for job in batch.runs:
-            try:
-                rows = fmus.run(job, batch)
-                finite = bool(np.all(np.isfinite(rows)))
-                results.append(rows if finite else None)
-                reasons.append("" if finite else "it returned values that are not finite")
-            except OrchestratorError as error:
-                results.append(None)
-                reasons.append(" ".join(str(error).split()))
-        remarks = [[r.instance, r.text, r.count] for r in fmus.take_remarks()]
-        return [results, reasons, time.monotonic() - begun, remarks]
+    def run(job: Run, batch: Batch) -> Ran:
+        try:
+            rows = fmus.run(job, batch)
+        except OrchestratorError as error:
+            return Ran(None, str(error))
+        return Ran(rows) if np.all(np.isfinite(rows)) else Ran(None, "it returned values that are not finite")
 
-    return run
+    def run_batch(batch: Batch) -> RanBatch:
+        begun = time.monotonic()
+        ran = tuple(run(job, batch) for job in batch.runs)
+        return RanBatch(ran, time.monotonic() - begun, tuple(fmus.take_remarks()[:MOST_REMARKS]))
+
+    return run_batch
 
 
 def split_name(name: str, members: Mapping[str, object]) -> tuple[str, str]:

@@ -7,17 +7,16 @@ from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu.coupled_fmus import Batch, Feedthrough, LoadRequest, Run
+from orchestrator.diagnosis.fmu.coupled_fmus import Batch, Feedthrough, LoadRequest, RanBatch, Run
 from orchestrator.diagnosis.fmu.loop import LOOP
 from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.diagnosis.settings import FmuSettings
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
-from orchestrator.master.result import MOST_REMARKS, RunRemark, read_remarks
+from orchestrator.master.result import MOST_REMARKS, RunRemark
 from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
@@ -86,9 +85,7 @@ class Runner:
             self._starting = time.monotonic() - begun
         except ChildError as error:
             self.close()
-            raise SlaveError(
-                f"{self.path}: must load and instantiate, but {_failure_words(error, settings.loading)}"
-            ) from None
+            raise SlaveError(f"{self.path}: must load and instantiate, but {error}") from None
         except OrchestratorError as error:
             self.close()
             raise FmuError(str(error)) from None
@@ -183,9 +180,9 @@ class Runner:
         try:
             jail = self._jail()
             begun = time.monotonic()
-            answer = jail.call(replace(batch, runs=runs), time=allowed, most=most)
+            answer = jail.call(replace(batch, runs=runs), RanBatch, allowed, most)
         except ChildError as error:
-            self._lose(_failure_words(error, allowed))
+            self._lose(str(error))
             if len(chunk) > 1:  # one of them was the culprit
                 for k in chunk:
                     self._run_chunk([k], batch, results)
@@ -208,26 +205,21 @@ class Runner:
         known = KNOWN / (1 + self.lost)
         return expected + known + (0.0 if threading.get_ident() in self._warm else AGAIN * self._first)
 
-    def _read_answer(self, answer: Any, runs: Sequence[Run], steps: int) -> list[Array | None]:
+    def _read_answer(self, answer: RanBatch, runs: Sequence[Run], steps: int) -> list[Array | None]:
         """Look at what the child claims, and return what can be believed of each run."""
-        match answer:
-            case [list() as given, list() as reasons, float() as seconds, remarks] if (
-                len(given) == len(reasons) == len(runs)
-            ):
-                self._keep_remarks(read_remarks(remarks))
-            case _:
-                raise SlaveError(f"{self.path}: its process must return {len(runs)} runs, but does not")
+        if len(answer.runs) != len(runs):
+            raise SlaveError(f"{self.path}: its process must return {len(runs)} runs, but does not")
+        self._keep_remarks(answer.remarks)
         results: list[Array | None] = []
-        for run, rows, reason in zip(runs, given, reasons, strict=True):
-            shape = (len(run.table) + 1, len(self.reads))
-            good = isinstance(rows, np.ndarray) and rows.shape == shape and rows.dtype == np.float64
-            results.append(rows if good else None)
-            if not good and isinstance(reason, str) and reason:
-                self.reason = plain_text(reason)
+        for run, ran in zip(runs, answer.runs, strict=True):
+            good = ran.rows is not None and ran.rows.shape == (len(run.table) + 1, len(self.reads))
+            results.append(ran.rows if good else None)
+            if not good and ran.reason:
+                self.reason = plain_text(ran.reason)
         mine = threading.get_ident()
-        self._spent += seconds
+        self._spent += answer.seconds
         if mine in self._warm:  # the first answer of a child includes what it loads
-            self.step_cost = max(0.5 * self.step_cost, seconds / max(steps, 1))
+            self.step_cost = max(0.5 * self.step_cost, answer.seconds / max(steps, 1))
         self._warm.add(mine)
         return results
 
@@ -266,9 +258,3 @@ class Runner:
             self.lost += 1
             if self.lost > self.settings.most_lost:
                 raise SlaveError(f"{self.path}: must run, but {reason}; given up after {self.lost} processes")
-
-
-def _failure_words(error: ChildError, allowed: float) -> str:
-    if error.reason == "time":
-        return f"hangs: no answer within {allowed:.0f} s"
-    return f"crashes: {error}" if error.reason == "signal" else str(error)

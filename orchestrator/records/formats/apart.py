@@ -65,7 +65,7 @@ class _Apart(RecordSource):
 
     def _ask(self, places: list[int] | None, kind: Any) -> Any:
         try:
-            return self._jail.call(places, most=2 * MAXIMUM_BYTES, answer=kind)
+            return self._jail.call(places, kind, most=2 * MAXIMUM_BYTES)
         except RecordError as error:
             raise RecordError(str(error).replace(str(self._file), str(self._shown))) from None
         except ChildError as error:

@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import Any
 
 from orchestrator.shared.isolation.limits import Setup
-from orchestrator.shared.isolation.walls import enclose, follow_parent, limit_process
+from orchestrator.shared.isolation.walls import Walls, enclose, follow_parent, limit_process
 
 _LENGTH = struct.Struct(">Q")
 ANSWER, REFUSAL = 0, 1
@@ -32,8 +32,7 @@ def main() -> None:
     follow_parent(setup.parent)
     sys.path[:] = setup.path
     limit_process(setup.limits)
-    walls = enclose(setup.read, setup.write) if setup.walls else None
-    _serve(link, setup, None if walls is None else [walls.landlock, walls.seccomp])
+    _serve(link, setup, enclose(setup.read, setup.write) if setup.walls else None)
     os._exit(0)  # threads or exit handlers of what was loaded must not keep the process alive
 
 
@@ -48,7 +47,7 @@ def _first(link: socket.socket) -> bytes:
     return data
 
 
-def _serve(link: socket.socket, setup: Setup, walls: list[Any] | None) -> None:
+def _serve(link: socket.socket, setup: Setup, walls: Walls | None) -> None:
     """Open the entry point, then answer one request after the other."""
     from orchestrator.shared.isolation import wire
 

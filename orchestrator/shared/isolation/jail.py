@@ -1,13 +1,13 @@
 """A Python entry point in a child process behind walls, asked over a private channel, killed at a deadline.
 
     with Jail("package.module:opened", argument, read=[unpacked_fmu]) as jail:
-        answer = jail.call(request, time=30.0)
+        answer = jail.call(request, Answer, time=30.0)
 
 In the child, ``opened(argument)`` is called once, after the walls are up, and returns the handler; every ``call`` then
 runs ``handler(request)``. Arguments and requests are pickled (they go from the trusted to the untrusted side);
-answers are plain data and arrays of float64, int64 and bool (see ``wire``), of the type that is asked for. An
-``OrchestratorError`` of the handler is raised again by ``call``, and the child lives on; any other exception becomes a
-``SimulationError``.
+answers are plain data and arrays of float64, int64 and bool (see ``wire``), of the type that is asked for: dataclasses
+and named tuples too. An ``OrchestratorError`` of the handler is raised again by ``call``, and the child lives on; any
+other exception becomes a ``SimulationError``. How else a child ends is a ``ChildError``, which words it for all.
 
 What holds for the child, from before the first foreign byte is loaded:
  - it has a session and process group of its own, no terminal, an environment without secrets, and dies with the
@@ -24,6 +24,7 @@ What a child says is a claim: whoever asks checks shapes and ranges, and never r
 """
 
 import contextlib
+import math
 import os
 import pickle
 import secrets
@@ -35,10 +36,12 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import msgspec
 
 from orchestrator import errors
-from orchestrator.errors import ChildError, OrchestratorError, OutputError, SimulationError
+from orchestrator.errors import ChildError, OrchestratorError, OutputError, SimulationError, SlaveError, word_printed
 from orchestrator.shared.isolation import wire
 from orchestrator.shared.isolation.inmate import ANSWER, NONCE, REFUSAL
 from orchestrator.shared.isolation.limits import PATIENCE, Limits, Setup
@@ -54,6 +57,8 @@ MOST_BYTES = 256 << 20
 _DISK_INTERVAL = 0.5
 _LAST_MOMENTS = 2.0
 _MOST_GIVEN = 100_000
+_Envelope = tuple[bytes, int, msgspec.Raw]
+Answer = TypeVar("Answer")
 _NAMES = {k: v for k, v in vars(errors).items() if isinstance(v, type) and issubclass(v, OrchestratorError)}
 
 
@@ -97,6 +102,7 @@ class Jail:
         self._interruption: BaseException | None = None
         self._root = Scratch("jail")
         self._usage_time = 0.0
+        self._allowed = math.inf  # s: the limit that was broken
         try:
             self.scratch = self._root.folder("work")
             temporary = self._root.folder("work/tmp")
@@ -131,24 +137,19 @@ class Jail:
     def start(self, time_limit: float = START_LIMIT) -> None:
         """Wait at most ``time_limit`` [s] until the entry point returned its handler, as ``call`` does by itself."""
         if not self.started:
-            found = self._exchange(b"", time_limit, 1 << 20)
-            if self._wanted:
-                self.walls = Walls(*found)
+            self.walls = self._exchange(b"", Walls if self._wanted else type(None), time_limit, 1 << 20)
             self.started = True
 
-    def call(self, request: Any, time: float | None = None, most: int = MOST_BYTES, answer: Any = Any) -> Any:
+    def call(self, request: Any, answer: type[Answer], time: float | None = None, most: int = MOST_BYTES) -> Answer:
         """Return the handler's answer to ``request``.
 
         Args:
+            answer: its type, of msgspec's types and arrays; an answer of another ends the child.
             time: seconds until the child is killed (default: the limit's).
-            answer: its type, of msgspec's types and arrays (default: any); an answer of another ends the child.
+            most: bytes of the answer.
         """
         self.start()
-        found = self._exchange(pickle.dumps(request), self.limits.time if time is None else time, most)
-        try:
-            return wire.convert(found, answer)
-        except wire.WireError as error:
-            raise self._forgery_error(str(error)) from None
+        return self._exchange(pickle.dumps(request), answer, self.limits.time if time is None else time, most)
 
     @property
     def pid(self) -> int:
@@ -163,11 +164,6 @@ class Jail:
     def processor_time(self) -> float:
         """Return how long the child has had a processor [s]; 0 where the system does not tell."""
         return processor_time(self.pid)
-
-    def describe_printed(self) -> str:
-        """Return the last line that the child has printed, as an addition to a message; empty for none."""
-        said = self._read_printed()
-        return f" (it printed: {said})" if said else ""
 
     def output_size(self) -> int:
         """Return how much the child has printed."""
@@ -204,7 +200,7 @@ class Jail:
 
     # ------------------------------------------------------------------------------------------------------------
 
-    def _exchange(self, body: bytes, limit: float, most: int) -> Any:
+    def _exchange(self, body: bytes, answer: type[Answer], limit: float, most: int) -> Answer:
         if self._interruption is not None:  # what cleans up after it must not put another error in its place
             raise self._interruption
         if self._process is None or self._process.returncode is not None:
@@ -216,17 +212,19 @@ class Jail:
         self._guard(wire.send, nonce + body, is_over)
         data = self._guard(lambda link, over, tick: wire.receive(link, most, over, tick), is_over)
         try:
-            message = wire.decode(data)
+            echo, kind, value = wire.decode(data, _Envelope)
+            if kind not in (ANSWER, REFUSAL) or not secrets.compare_digest(echo, nonce):
+                raise wire.WireError("its answer belongs to no request")
+            if kind == ANSWER:
+                found: Answer = wire.decode(value, answer)
+                return found
+            name, text = wire.decode(value, tuple[str, str])
         except wire.WireError as error:
             raise self._forgery_error(str(error)) from None
-        match message:
-            case [bytes() as echo, int() as kind, value] if secrets.compare_digest(echo, nonce):
-                if kind == ANSWER:
-                    return value
-                if kind == REFUSAL and isinstance(value, list) and len(value) == 2 and all(map(_is_text, value)):
-                    known = _NAMES.get(value[0])
-                    raise known(value[1]) if known else SimulationError(f"{value[0]}: {value[1]}".rstrip(": "))
-        raise self._forgery_error("its answer belongs to no request")
+        known = _NAMES.get(name)
+        if known is None:
+            raise SimulationError(f"{name}: {text}".rstrip(": "))
+        raise known(text + word_printed(self._read_printed()) if issubclass(known, SlaveError) else text)
 
     def _allow(self, limit: float) -> Callable[[], bool]:
         """Return whether ``limit`` [s] from now, or the child's total, is over.
@@ -242,7 +240,9 @@ class Jail:
             allowed = ((now - begin, limit, waited), (now - self._born, self.limits.total, [0.0]))
             if not waited and now - begin > wire.SLICE:
                 waited.append(processor_wait(self.pid))
-            return any(spent > most and self._is_spent(spent, most, before) for spent, most, before in allowed)
+            broken = (most for spent, most, before in allowed if spent > most and self._is_spent(spent, most, before))
+            self._allowed = next(broken, math.inf)
+            return self._allowed < math.inf
 
         return is_over
 
@@ -256,7 +256,8 @@ class Jail:
             return action(self._link, *arguments, self._tick)
         except wire.LateError:
             self._kill()
-            raise ChildError("the process took too long", "time") from None
+            text = f"the process gave no answer within {self._allowed:.3g} s"
+            raise ChildError(text, "time", self._allowed) from None
         except wire.ClosedError:
             raise self._end_error() from None
         except wire.WireError as error:
@@ -300,7 +301,7 @@ class Jail:
         code = self._process.returncode
         said = self._read_printed()
         if code == -getattr(signal, "SIGXCPU", 0):
-            return ChildError("the process took too much processor time", "time")
+            return ChildError("the process took too much processor time", "time", self.limits.time)
         if code < 0 and peak > self.limits.memory:
             return ChildError(f"the process used more than {self.limits.memory >> 20} MiB of memory", "memory")
         if code < 0:
@@ -323,10 +324,6 @@ class Jail:
             kill_group(process)  # before the process is collected, its number cannot be another's
             process.kill()
             process.wait()
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
 
 
 __all__ = ["ChildError", "Jail", "Limits", "OutputError"]

@@ -1,8 +1,10 @@
 """What a child process may use. Imported by the child before its walls are up: standard library only."""
 
+import math
 from dataclasses import dataclass
 
 MEBIBYTE = 1 << 20
+BOUNDLESS = 1 << 50
 PATIENCE = 5.0
 """Times a limit that a child may take by the clock on the wall, where it waits for a processor all the while."""
 
@@ -27,6 +29,11 @@ class Limits:
     entries: int = 10_000
     threads: int = 256
     open_files: int = 256
+
+    @classmethod
+    def of_time(cls, time: float) -> "Limits":
+        """Return the limits of a child that runs what is ours: the time of an answer [s] alone."""
+        return cls(time, BOUNDLESS, BOUNDLESS, math.inf, BOUNDLESS, BOUNDLESS, BOUNDLESS, 1 << 16)
 
 
 @dataclass(frozen=True)

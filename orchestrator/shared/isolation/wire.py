@@ -7,6 +7,7 @@ the child is pickled.
 NumPy is imported where an array comes, not before: a child without arrays does without it.
 """
 
+import functools
 import math
 import socket
 import struct
@@ -42,20 +43,19 @@ def encode(value: Any) -> bytes:
     return msgspec.msgpack.encode(value, enc_hook=_pack)
 
 
-def decode(data: bytes) -> Any:
-    """Return what ``encode`` was given; tuples come back as lists."""
+def decode(data: bytes, kind: Any = Any) -> Any:
+    """Return what ``encode`` was given, as a type: one of msgspec's, in which ``NDArray[T]`` is an array of numbers."""
     try:
-        return msgspec.msgpack.decode(data, ext_hook=_unpack)
+        return _decoder(kind).decode(data)
+    except msgspec.ValidationError as error:
+        raise WireError(f"its answer must be of another type: {error}") from None
     except (msgspec.DecodeError, ValueError, RecursionError, OverflowError, struct.error) as error:
         raise WireError(f"a message must be plain data, but is not: {error}") from None
 
 
-def convert(value: Any, kind: Any) -> Any:
-    """Return decoded data as a type: one of msgspec's, in which ``NDArray[T]`` is an array of such numbers."""
-    try:
-        return msgspec.convert(value, kind, dec_hook=_as_array)
-    except (msgspec.ValidationError, RecursionError) as error:
-        raise WireError(f"its answer must be of another type: {error}") from None
+@functools.cache
+def _decoder(kind: Any) -> msgspec.msgpack.Decoder[Any]:
+    return msgspec.msgpack.Decoder(kind, ext_hook=_unpack, dec_hook=_as_array)
 
 
 def _as_array(kind: Any, value: Any) -> Any:

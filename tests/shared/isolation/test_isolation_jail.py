@@ -11,6 +11,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,9 +41,10 @@ def nothing_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 
 def test_answers_come_back_with_their_types() -> None:
+    plain = [1, 2.5, None, "é", b"\0", True]
     with Jail(ENTRY, {"a": 1}, limits=QUICK) as jail:
-        assert jail.call(["echo", [1, 2.5, None, "é", b"\0", True]]) == [{"a": 1}, [1, 2.5, None, "é", b"\0", True]]
-        assert np.array_equal(jail.call(["array", 6]), [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
+        assert jail.call(["echo", plain], Any) == [{"a": 1}, plain]
+        assert np.array_equal(jail.call(["array", 6], Any), [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
 
 
 @dataclass(frozen=True)
@@ -55,20 +57,20 @@ class Row:
 def test_an_answer_is_of_the_type_that_is_asked_for_or_ends_the_child() -> None:
     good = {"name": "a", "values": np.arange(2.0)}
     with Jail(ENTRY, limits=QUICK) as jail:
-        (_, row) = jail.call(["echo", good], answer=tuple[None, Row])
+        (_, row) = jail.call(["echo", good], tuple[None, Row])
         assert (row.name, row.values.tolist(), row.count) == ("a", [0.0, 1.0], None)
     wrong = [{"name": 1}, {"values": [0.0, 1.0]}, {"values": np.arange(2)}, {"values": np.arange(2.0) > 0.0}]
     for change in [*wrong, {"values": None}, {"count": 0.5}]:
         with Jail(ENTRY, limits=QUICK) as jail:
             with pytest.raises(ChildError, match="its answer must be of another type") as raised:
-                jail.call(["echo", good | change], answer=tuple[None, Row])
+                jail.call(["echo", good | change], tuple[None, Row])
             assert raised.value.reason == "protocol"
             assert not Path(f"/proc/{jail.pid}").exists()
 
 
 def test_pickles_of_a_child_are_bytes_and_nothing_else() -> None:
     with Jail(ENTRY, limits=QUICK) as jail, pytest.raises(ChildError, match="of another type"):
-        jail.call(["echo", pickle.dumps(Row("a", np.arange(2.0)))], answer=tuple[None, Row])
+        jail.call(["echo", pickle.dumps(Row("a", np.arange(2.0)))], tuple[None, Row])
     folder = Path(jail_module.__file__).parents[2]
     found = {
         path.relative_to(folder).as_posix()
@@ -91,17 +93,17 @@ def test_what_cleans_up_after_an_interruption_does_not_hide_it(error: BaseExcept
         jail._tick = interrupt  # type: ignore[method-assign]
         for request in (["sleep", 60.0], ["echo", 1]):  # the second as an instance is freed, whatever happened
             with pytest.raises(type(error)):
-                jail.call(request)
+                jail.call(request, Any)
         assert not Path(f"/proc/{jail.pid}").exists()
 
 
 def test_errors_come_back_as_they_are_and_the_child_lives() -> None:
     with Jail(ENTRY, limits=QUICK) as jail:
         with pytest.raises(ScenarioError, match=r"`it` must be right, but is wrong"):
-            jail.call(["refuse"])
+            jail.call(["refuse"], Any)
         with pytest.raises(SimulationError, match=r"KeyError: 'odd'"):
-            jail.call(["fail"])
-        assert jail.call(["echo", 1]) == [None, 1]
+            jail.call(["fail"], Any)
+        assert jail.call(["echo", 1], Any) == [None, 1]
 
 
 @pytest.mark.parametrize(
@@ -110,7 +112,7 @@ def test_errors_come_back_as_they_are_and_the_child_lives() -> None:
         (["leave", 0], "exit", "exit code 0"),
         (["leave", 7], "exit", "exit code 7"),
         (["abort"], "signal", "SIGABRT"),
-        (["sleep", 30.0], "time", "too long"),
+        (["sleep", 30.0], "time", "within 1 s"),
         (["eat"], "memory", "256 MiB"),
         (["fill"], "disk", "8 MiB"),
         (["threads"], "threads", "8 threads"),
@@ -123,24 +125,24 @@ def test_every_other_ending_is_told_and_leaves_nothing(request_: list, reason: s
     with Jail(ENTRY, limits=QUICK) as jail:
         jail.start()
         with pytest.raises(ChildError, match=text) as raised:
-            jail.call(request_, 1.0 if reason == "time" else None)
+            jail.call(request_, Any, 1.0 if reason == "time" else None)
         assert raised.value.reason == reason
         assert not Path(f"/proc/{jail.pid}").exists()
 
 
 def test_what_nobody_asked_for_ends_the_child() -> None:
     with Jail(ENTRY, limits=QUICK) as jail:
-        assert jail.call(["early"]) == "first"
+        assert jail.call(["early"], Any) == "first"
         select.select([jail._link], [], [])  # what nobody asked for has arrived
         with pytest.raises(ChildError, match="without being asked"):
-            jail.call(["echo", 1])
+            jail.call(["echo", 1], Any)
 
 
 def test_the_environment_has_no_secrets_and_its_own_folders(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MY_ACCESS_TOKEN", "secret")
     monkeypatch.setenv("HARMLESS", "yes")
     with Jail(ENTRY, limits=QUICK) as jail:
-        names, path, temporary, work, leads = jail.call(["environment"])
+        names, path, temporary, work, leads = jail.call(["environment"], Any)
         assert "HARMLESS" in names
         assert "MY_ACCESS_TOKEN" not in names
         assert "" not in path
@@ -158,7 +160,7 @@ def test_files_of_the_user_are_out_of_reach(tmp_path: Path, what: str) -> None:
     precious.write_text("mine")
     before = precious.stat()
     with Jail(ENTRY, limits=QUICK) as jail:
-        assert jail.call(["attempt", what, str(precious)]) in (REFUSED, "OSError")
+        assert jail.call(["attempt", what, str(precious)], Any) in (REFUSED, "OSError")
     after = precious.stat()
     assert precious.read_text() == "mine"
     assert (before.st_mode, before.st_mtime_ns, before.st_nlink) == (after.st_mode, after.st_mtime_ns, after.st_nlink)
@@ -169,24 +171,24 @@ def test_without_walls_the_same_calls_work(tmp_path: Path) -> None:
     precious = tmp_path / "precious"
     precious.write_text("mine")
     with Jail(ENTRY, limits=QUICK, walls=False) as jail:
-        assert jail.call(["attempt", "read", str(precious)]) == "done"
-        assert jail.call(["attempt", "delete", str(precious)]) == "done"
-        assert jail.call(["attempt", "unix"]) == "done"
+        assert jail.call(["attempt", "read", str(precious)], Any) == "done"
+        assert jail.call(["attempt", "delete", str(precious)], Any) == "done"
+        assert jail.call(["attempt", "unix"], Any) == "done"
 
 
 @enclosed
 def test_network_processes_and_signals_are_refused(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server, Jail(ENTRY, limits=QUICK, read=[tmp_path]) as jail:
         port = str(server.getsockname()[1])
-        assert jail.call(["attempt", "tcp", port]) == REFUSED
+        assert jail.call(["attempt", "tcp", port], Any) == REFUSED
         for what in ("udp", "unix", "fork", "posix_spawn", "exec", "death", "shm"):
-            assert jail.call(["attempt", what]) == REFUSED, what
+            assert jail.call(["attempt", what], Any) == REFUSED, what
         for what in ("signal", "ptrace"):
-            assert jail.call(["attempt", what, str(os.getpid())]) == REFUSED, what
-        assert jail.call(["attempt", "list", str(tmp_path)]) == "done"
-        assert jail.call(["attempt", "write", str(tmp_path / "new")]) == REFUSED
+            assert jail.call(["attempt", what, str(os.getpid())], Any) == REFUSED, what
+        assert jail.call(["attempt", "list", str(tmp_path)], Any) == "done"
+        assert jail.call(["attempt", "write", str(tmp_path / "new")], Any) == REFUSED
         for what in ("thread", "scratch"):
-            assert jail.call(["attempt", what]) == "done", what
+            assert jail.call(["attempt", what], Any) == "done", what
         server.settimeout(0.0)
         with pytest.raises(BlockingIOError):
             server.accept()
@@ -223,11 +225,11 @@ def test_what_waits_for_a_processor_has_more_time_but_not_for_ever(
         jail.start()
         if ends:
             with pytest.raises(ChildError) as error:
-                jail.call(["sleep", seconds])
+                jail.call(["sleep", seconds], Any)
             assert error.value.reason == "time"
             assert time.monotonic() - begin < 30.0
         else:
-            jail.call(["sleep", seconds])
+            jail.call(["sleep", seconds], Any)
 
 
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not tell")
