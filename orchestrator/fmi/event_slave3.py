@@ -13,15 +13,8 @@ from orchestrator.fmi.instance_clocks import ClockedSlave, InstanceClocks, next_
 from orchestrator.fmi.intermediate import IntermediateUpdates
 from orchestrator.fmi.messages import ERROR
 from orchestrator.fmi.model_description import FmuDescription
-from orchestrator.fmi.shorter_steps import SMALLEST
 from orchestrator.fmi.slave3 import NEAR, TERMINATES, Fmu3Slave
-from orchestrator.master.protocol import (
-    EventSlave,
-    EventUpdate,
-    StepDiscardedError,
-    StepOutcome,
-)
-from orchestrator.master.result import RunRemark
+from orchestrator.master.protocol import EventSlave, EventUpdate, StepOutcome
 
 
 class _State(NamedTuple):
@@ -42,8 +35,6 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
         self._clocks = InstanceClocks(name, description, self._call)
         self._in_event_mode = False
         self._next_event = math.inf
-        self._halves = False
-        self._halved: tuple[float, int] = (math.nan, 0)  # s, count
 
     def _necessary_functions(self) -> list[str]:
         modes = ["EnterEventMode", "EnterStepMode", "UpdateDiscreteStates"]
@@ -72,18 +63,6 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
         """Advance from ``time`` by at most ``step`` [s]; stop at the first event."""
         if self._worst >= ERROR:
             self._alive("fmi3DoStep")
-        length = step
-        while True:
-            try:
-                return self._advance(time, length)
-            except StepDiscardedError:
-                if not self._halves or length < SMALLEST * step:
-                    raise
-                length *= 0.5
-                first, count = self._halved
-                self._halved = (time if not count else first, count + 1)
-
-    def _advance(self, time: float, step: float) -> StepOutcome:
         end = self._last.value = time + step
         status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
         self._reached, self._size = time, step
@@ -104,16 +83,6 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
             self.came_elsewhere(1, time, reached - end)
         self._reached = min(max(reached, time), end) if stops else end
         return StepOutcome(self._reached, event, TERMINATES if ends else "")
-
-    def shorten_steps(self) -> bool:
-        """Do steps that the FMU discards in shorter ones, from the next run on."""
-        new, self._halves = not self._halves and self.model.can_vary_step, self.model.can_vary_step
-        return new
-
-    def take_remarks(self) -> list[RunRemark]:
-        (first, count), self._halved = self._halved, (math.nan, 0)
-        text = f"fmi3DoStep at t = {first:g} s returned Discard: shorter steps were tried"
-        return [*super().take_remarks(), *([RunRemark(self.name, text, count)] if count else [])]
 
     def do_step(self, time: float, step: float) -> None:
         """Advance from ``time`` to ``time + step`` [s]; events on the way are taken, by this slave alone."""

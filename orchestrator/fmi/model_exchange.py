@@ -105,16 +105,6 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         super().reset()
         self._forget()
 
-    def try_step(self, time: float, step: float) -> None:
-        self.do_step(time, step)
-
-    def last_successful_time(self) -> float | None:
-        return self._reached
-
-    def shorten_steps(self) -> bool:
-        """Refuse: the integrator chooses its steps itself."""
-        return False
-
     def _due(self) -> float:
         return self._next_event
 

@@ -37,7 +37,8 @@ class Undone(NamedTuple):
 
     text: str
     time: float
-    how: str = ""
+    reached: float | None
+    how: str
 
 
 def open_instance(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, tuple[Any, ...]]], Any]:
@@ -75,11 +76,17 @@ class _Host:
         self.send(number, values)  # variables of clocks keep their values between ticks
         return self._transfers[number][1]
 
-    def advance(self, method: str, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
+    def do_step(self, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
+        return self._advance("do_step", time, step)
+
+    def step(self, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
+        return self._advance("step", time, step)
+
+    def _advance(self, method: str, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
         try:
             return getattr(self._slave, method)(time, step), None
         except StepDiscardedError as error:
-            return None, Undone(str(error), error.time, getattr(error, "how", ""))
+            return None, Undone(str(error), error.time, error.reached, getattr(error, "how", ""))
 
     def get_state(self) -> int:
         number = max(self._states, default=0) + 1
@@ -115,7 +122,7 @@ class RemoteSlave(Slave):
         try:
             return self._jail.call((method, arguments), answer)
         except ChildError as error:
-            raise SlaveError(f"{self.name}: {error.explain(method)}", "time_limit") from None
+            raise SlaveError(f"{self.name}, {method}: {error.explain('the run')}", "time_limit") from None
 
     def set(self, values: Mapping[str, Value]) -> None:
         self._ask(NOTHING, "set", dict(values))
@@ -149,12 +156,12 @@ class RemoteSlave(Slave):
 
     def _advance(self, method: str, time: float, step: float) -> StepOutcome | None:
         """Do a step; return its outcome, where it has one."""
-        outcome, undone = self._ask(tuple[StepOutcome | None, Undone | None], "advance", method, time, step)
+        outcome, undone = self._ask(tuple[StepOutcome | None, Undone | None], method, time, step)
         if undone is None:
             return outcome
         if undone.how:
             raise RunEndedError(undone.text, self.name, undone.time, undone.how)
-        raise StepDiscardedError(undone.text, self.name, undone.time)
+        raise StepDiscardedError(undone.text, self.name, undone.time, undone.reached)
 
     def get_state(self) -> int:
         return self._ask(int, "get_state")
@@ -172,16 +179,8 @@ class RemoteSlave(Slave):
         self._ask(NOTHING, "reset")
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return warnings and shortened steps since this was last asked."""
+        """Return warnings since this was last asked."""
         return self._ask(list[RunRemark], "take_remarks")[:MOST_REMARKS]
-
-    def shorten_steps(self) -> bool:
-        """Do steps that the FMU discards in shorter ones, from the next run on.
-
-        Returns:
-            Whether the FMU can, and this is new.
-        """
-        return self._ask(bool, "shorten_steps")
 
     def close(self) -> None:
         self._jail.close()

@@ -23,7 +23,6 @@ from orchestrator.fmi.extraction import content_hash, extract_fmu
 from orchestrator.fmi.messages import DISCARD, ERROR, FATAL, OK, PENDING, STATUS, WARNING, Inbox
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.python_modules import PythonModules
-from orchestrator.fmi.shorter_steps import ShorterSteps
 from orchestrator.master.protocol import (
     ModelInterface,
     NativeCalls,
@@ -59,7 +58,6 @@ class FmuSlave(Slave):
         self._description = read_description(path) if description is None else description
         self.model: ModelInterface = self._description.model
         self._inbox = Inbox()
-        self._shorter: ShorterSteps | None = None
         self._worst = OK
         self._closed = False
         self._reached: float | None = None  # s, in a run
@@ -141,37 +139,26 @@ class FmuSlave(Slave):
             how = self._ends_run() if what.endswith("DoStep") else ""
             if how:
                 raise RunEndedError(text, self.name, self._reached or 0.0, how)
-            raise StepDiscardedError(text, self.name, self._reached or 0.0)
+            reached = self.last_successful_time() if what.endswith("DoStep") else None
+            raise StepDiscardedError(text, self.name, self._reached or 0.0, reached)
         raise SlaveError(text)
 
     def _ends_run(self) -> str:
         """Return how the FMU wants the run to end, after a step that it discarded; empty where it does not."""
         return ""
 
-    @abstractmethod
     def last_successful_time(self) -> float | None:
         """Return how far the FMU came in a step that it discarded.
 
         Returns:
             The time [s]; None where it does not say.
         """
+        return self._reached
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return warnings and shortened steps since this was last asked."""
-        shortened = [] if self._shorter is None else self._shorter.take_remarks()
+        """Return warnings since this was last asked."""
         left_out = [RunRemark(self.name, self._description.left_out)] if self._description.left_out else []
-        return [*left_out, *self._inbox.take_remarks(self.name), *shortened]
-
-    def shorten_steps(self) -> bool:
-        """Do steps that the FMU discards in shorter ones, from the next run on.
-
-        Returns:
-            Whether the FMU can, and this is new.
-        """
-        if self._shorter is not None or not self.model.can_vary_step:
-            return False
-        self._shorter = ShorterSteps(self)
-        return True
+        return [*left_out, *self._inbox.take_remarks(self.name)]
 
     def _require_time(self, time: float) -> float:
         """Return the time that the FMU says for its next event [s]; infinity for none, an error where it is no time."""
@@ -289,24 +276,6 @@ class FmuSlave(Slave):
         """Exit initialisation mode."""
         self._call("ExitInitializationMode")
 
-    def do_step(self, time: float, step: float) -> None:
-        """Advance from ``time`` to ``time + step`` [s], inputs held."""
-        if self._worst >= ERROR:
-            self._alive(f"{self.PREFIX}DoStep")
-        if self._shorter is not None:
-            self._shorter.do_step(time, step)
-        else:
-            self.try_step(time, step)
-
-    @abstractmethod
-    def try_step(self, time: float, step: float) -> None:
-        """Step once; see ``do_step``.
-
-        Args:
-            time: [s].
-            step: [s].
-        """
-
     def get_state(self) -> Any:
         """Return a handle of a copy of the whole state."""
         state = ctypes.c_void_p()
@@ -350,7 +319,7 @@ class FmuSlave(Slave):
 
     def native_calls(self, inputs: Sequence[str], outputs: Sequence[str]) -> NativeCalls | None:
         """Return addresses for calls from machine code; ``None`` where it cannot make them."""
-        if self._shorter is not None or self._worst >= ERROR or self.model.has_events:
+        if self._worst >= ERROR or self.model.has_events:
             return None
         variables = self.model.variables
         if any(variables[name].type == "String" for name in (*inputs, *outputs)):

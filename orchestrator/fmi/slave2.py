@@ -9,7 +9,7 @@ from typing import Any
 from orchestrator.errors import FmuError
 from orchestrator.fmi.extraction import extract_fmu, library_of
 from orchestrator.fmi.farewell import ends_cleanly
-from orchestrator.fmi.messages import OK, make_callbacks
+from orchestrator.fmi.messages import ERROR, OK, make_callbacks
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.protocol import Value
@@ -106,7 +106,10 @@ class Fmu2Slave(Fmu2Instance):
         status = self._library.fmi2GetRealStatus(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(time))
         return time.value if status == OK and math.isfinite(time.value) else None
 
-    def try_step(self, time: float, step: float) -> None:
+    def do_step(self, time: float, step: float) -> None:
+        """Advance from ``time`` to ``time + step`` [s], inputs held."""
+        if self._worst >= ERROR:
+            self._alive("fmi2DoStep")
         status = self._step(self._component, time, step, 1)
         self._reached, self._size = time, step
         if status:

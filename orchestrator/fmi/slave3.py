@@ -155,11 +155,10 @@ class Fmu3Slave(Fmu3Instance):
         """Return the variables that intermediate updates set, and the function that does it, if any."""
         return (ctypes.c_uint * 0)(), None
 
-    def last_successful_time(self) -> float | None:
-        """Return where the FMU is after a step that it discarded: where it was, for FMI 3.0 discards all of it."""
-        return self._reached
-
-    def try_step(self, time: float, step: float) -> None:
+    def do_step(self, time: float, step: float) -> None:
+        """Advance from ``time`` to ``time + step`` [s], inputs held."""
+        if self._worst >= ERROR:
+            self._alive("fmi3DoStep")
         end = self._last.value = time + step
         status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
         self._reached, self._size = time, step

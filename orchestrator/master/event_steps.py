@@ -16,7 +16,7 @@ from orchestrator.master.events import MOST_EVENTS, EventIteration
 from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.input_leads import InputLeads
 from orchestrator.master.iterated import loop_groups
-from orchestrator.master.protocol import RunEndedError, StepDiscardedError, StepOutcome
+from orchestrator.master.protocol import RunEndedError, StepOutcome
 from orchestrator.master.wiring import Stage, gather
 
 Array = NDArray[np.float64]
@@ -24,9 +24,6 @@ Slots = NDArray[np.int64]
 
 MOST_SHORTENINGS = 100
 """Times that a window may become shorter, because slaves stop earlier and earlier when they are taken back."""
-
-MOST_HALVINGS = 10
-"""Halvings of a window that a slave discards."""
 
 
 class _StoppedError(Exception):
@@ -168,19 +165,6 @@ class FixedSteps:
         values = self.values.copy()
         self._leads.begin(values)
         try:
-            for _ in range(MOST_HALVINGS):
-                try:
-                    return self._meet(begin, end, values)
-                except RunEndedError:
-                    raise
-                except StepDiscardedError:
-                    if not all(group.can_go_back for group in self._groups):
-                        raise
-                    for group in self._groups:
-                        group.restore(begin)
-                    self.values[:] = values
-                    self.undone += 1
-                    end = 0.5 * (begin + end)
             return self._meet(begin, end, values)
         finally:
             for group in self._groups:

@@ -27,11 +27,14 @@ class StepDiscardedError(SlaveError):
     Attributes:
         instance: name of the slave.
         time: beginning of the step [s].
+        reached: to which the slave came [s]; None: it does not say.
     """
 
-    def __init__(self, text: str, instance: str = "", time: float = math.nan) -> None:
+    def __init__(
+        self, text: str, instance: str = "", time: float = math.nan, reached: float | None = None
+    ) -> None:  # fmt: skip
         super().__init__(text)
-        self.instance, self.time = instance, time
+        self.instance, self.time, self.reached = instance, time, reached
 
 
 class RunEndedError(StepDiscardedError):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from orchestrator.master.own_steps import own_step_remarks
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import AT_EVENT, RunEndedError, Slave, StepDiscardedError, Value
 from orchestrator.master.result import MACHINE_CODE, PYTHON, EventStatistics, Loop, Recording, RunRemark, Statistics
+from orchestrator.master.shorter_steps import ShorterSteps
 from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, Quantity, System, split
 from orchestrator.master.wiring import Array, Slots, Wiring, gather, wire
@@ -150,11 +151,11 @@ class Session:
                 events = EventStatistics() if self._events is None else self._events.statistics()
                 return Statistics(steps, 0, calls, steps, events=events), [RunRemark(error.instance, text)]
             except StepDiscardedError as error:
-                shorten = getattr(self._slaves[error.instance], "shorten_steps", None)
-                if isinstance(self.algorithm, Adaptive) or shorten is None or not shorten():
+                fixed = not self._slaves[error.instance].model.can_vary_step or error.instance in self._shortened
+                if fixed or isinstance(self.algorithm, Adaptive):
                     raise SlaveError(str(error)) from None
                 self._shortened.add(error.instance)
-                self._compiled = None
+                self.close()
 
     def _remarks(self, rows: Array) -> list[RunRemark]:
         """Return what the slaves have to say, and what the recorded signals show of their own steps."""
@@ -185,9 +186,9 @@ class Session:
             self._used.clear()
             try:
                 for instance in self.system.instances:
-                    self._slaves[instance.name] = self._create(instance)
-                for name in self._shortened:
-                    self._slaves[name].shorten_steps()  # type: ignore[attr-defined]
+                    slave = self._create(instance)
+                    shortened = instance.name in self._shortened
+                    self._slaves[instance.name] = cast(Slave, ShorterSteps(slave)) if shortened else slave
                 self._wiring = wire(self.layout, self._slaves)
                 if any(instance.model.has_events for instance in self.system.instances):
                     self._events = EventIteration(self._wiring)

@@ -13,6 +13,7 @@ from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import read_description
 from orchestrator.master.protocol import EventUpdate, RunEndedError, StepDiscardedError, StepOutcome
+from orchestrator.master.shorter_steps import ShorterSteps
 from tests.support.ball3 import build_ball
 from tests.support.c_fmu import have_compiler
 from tests.support.event3_fmu import build_event3_fmu
@@ -139,12 +140,12 @@ def test_a_discarded_step_leaves_the_slave_well_and_is_shortened_where_that_is_a
     slave = started(build_event3_fmu(tmp_path, "DISCARDS_ABOVE=0.03"))
     with pytest.raises(StepDiscardedError):
         slave.step(0.0, 0.1)
-    assert slave.shorten_steps()
-    assert not slave.shorten_steps()
-    assert slave.step(0.0, 0.1) == StepOutcome(0.025, False)
-    (remark,) = slave.take_remarks()
-    assert (remark.text, remark.count) == ("fmi3DoStep at t = 0 s returned Discard: shorter steps were tried", 2)
-    slave.do_step(0.025, 0.575)
+    shorter = ShorterSteps(slave)
+    assert shorter.step(0.0, 0.1) == StepOutcome(0.025, False)
+    (remark,) = shorter.take_remarks()
+    text = "the step at t = 0 s was discarded: done in shorter steps, the least of 0.025 s"
+    assert (remark.text, remark.count) == (text, 1)
+    shorter.do_step(0.025, 0.575)
     assert slave.get(["n"]) == [2]
     slave.close()
 

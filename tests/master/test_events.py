@@ -1,6 +1,7 @@
 """Events between slaves under the algorithms with a fixed step, on slaves made of functions."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -126,23 +127,28 @@ def test_a_step_that_ends_early_without_an_event_takes_all_along(algorithm) -> N
     assert statistics.events.instants == 1
 
 
+@pytest.mark.parametrize("saves", [True, False])
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_a_discarded_step_is_done_in_parts(algorithm) -> None:
+def test_a_discarded_step_is_done_in_parts(algorithm, saves) -> None:
+    ball = replace(BALL, can_save_state=saves)
+
     def careful(v, time, step):
         if step > 0.03:
             raise StepDiscardedError("ball: too long", "ball", time)
         return fall(v, time, step)
 
-    system = System((clock_watch([]), event_instance("ball", BALL, careful, bounce)))
+    system = System((clock_watch([]), event_instance("ball", ball, careful, bounce)))
     with Session(system, ["ball.h"], algorithm(0.1), 1.0) as session:
         result = session.run()
+    (remark,) = result.remarks
+    assert "done in shorter steps, the least of 0.0" in remark.text
     np.testing.assert_allclose(result["ball.h"], [height(t) for t in result.time], rtol=0, atol=1e-12)
     assert result.statistics.rejected >= 20
 
     def never(v, time, step):
         raise StepDiscardedError("ball: no step at all", "ball", time)
 
-    system = System((event_instance("ball", BALL, never, bounce),))
+    system = System((event_instance("ball", ball, never, bounce),))
     with Session(system, ["ball.h"], algorithm(0.1), 1.0) as session, pytest.raises(SlaveError, match="no step at all"):
         session.run()
 

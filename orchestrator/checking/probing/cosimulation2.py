@@ -6,7 +6,7 @@ from typing import Any
 from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import MOST_PARTS, Driver
 from orchestrator.checking.probing.job import ProbeJob
-from orchestrator.checking.probing.statuses import DISCARD, OK, PENDING, WARNING, DiscardedError, TerminatedError
+from orchestrator.checking.probing.statuses import DISCARD, OK, PENDING, WARNING, TerminatedError
 
 _DO_STEP_STATUS, _TERMINATED = 0, 3
 NOT_DONE = "is discarded, and the end of the run asked for: a step that is done returns OK (`return True` in Python)"
@@ -39,10 +39,9 @@ class CoSimulation2(Driver):
             saved = self.get_state() if self.job.careful else None
             complete = self._step(t + done * h, h, when)
             if not complete:
-                self.report_discard(when)
                 again = self.job.saves and self.job.varies and not self.job.careful
-                if saved is None or parts >= MOST_PARTS:
-                    raise DiscardedError(f"a step was discarded {when}", again)
+                self.report_discard(when, saved is not None and parts < MOST_PARTS, again)
+                assert saved is not None
                 self.set_state(saved)  # FMI 2.0 allows no other way on
                 parts, done = 2 * parts, 2 * done
             if saved is not None:

@@ -8,7 +8,7 @@ from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import MOST_PARTS
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
-from orchestrator.checking.probing.statuses import DISCARD, OK, WARNING, DiscardedError, StatusError, TerminatedError
+from orchestrator.checking.probing.statuses import DISCARD, OK, WARNING, StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable
 
 _MOST_RETURNS = 1000
@@ -68,8 +68,7 @@ class CoSimulation3(EventDriver):
                 found = self._step(t, goal, slack, when)
                 if found is None:
                     h = 0.5 * (goal - t)
-                    if not self.job.varies or h * MOST_PARTS < size:
-                        raise DiscardedError(f"a step was discarded {when}")
+                    self.report_discard(when, self.job.varies and h * MOST_PARTS >= size)
                     continue
                 wanted, reached = found
                 t = reached if reached < goal - slack else goal
@@ -87,7 +86,6 @@ class CoSimulation3(EventDriver):
             ("out", "double", 1, goal),
         )  # fmt: skip
         if status == DISCARD:
-            self.report_discard(when)
             return None
         if status not in (OK, WARNING):
             raise self.status_error("DoStep", status, when)

@@ -6,7 +6,7 @@ from typing import Any
 from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.instance import FmuInstance
 from orchestrator.checking.probing.job import ProbeJob, references
-from orchestrator.checking.probing.statuses import odd
+from orchestrator.checking.probing.statuses import DiscardedError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
 
 Report = Callable[..., None]
@@ -126,10 +126,12 @@ class Driver(FmuInstance):
         """Go from the communication point ``t`` [s] to the next, ``size`` [s] later."""
         raise NotImplementedError
 
-    def report_discard(self, when: str) -> None:
-        """Report that a step was discarded."""
+    def report_discard(self, when: str, shorter: bool, again: bool = False) -> None:
+        """Report that a step was discarded, and raise unless a ``shorter`` one can be tried, at once or ``again``."""
         name = f"{self.library.names.prefix}DoStep"
         self.report("step.discarded", f"{name} must do the steps that it is asked for, but discards one", when=when)
+        if not shorter:
+            raise DiscardedError(f"a step was discarded {when}", again)
 
     def terminate(self) -> None:
         """End the simulation."""
