@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.api.scenario_sweep import sweep_scenario
 from orchestrator.api.simulate import simulate
+from orchestrator.cli import main
 from orchestrator.errors import OrchestratorError
 from tests.support.answers_fmu import build_answers_fmu
 from tests.support.c_fmu import have_compiler
@@ -49,6 +50,21 @@ def test_warnings_discards_and_an_early_end_are_told_across_processes(tmp_path: 
     short = simulate(scenario(tmp_path / "long", "LONGEST=0.03", saves=True))
     assert short["a.x"][-1] == pytest.approx(2.0)
     assert all("done in shorter steps" in r.text for r in short.run.remarks)
+
+
+@pytest.mark.parametrize(
+    ("macro", "said"),
+    [
+        ("HANGS", "a, do_step: the run must take at most 3 s (`--time-limit`), but takes longer"),
+        ("DIES", "a, do_step: the run must come to its end, but the process was ended by SIGABRT"),
+    ],
+)
+def test_how_a_process_ends_is_said_as_for_one_process(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], macro: str, said: str
+) -> None:
+    words = ["simulate", "--scenario", str(scenario(tmp_path, macro)), "--out", str(tmp_path / "out")]
+    assert main([*words, "--time-limit", "3"]) == 1
+    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_what_a_sweep_says_of_it_works(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@
  *   LONGEST=h       longer steps are discarded; COMES_TO: after that much, which fmi2LastSuccessfulTime says
  *   OWN_STEP=h      steps of its own, until the communication point is reached or passed
  *   REFUSES         fmi2DoStep prints why and returns fmi2Error
- *   PENDS           fmi2DoStep returns fmi2Pending
+ *   PENDS           fmi2DoStep returns fmi2Pending; HANGS: it does not return; DIES: it ends the process
  *   ONCE            a second instance in a process is refused
  *   RESETS=code     what fmi2Reset does after it began anew, with x and gain of before; LEFT: a variable of the library that outlives instances
  */
@@ -118,6 +118,12 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean k)
     s->last = t;
 #ifdef PENDS
     return fmi2Pending;
+#endif
+#ifdef HANGS
+    for (;;) s->last = t;
+#endif
+#ifdef DIES
+    abort();
 #endif
 #ifdef REFUSES
     printf("steps must be whole numbers of 0.1 s\n");

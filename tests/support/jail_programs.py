@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import ScenarioError, SlaveError
 
 
 def opened(argument: Any) -> Callable[[Any], Any]:
@@ -30,6 +30,11 @@ def _array(_: Any, n: int) -> Any:
 
 def _refuse(_: Any) -> None:
     raise ScenarioError("`it` must be right, but is wrong")
+
+
+def _print(_: Any) -> None:
+    print("no licence")
+    raise SlaveError("it returned Error")
 
 
 def _fail(_: Any) -> None:

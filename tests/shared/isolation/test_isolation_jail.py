@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from orchestrator.errors import ChildError, ScenarioError, SimulationError
+from orchestrator.errors import ChildError, ScenarioError, SimulationError, SlaveError
 from orchestrator.shared.isolation import jail as jail_module
 from orchestrator.shared.isolation.jail import Jail, Limits
 from orchestrator.shared.isolation.scratch import PREFIX, Scratch
@@ -103,6 +103,8 @@ def test_errors_come_back_as_they_are_and_the_child_lives() -> None:
             jail.call(["refuse"], Any)
         with pytest.raises(SimulationError, match=r"KeyError: 'odd'"):
             jail.call(["fail"], Any)
+        with pytest.raises(SlaveError, match=r"it returned Error \(it printed: no licence\)"):
+            jail.call(["print"], Any)
         assert jail.call(["echo", 1], Any) == [None, 1]
 
 
