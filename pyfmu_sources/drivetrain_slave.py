@@ -119,6 +119,9 @@ class Drivetrain(PlantSlave):
         ("state.w", "1", 1.0, "Memory of the shaft's hysteresis"),
         ("state.y", "N.m", 100.0, "Filtered torque request"),
     )
+    jumping_states: ClassVar[tuple[str, ...]] = (
+        "state.omega_m", "state.theta_l", "state.omega_l", "state.s", "state.z_m", "state.z_l", "state.w",
+    )  # fmt: skip
 
     response: ClassVar[Callable[..., Any]] = rates_and_outputs
     response_outputs: ClassVar[tuple[str, ...]] = ("theta_m", "theta_l", "omega_m", "omega_l", "T_m", "T_shaft")

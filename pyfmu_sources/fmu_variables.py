@@ -26,7 +26,8 @@ class FmuVariable(NamedTuple):
 
     ``minimum`` and ``maximum`` are closed bounds, and finiteness is demanded where there are none. ``depends_on``
     names the inputs from which an output is computed at the same communication point; ``starts_from``
-    names what determines its initial value; ``derivative_of`` the state whose derivative it is.
+    names what determines its initial value; ``derivative_of`` the state whose derivative it is. ``reinit`` marks a
+    state that an event may change.
     """
 
     name: str
@@ -43,6 +44,7 @@ class FmuVariable(NamedTuple):
     depends_on: tuple[str, ...] = ()
     starts_from: tuple[str, ...] = ()
     derivative_of: str = ""
+    reinit: bool = False
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -46,7 +46,7 @@ class PlantSlave(SlaveBase):
     """A plant driven by a torque that is limited and may come late; subclasses hold its state and move it."""
 
     # The hidden attribute that model exchange integrates; a plant's `continuous_states` are name, unit, nominal value
-    # and meaning of its items. Directional derivatives are of its `response`: a function of hidden attributes and
+    # and meaning of its items, `jumping_states` the names of those that events may set anew. Directional derivatives are of its `response`: a function of hidden attributes and
     # inputs by their names, which returns the derivatives of the states, and `response_outputs`.
     state_attribute: ClassVar[str] = "_x"
 
@@ -105,10 +105,14 @@ class PlantSlave(SlaveBase):
             self._known.append((step, table))
         return len(self._known) - 1
 
-    def _require_no_time_events(self) -> None:
-        """Refuse effects that need time events, which model exchange does not have here."""
+    def _require_no_dead_time(self) -> None:
+        """Refuse a dead time, which needs time events: model exchange does not have them here."""
         if self._p.input_delay_delay > 0.0:
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
+
+    def _require_no_time_events(self) -> None:
+        """Refuse effects that need time events."""
+        self._require_no_dead_time()
         if self._p.rate_limit_rate < BIG:
             raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
 

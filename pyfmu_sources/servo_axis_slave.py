@@ -52,7 +52,7 @@ class ServoAxis(PlantSlave):
         ("state.z", "rad", 1e-3, "Bristles of the friction"),
         ("state.y", "N.m", 100.0, "Filtered torque request"),
     )
-
+    jumping_states: ClassVar[tuple[str, ...]] = ("state.omega_m", "state.z")
     response: ClassVar[Callable[..., Any]] = rates_and_outputs
     response_outputs: ClassVar[tuple[str, ...]] = ("theta_m", "omega_m", "T_m")
     # Outputs that follow inputs at once in model exchange; in co-simulation they follow at the end of a step.

@@ -9,16 +9,14 @@ from typing import Annotated, Any, ClassVar
 from . import train_steps
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
-from .laws.drive import saturated
-from .parameter_rows import BIG
-from .plant_slave import KNOWN_STEPS, PlantSlave
+from .plant_slave import KNOWN_STEPS, T_L, PlantSlave, input_variables, parameter_variable, start_variable
 from .slave_base import TOO_STIFF, StepRefusedError
 from .train_equations import PARAMETERS, Mode, State, TrainParameters, initial_mode, reported_contacts
 from .train_modes import Indicators, Outputs, after_events, indicators, output_rates, rates_and_outputs, state_rates
 from .train_steps import Table
 
-U, T_L = range(2)
-FIRST_OUTPUT, CONTACT_1, CONTACT_2 = 2, 13, 14
+FIRST_OUTPUT = T_L + 1
+CONTACT_1, CONTACT_2 = FIRST_OUTPUT + 11, FIRST_OUTPUT + 12
 FIRST_PARAMETER = CONTACT_2 + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
 # Angles [rad] beyond which neighbouring numbers are over 2 mrad apart: a gap and most motion are lost in rounding.
@@ -56,8 +54,7 @@ class TwoStageTrain(PlantSlave):
 
     title = "Drivetrain of two stages: motor with lag, intermediate shaft, load, a gap in either stage or both"
     table: ClassVar[tuple[FmuVariable, ...]] = (
-        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque", -BIG, BIG, nominal=100.0),
-        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the load", -BIG, BIG, nominal=100.0),
+        *input_variables("motor ", "load"),
         _output(
             "theta_m", "rad", "Motor angle as measured", 1.0, "theta_m_start", "effects.sensor_offset.motor.offset"
         ),
@@ -75,8 +72,8 @@ class TwoStageTrain(PlantSlave):
         _output("twist_2", "rad", "Twist of stage 2 from mid-gap, at the load", 0.1, *_TWIST_2),
         _contact("contact_1", 1, (*_TWIST_1, "alpha_1")),
         _contact("contact_2", 2, (*_TWIST_2, "alpha_2")),
-        *(FmuVariable(p.name, "parameter", p.unit, p.default, p.description, p.minimum, p.maximum) for p in PARAMETERS),
-        *(FmuVariable(name, "parameter", unit, 0.0, text, -1e12, 1e12) for name, unit, text in _STARTS),
+        *(parameter_variable(row) for row in PARAMETERS),
+        *(start_variable(*start) for start in _STARTS),
     )  # fmt: skip
     terminals: ClassVar[Terminals] = {
         "shaft": {"angle": "theta_l", "speed": "omega_l", "torque": "T_l"},
@@ -88,8 +85,6 @@ class TwoStageTrain(PlantSlave):
     _p: TrainParameters
     _known: KnownSteps
 
-    # The hidden attribute that model exchange integrates, and its items: name, unit, nominal value, meaning.
-    state_attribute: ClassVar[str] = "_x"
     continuous_states: ClassVar[tuple[tuple[str, str, float, str], ...]] = (
         ("state.theta_m", "rad", 1.0, "Motor angle"),
         ("state.omega_m", "rad/s", 10.0, "Motor speed"),
@@ -99,9 +94,8 @@ class TwoStageTrain(PlantSlave):
         ("state.omega_l", "rad/s", 10.0, "Load speed"),
         ("state.T_m", "N.m", 100.0, "Motor torque"),
     )
+    jumping_states: ClassVar[tuple[str, ...]] = ("state.omega_m", "state.omega_s", "state.omega_l")
 
-    # What directional derivatives are of: a function of hidden attributes and inputs by their names, which returns the
-    # derivatives of the states and these outputs.
     response: ClassVar[Callable[..., Any]] = rates_and_outputs
     response_outputs: ClassVar[tuple[str, ...]] = (
         "theta_m", "theta_s", "theta_l", "omega_m", "omega_s", "omega_l", "T_m", "T_1", "T_2", "twist_1", "twist_2",
@@ -118,20 +112,10 @@ class TwoStageTrain(PlantSlave):
         self._start_requests()
         self._write()
 
-    def _request(self) -> float:
-        """Return the requested torque within its limit [N.m]."""
-        return saturated(self.real[U], self._p.torque_saturation_limit)
-
-    def _dead_time(self) -> float:
-        """Return how late a request acts [s]."""
-        return self._p.input_delay_delay
-
     def _prepared(self, step: float) -> Table:
-        """Return what steps of this length need again and again."""
         return _prepare(self._p, step)
 
     def _moved(self, x: State, mode: Mode, u: float, time: float, step: float) -> tuple[State, Mode]:
-        """Return state and mode after a piece of a step."""
         known = self._known
         number = self._step_number(time, step)
         return train_steps.advance(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
@@ -139,13 +123,11 @@ class TwoStageTrain(PlantSlave):
     def _moved_to_event(
         self, x: State, mode: Mode, u: float, time: float, step: float
     ) -> tuple[State, Mode, float, int]:
-        """Return state and mode at the first event of a piece, how far it is, and the guard that ends the mode."""
         known = self._known
         number = self._step_number(time, step)
         return train_steps.advance_to_event(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
 
     def _take(self, x: State, mode: Mode, acting: float, step: float) -> None:
-        """Take over a state that is finite and not too far away to be told from its neighbours, or refuse the step."""
         if x[0] != x[0]:
             raise StepRefusedError(f"the step of {step!r} s {TOO_STIFF}")
         if not (abs(x[0]) <= FARTHEST and abs(x[2]) <= FARTHEST and abs(x[4]) <= FARTHEST):
@@ -187,8 +169,7 @@ class TwoStageTrain(PlantSlave):
 
     def begin_exchange(self) -> None:
         """Refuse a dead time, which needs time events, in model exchange."""
-        if self._p.input_delay_delay > 0.0:
-            raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
+        self._require_no_dead_time()
 
     def observe(self) -> None:
         """Write the outputs at the inputs of the moment, for model exchange."""

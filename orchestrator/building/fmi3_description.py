@@ -149,6 +149,7 @@ def _variable(array: Array, references: dict[str, int], plant: bool) -> Element:
         "start": " ".join(_number(variable, variable.start) for variable in array.variables).strip(),
         "intermediateUpdate": "true" if plant and first.causality in ("input", "output") and not whole else "",
         "derivative": str(references[first.derivative_of]) if first.derivative_of else "",
+        "reinit": "true" if first.reinit else "",
     }
     element = Element(kind, {key: value for key, value in attributes.items() if value})
     for size in array.dimensions:

@@ -39,7 +39,10 @@ def _states(root: Element, cls: Any) -> None:
     """Name states and derivatives, and what depends on them."""
     index = {variable.name: position for position, variable in enumerate(cls.table, start=1)}
     rates = {variable.name: variable.derivative_of for variable in cls.table if variable.derivative_of}
+    jumping = {variable.name for variable in cls.table if variable.reinit}
     for variable in root.iter("ScalarVariable"):
+        if variable.attrib["name"] in jumping:
+            variable[0].set("reinit", "true")
         if variable.attrib["name"] in rates:
             variable[0].set("derivative", str(index[rates[variable.attrib["name"]]]))
     states = sorted(index[name] for name in rates.values())

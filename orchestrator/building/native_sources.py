@@ -91,8 +91,9 @@ def _hide_whole_output(variable: FmuVariable) -> FmuVariable:
 def _state_variables(cls: Any) -> Iterator[FmuVariable]:
     """Yield the variables by which model exchange names states and derivatives."""
     states = getattr(cls, "continuous_states", ())
+    jumping = getattr(cls, "jumping_states", ())
     for name, unit, nominal, text in states:
-        yield FmuVariable(name, "local", unit, None, text, nominal=nominal)
+        yield FmuVariable(name, "local", unit, None, text, nominal=nominal, reinit=name in jumping)
     for name, unit, _, text in states:
         rate = {"rad": "rad/s", "rad/s": "rad/s2", "N.m": "N.m/s", "1": "1/s"}.get(unit, f"{unit}/s")
         yield FmuVariable(f"der({name})", "local", rate, None, f"Rate of: {text}", derivative_of=name)

@@ -1,6 +1,5 @@
 """Model exchange of the native single axis: against its co-simulation, located events and differences."""
 
-import ctypes
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +13,15 @@ from orchestrator.building.compilers import find_compiler
 from pyfmu_sources import servo_axis
 from pyfmu_sources.axis_equations import DEFAULTS, NAMES
 from pyfmu_sources.parameter_rows import with_values
-from tests.support.model_exchange import END, STEP, event_times, first_time, request, stepped_and_exchanged
+from tests.support.model_exchange import (
+    END,
+    STEP,
+    compare_directional_derivatives,
+    event_times,
+    first_time,
+    request,
+    stepped_and_exchanged,
+)
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
 
@@ -94,21 +101,7 @@ def test_directional_derivatives_are_those_of_differences(axis: Path, name: str)
     fmu.newDiscreteStates()
     fmu.enterContinuousTimeMode()
 
-    def response(point: np.ndarray) -> np.ndarray:
-        fmu.setReal([references["u"], references["T_l"]], point[5:].tolist())
-        fmu.setContinuousStates((ctypes.c_double * 5)(*point[:5]), 5)
-        return np.array(fmu.getReal([references[n] for n in unknown]))
-
-    rng = np.random.default_rng(sorted(CASES).index(name))
-    for _ in range(5):
-        point = rng.normal(0.0, 0.05, 7) * nominal
-        for n, variable in enumerate(known):
-            step = np.zeros(7)
-            step[n] = 1e-5 * nominal[n]
-            expected = (response(point + step) - response(point - step)) / (2.0 * step[n])
-            response(point)
-            column = fmu.getDirectionalDerivative([references[v] for v in unknown], [references[variable]], [1.0])
-            assert np.max(np.abs(column - expected)) <= 1e-6 * max(np.max(np.abs(expected)), 1.0), variable
+    compare_directional_derivatives(fmu, references, known, unknown, nominal, sorted(CASES).index(name))
     fmu.terminate()
     fmu.freeInstance()
 

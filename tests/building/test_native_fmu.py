@@ -8,7 +8,8 @@ import pytest
 
 from orchestrator.building.build import ensure_built
 from orchestrator.building.compilers import find_compiler
-from tests.support.native_bits import EFFECTS, MODELS, Comparison
+from pyfmu_sources.two_stage_train_slave import TwoStageTrain
+from tests.support.native_bits import EFFECTS, MODELS, TRAIN, Comparison, drivetrain_values
 from tests.support.native_pair import Driver, random_calls
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
@@ -20,6 +21,7 @@ NAMES = {
     "BacklashEstimator": "backlash_estimator_slave",
     "BacklashCompensator": "backlash_compensator_slave",
     "ServoAxis": "servo_axis_slave",
+    "TwoStageTrain": "two_stage_train_slave",
 }
 
 
@@ -41,14 +43,24 @@ def test_random_calls_give_the_same_as_the_python_fmu(native: dict[str, Path], n
 def test_every_bit_of_every_model_and_effect(native: dict[str, Path], effect: str) -> None:
     """A sample; ``python -m benchmarks.native_bits`` does a million."""
     for model in range(1, len(MODELS) + 1):
-        comparison = Comparison(native["Drivetrain"], model, EFFECTS.get(effect, {}), seed=10 + model)
+        comparison = Comparison(
+            native["Drivetrain"], drivetrain_values(model, EFFECTS.get(effect, {})), seed=10 + model
+        )
         for n in range(150):
             assert comparison.step(), f"{MODELS[model - 1]}, {effect}: step {n}"
         assert comparison.taken > 130
 
 
+@pytest.mark.parametrize("case", TRAIN)
+def test_every_bit_of_two_stages(native: dict[str, Path], case: str) -> None:
+    comparison = Comparison(native["TwoStageTrain"], TRAIN[case], 3, TwoStageTrain)
+    for n in range(400):
+        assert comparison.step(), f"{case}: step {n}"
+    assert comparison.taken > 350
+
+
 def test_a_difference_in_the_last_bit_is_seen(native: dict[str, Path]) -> None:
-    comparison = Comparison(native["Drivetrain"], 2, {}, seed=1)
+    comparison = Comparison(native["Drivetrain"], drivetrain_values(2, {}), seed=1)
     stiffness = 2
     p = comparison.python._p
     comparison.python._p = tuple(x * (1.0 + 2.0**-52) if n == stiffness else x for n, x in enumerate(p))

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compi
 
 NAMES = [
     "Drivetrain", "KalmanEstimator", "LqrController", "ServoAxis", "MotorHalf", "LoadHalf", "BacklashEstimator",
-    "BacklashCompensator",
+    "BacklashCompensator", "TwoStageTrain",
 ]  # fmt: skip
 ESTIMATES = ("theta_m_hat", "omega_m_hat", "theta_l_hat", "omega_l_hat", "T_l_hat", "T_m_hat")
 

@@ -1,10 +1,12 @@
 """Model exchange of native FMUs by FMPy's CVode beside their own co-simulation; used by tests."""
 
+import ctypes
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from fmpy import simulate_fmu
+from fmpy.fmi2 import FMU2Model
 
 STEP, END = 1e-2, 2.0
 TOLERANCE = 1e-12
@@ -63,3 +65,26 @@ def event_times(fmu: Path, start: dict[str, float]) -> list[float]:
     times = exchanged(fmu, start, [], events=True)["time"]
     doubled = times[1:][np.diff(times) == 0.0]
     return [float(t) for t in doubled if abs(t / STEP - round(t / STEP)) > 1e-6]
+
+
+def compare_directional_derivatives(
+    fmu: FMU2Model, references: dict[str, int], known: list[str], unknown: list[str], nominal: np.ndarray, seed: int
+) -> None:
+    """Hold each column at five random points to a central difference; ``known``: all states, then ``u`` and ``T_l``."""
+    count = len(known) - 2
+
+    def response(point: np.ndarray) -> np.ndarray:
+        fmu.setReal([references["u"], references["T_l"]], point[count:].tolist())
+        fmu.setContinuousStates((ctypes.c_double * count)(*point[:count]), count)
+        return np.array(fmu.getReal([references[n] for n in unknown]))
+
+    rng = np.random.default_rng(seed)
+    for _ in range(5):
+        point = rng.normal(0.0, 0.05, len(known)) * nominal
+        for n, variable in enumerate(known):
+            step = np.zeros(len(known))
+            step[n] = 1e-5 * nominal[n]
+            expected = (response(point + step) - response(point - step)) / (2.0 * step[n])
+            response(point)
+            column = fmu.getDirectionalDerivative([references[v] for v in unknown], [references[variable]], [1.0])
+            assert np.max(np.abs(column - expected)) <= 1e-6 * max(np.max(np.abs(expected)), 1.0), variable

@@ -1,14 +1,13 @@
-"""The native plant beside the Python slave, step by step in the same calls; used by tests and benchmarks."""
+"""A native plant beside the Python slave, step by step in the same calls; used by tests and benchmarks."""
 
 import ctypes
 import random
 from pathlib import Path
 from typing import Any
 
-from pyfmu_sources.drivetrain_slave import CONTACT, T_SHAFT, THETA_M, Drivetrain
+from pyfmu_sources.drivetrain_slave import Drivetrain
 from tests.support.native_pair import Driver
 
-NAMES = [variable.name for variable in Drivetrain.table]
 MODELS = ("none", "dead_zone", "nordin", "hysteresis", "rigid_impact", "elastic_impact")
 EFFECTS: dict[str, dict[str, float]] = {
     "input_delay": {"effects.input_delay.delay": 0.0123},
@@ -50,30 +49,45 @@ EFFECTS: dict[str, dict[str, float]] = {
 }
 
 
-class Comparison:
-    """One Python slave and one native instance in step."""
+TRAIN: dict[str, dict[str, float]] = {
+    "both gaps": {},
+    "light shaft": {"J_s": 0.004},
+    "friction": {f"effects.coulomb_friction.{site}.torque": 1.0 for site in ("motor", "shaft", "load")},
+    "dead time": {"effects.input_delay.delay": 0.0123, "effects.torque_saturation.limit": 12.0},
+}
+"""Values of ``TwoStageTrain`` at which it is compared."""
 
-    def __init__(self, library: Path, model: int, effect: dict[str, float], seed: int) -> None:
+
+def drivetrain_values(model: int, effect: dict[str, float]) -> dict[str, float]:
+    """Return what a drivetrain is compared at: a backlash model, from 1, and an effect."""
+    return {"alpha": 0.01, "theta_m_start": 0.05, "omega_l_start": 0.3, **effect, "backlash_model": model}
+
+
+class Comparison:
+    """One Python slave and one native instance of a plant in step, with ``values`` of its parameters."""
+
+    def __init__(self, library: Path, values: dict[str, float], seed: int, plant: Any = Drivetrain) -> None:
         self.rng = random.Random(seed)
-        self.python = Drivetrain()
+        self.python = plant()
         self.native = Driver(library)
-        start = {"theta_m_start": 0.05, "omega_l_start": 0.3}
-        for name, value in {"alpha": 0.01, **start, **effect}.items():
-            self.python.set_real([NAMES.index(name)], [value])
-            assert self.native.set("Real", [NAMES.index(name)], [value])[0] == 0
-        number = NAMES.index("backlash_model")
-        self.python.set_integer([number], [model])
-        assert self.native.set("Integer", [number], [model])[0] == 0
+        table = {variable.name: (n, variable.type == "Real") for n, variable in enumerate(plant.table)}
+        for name, value in values.items():
+            number, real = table[name]
+            (self.python.set_real if real else self.python.set_integer)([number], [value])
+            assert self.native.set("Real" if real else "Integer", [number], [value])[0] == 0
         self.python.setup_experiment(0.0)
         self.python.enter_initialization_mode()
         self.python.exit_initialization_mode()
         self.native.setup(0.0, None)
         self.native.call("fmi2EnterInitializationMode")
         self.native.call("fmi2ExitInitializationMode")
-        self.references = (ctypes.c_uint * 6)(*range(THETA_M, T_SHAFT + 1))
-        self.values = (ctypes.c_double * 6)()
-        self.whole = (ctypes.c_uint * 1)(CONTACT)
-        self.contact = (ctypes.c_int * 1)()
+        outputs = {n for n, variable in enumerate(plant.table) if variable.causality == "output"}
+        reals = sorted(n for n, real in table.values() if real and n in outputs)
+        wholes = sorted(outputs - set(reals))
+        self.references = (ctypes.c_uint * len(reals))(*reals)
+        self.values = (ctypes.c_double * len(reals))()
+        self.whole = (ctypes.c_uint * len(wholes))(*wholes)
+        self.contact = (ctypes.c_int * len(wholes))()
         self.time = 0.0
         self.taken = 0
         self.kept: list[tuple[Any, float]] = []
@@ -81,11 +95,11 @@ class Comparison:
     def agree(self) -> bool:
         """Tell whether all outputs have the same bits."""
         library, component = self.native.fmu.library, self.native.component
-        library.fmi2GetReal(component, self.references, ctypes.c_size_t(6), self.values)
-        library.fmi2GetInteger(component, self.whole, ctypes.c_size_t(1), self.contact)
+        library.fmi2GetReal(component, self.references, ctypes.c_size_t(len(self.references)), self.values)
+        library.fmi2GetInteger(component, self.whole, ctypes.c_size_t(len(self.whole)), self.contact)
         mine = self.python.get_real(list(self.references))
-        same = bytes((ctypes.c_double * 6)(*mine)) == bytes(self.values)
-        return same and self.python.get_integer([CONTACT]) == list(self.contact)
+        same = bytes(type(self.values)(*mine)) == bytes(self.values)
+        return same and self.python.get_integer(list(self.whole)) == list(self.contact)
 
     def step(self) -> bool:
         """Take one random step with both; tell whether they agree."""

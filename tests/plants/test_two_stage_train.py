@@ -1,0 +1,260 @@
+"""The two-stage drivetrain beside an independent solution, in its limits beside the drivetrain, and its energy."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from pyfmu_sources import drivetrain
+from pyfmu_sources.equations import parameters
+from pyfmu_sources.event_numbers import NO_EVENT
+from pyfmu_sources.parameter_rows import with_values
+from pyfmu_sources.train_equations import (
+    DEFAULTS,
+    NAMES,
+    Mode,
+    Parameters,
+    State,
+    initial_mode,
+    stage_torques,
+    twists,
+)
+from pyfmu_sources.train_modes import after_events
+from pyfmu_sources.train_steps import advance, advance_to_event, fastest_rate, prepare
+from tests.support.two_stage_solution import solve_two_stages, start_values
+
+STEP = 1e-3
+FRICTION = {
+    "effects.coulomb_friction.motor.torque": 1.0,
+    "effects.coulomb_friction.shaft.torque": 0.4,
+    "effects.coulomb_friction.load.torque": 4.0,
+}
+CASES: dict[str, dict[str, float]] = {
+    "both gaps": {},
+    "stage 1": {"alpha_2": 0.0},
+    "stage 2": {"alpha_1": 0.0},
+    "no gap": {"alpha_1": 0.0, "alpha_2": 0.0},
+    "wide gaps": {"alpha_1": 0.05, "alpha_2": 0.02},
+    "light shaft": {"J_s": 0.004},
+    "heavy shaft": {"J_s": 0.5, "b_s": 0.5},
+    "slow drive": {"tau": 1.0},
+    "quick drive": {"tau": 2e-4},
+    "friction": FRICTION,
+    "friction, gap of stage 2": FRICTION | {"alpha_1": 0.0},
+    "one friction": {"effects.coulomb_friction.shaft.torque": 2.0},
+    "load torque": {"effects.load_torque.torque": 5.0},
+    "in motion": {"theta_m_start": 0.3, "omega_m_start": -3.0, "theta_s_start": 0.12, "omega_s_start": 2.0,
+                  "theta_l_start": 0.1, "omega_l_start": 0.4, "T_m_start": 20.0},
+}  # fmt: skip
+
+
+def torques(count: int = 500, seed: int = 4) -> tuple[np.ndarray, np.ndarray]:
+    """A request that reverses, and a load torque that comes and goes."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(5.0, 25.0, count // 50 + 1) * (-1.0) ** np.arange(count // 50 + 1), 50)[:count]
+    return u, np.where(np.arange(count) % 200 < 80, 3.0, 0.0)
+
+
+def run(
+    p: Parameters, x: State, u: np.ndarray, T_l: np.ndarray, step: float, splits: int = 1
+) -> tuple[np.ndarray, list[Mode]]:
+    """The states (n + 1, 7) and modes of the plant; each sample in ``splits`` steps."""
+    mode = initial_mode(x, p, float(T_l[0]))
+    table = prepare(p, step / splits)
+    states, modes = [x], [mode]
+    for n in range(len(u)):
+        for _ in range(splits):
+            x, mode = advance(x, mode, p, float(u[n]), float(T_l[n]), step / splits, table)
+        states.append(x)
+        modes.append(mode)
+    return np.array(states), modes
+
+
+def all_values(values: dict[str, float]) -> dict[str, float]:
+    return dict(zip(NAMES, DEFAULTS, strict=True)) | values
+
+
+def plant(values: dict[str, float]) -> tuple[Parameters, State]:
+    own = {name: value for name, value in values.items() if not name.endswith("_start")}
+    return with_values(DEFAULTS, own), tuple(map(float, start_values(values)))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_motion_is_that_of_an_independent_solution(case: str) -> None:
+    values = all_values(CASES[case])
+    u, T_l = torques()
+    wanted, flanks, instants = solve_two_stages(values, u, T_l, STEP)
+    p, x = plant(values)
+    found, modes = run(p, x, u, T_l, STEP)
+    assert np.abs(found - wanted).max(axis=0)[[0, 2, 4]].max() < 1e-9, "rad"
+    assert np.abs(found - wanted).max() < 1e-7, "rad/s and N.m"
+    contacts = np.array([mode[:2] for mode in modes])
+    for stage, name in enumerate(("alpha_1", "alpha_2")):
+        if values[name] > 0.0:
+            assert (contacts[:, stage] == flanks[:, stage]).all()
+    assert len(instants) > 3 or values["alpha_1"] + values["alpha_2"] == 0.0
+
+
+def energy(x: State, mode: Mode, p: Parameters) -> float:
+    """Kinetic energy and that of both shafts [J]."""
+    first, second = twists(x, p)
+    wound = ((first - mode[0] * p.alpha_1) if mode[0] else 0.0, (second - mode[1] * p.alpha_2) if mode[1] else 0.0)
+    kinetic = p.J_m * x[1] ** 2 + p.J_s * x[3] ** 2 + p.J_l * x[5] ** 2
+    return 0.5 * (kinetic + p.k_1 * wound[0] ** 2 + p.k_2 * wound[1] ** 2)
+
+
+def power(x: State, mode: Mode, p: Parameters, T_l: float) -> float:
+    """What the drive gives, less what load, friction and damping take [W]."""
+    first, second = stage_torques((0.0, x[1], 0.0, x[3], 0.0, x[5], 0.0), 0.0, mode, p)
+    damping = first * (x[1] / p.i_1 - x[3]) + second * (x[3] / p.i_2 - x[5])
+    viscous = p.b_m * x[1] ** 2 + p.b_s * x[3] ** 2 + p.b_l * x[5] ** 2
+    rubbing = (
+        p.coulomb_friction_motor_torque * abs(x[1])
+        + p.coulomb_friction_shaft_torque * abs(x[3])
+        + p.coulomb_friction_load_torque * abs(x[5])
+    )
+    return x[6] * x[1] - T_l * x[5] - damping - viscous - rubbing
+
+
+def test_without_losses_energy_is_kept_through_every_contact() -> None:
+    values = dict.fromkeys(("c_1", "c_2", "b_m", "b_s", "b_l"), 0.0) | {"omega_m_start": 4.0, "omega_l_start": -1.0}
+    p, x = plant(all_values(values))
+    zero = np.zeros(2000)
+    states, modes = run(p, x, zero, zero, STEP)
+    total = np.array([energy(tuple(row), mode, p) for row, mode in zip(states, modes, strict=True)])
+    changes = sum(a[:2] != b[:2] for a, b in itertools.pairwise(modes))
+    assert changes > 50
+    assert np.ptp(total) < 1e-10 * total[0]
+
+
+@pytest.mark.parametrize("friction", [{}, FRICTION], ids=["no friction", "friction"])
+def test_energy_changes_by_what_is_given_and_taken(friction: dict[str, float]) -> None:
+    p, x = plant(all_values(friction))
+    u, T_l = torques(200)
+    splits = 100
+    fine = np.repeat(u, splits), np.repeat(T_l, splits)
+    states, modes = run(p, x, *fine, STEP / splits)
+    flow = [power(tuple(row), mode, p, 0.0) for row, mode in zip(states, modes, strict=True)]
+    flow = np.array(flow[:-1]) - fine[1] * states[:-1, 5], np.array(flow[1:]) - fine[1] * states[1:, 5]
+    given = np.cumsum(0.5 * (flow[0] + flow[1])) * STEP / splits
+    total = np.array([energy(tuple(row), mode, p) for row, mode in zip(states, modes, strict=True)])
+    assert total.max() > 1.0
+    assert np.abs(total[1:] - total[0] - given).max() < 1e-4 * total.max()
+
+
+def of_drivetrain(p: Parameters, **values: float) -> np.ndarray:
+    """Angles of motor and load of a drivetrain of one stage under the same torques."""
+    q = parameters(J_m=p.J_m, b_m=p.b_m, i=p.i_1 * p.i_2, tau=p.tau, **values)
+    u, T_l = torques()
+    x = drivetrain.consistent_start((0.0,) * 8, q)
+    mode, table, found = drivetrain.initial_mode(x, q), drivetrain.prepare(q, STEP), [x]
+    for n in range(len(u)):
+        x, mode = drivetrain.advance(x, mode, q, float(u[n]), float(T_l[n]), STEP, table)
+        found.append(x)
+    return np.array(found)[:, [0, 2]]
+
+
+def deviation(values: dict[str, float], one_stage: dict[str, float]) -> float:
+    p, x = plant(all_values(values))
+    states, _ = run(p, x, *torques(), STEP)
+    return float(np.abs(states[:, [0, 4]] - of_drivetrain(p, **one_stage)).max())
+
+
+@pytest.mark.parametrize("gap", [1, 2])
+def test_a_light_shaft_makes_one_stage_of_two(gap: int) -> None:
+    """Both springs in a row, where damping over stiffness is the same: the deviation vanishes with the inertia."""
+    i_2, load = 2.0, {"J_l": 5.6, "b_l": 1.0}
+    springs = {"i_2": i_2, "k_1": 1500.0, "c_1": 0.6, "k_2": 7500.0, "c_2": 3.0, "b_s": 0.0, "tau": 0.05, **load}
+    gaps = {"alpha_1": 0.02 if gap == 1 else 0.0, "alpha_2": 0.01 if gap == 2 else 0.0}
+    one = 1.0 / (1500.0 * i_2**2), 1.0 / 7500.0
+    k = 1.0 / sum(one)
+    same = {"k": k, "c": k * 4e-4, "alpha": 0.01, **load}
+    rough, fine = (deviation({**springs, **gaps, "J_s": inertia}, same) for inertia in (2e-4, 2e-5))
+    assert rough < 2e-3
+    assert fine < 0.2 * rough
+
+
+@pytest.mark.parametrize("gap", [1, 2])
+def test_a_stiff_stage_makes_one_body_of_two(gap: int) -> None:
+    """The intermediate shaft turns with the load (stage 2 is stiff) or with the motor: a deviation of 1 / stiffness."""
+    found = []
+    for stiffness in (1e6, 1e7):
+        if gap == 1:
+            values = {"k_2": stiffness, "c_2": stiffness * 1e-4, "alpha_2": 0.0, "alpha_1": 0.02, "i_2": 2.0}
+            same = {"J_l": 5.6 + 4.0 * 0.04, "b_l": 1.0 + 4.0 * 0.02, "k": 4.0 * 1660.0, "c": 4.0 * 0.5, "alpha": 0.01}
+        else:
+            values = {"k_1": stiffness, "c_1": stiffness * 1e-4, "alpha_1": 0.0, "alpha_2": 0.01}
+            values |= {"J_m": 0.4 - 0.04 / 4.0, "b_m": 0.1 - 0.02 / 4.0}
+            same = {"J_l": 5.6, "b_l": 1.0, "k": 6600.0, "c": 2.0, "alpha": 0.01}
+        p, x = plant(all_values({**values, "tau": 0.05}))
+        states, _ = run(p, x, *torques(), STEP)
+        whole = p._replace(J_m=0.4, b_m=0.1)
+        found.append(float(np.abs(states[:, [0, 4]] - of_drivetrain(whole, **same)).max()))
+    assert found[0] < 2e-3
+    assert found[1] < 0.2 * found[0]
+
+
+@pytest.mark.parametrize("case", ["both gaps", "light shaft", "friction", "in motion"])
+def test_steps_of_any_size_lead_to_the_same_motion(case: str) -> None:
+    """Products with a matrix (short steps) and power series (long ones) are one solution."""
+    p, x = plant(all_values(CASES[case]))
+    u, T_l = np.repeat(torques(60)[0], 10), np.zeros(600)
+    fine, _ = run(p, x, u, T_l, STEP, splits=3)
+    coarse, _ = run(p, x, u[::10], T_l[::10], 10 * STEP)
+    assert 10 * STEP * fastest_rate((1, 1, 1, 1, 1), p) > 2.0
+    assert np.abs(fine[::10] - coarse).max() < 1e-8
+
+
+def test_a_short_contact_is_never_stepped_over() -> None:
+    """Steps that take the matrix and steps that look for every event have the same contacts."""
+    rng = np.random.default_rng(8)
+    for _ in range(30):
+        values = {
+            "alpha_1": 10 ** rng.uniform(-5, -2),
+            "alpha_2": 10 ** rng.uniform(-5, -2),
+            "J_s": rng.uniform(0.02, 0.2),
+        }
+        p, x = plant(all_values(values))
+        mode = other = initial_mode(x, p, 0.0)
+        y = x
+        table = prepare(p, STEP)
+        assert table[4]
+        for n in range(150):
+            u = float(30.0 * math.sin(2.0 * math.pi * 25.0 * n * STEP) + 4.0)
+            x, mode = advance(x, mode, p, u, 0.0, STEP, table)
+            y, other = advance(y, other, p, u, 0.0, STEP, (*table[:4], False))
+            assert mode == other
+        assert np.abs(np.subtract(x, y)).max() < 1e-7
+
+
+def test_an_event_ends_a_step_at_the_flank() -> None:
+    p, x = plant(all_values({"omega_m_start": 1.0}))
+    mode, table, found = initial_mode(x, p, 0.0), prepare(p, 0.05), []
+    time = 0.0
+    while len(found) < 10 and time < 1.0:
+        x, after, taken, which = advance_to_event(x, mode, p, 0.0, 0.0, 0.05, table)
+        time += taken
+        if which == NO_EVENT:
+            mode = after
+            continue
+        twist, alpha = twists(x, p)[which // 2], (p.alpha_1, p.alpha_2)[which // 2]
+        assert abs(abs(twist) - alpha) < 1e-13
+        x, mode = after_events(x, after, which, p, 0.0)
+        assert mode != after
+        found.append(which)
+    assert {which // 2 for which in found} == {0, 1}
+
+
+def test_friction_holds_a_body_until_the_torque_breaks_it_loose() -> None:
+    """A load that rests holds against the spring's torque up to its friction, then breaks away."""
+    p, x = plant(all_values({"effects.coulomb_friction.load.torque": 6.0, "tau": 0.2}))
+    u = np.full(400, 2.5)
+    states, modes = run(p, x, u, np.zeros(400), STEP)
+    held = [n for n, mode in enumerate(modes) if mode[4] == 0]
+    assert held[0] == 0
+    first = next(n for n, mode in enumerate(modes) if mode[4] != 0)
+    assert (states[:first, 4] == 0.0).all()
+    second = [stage_torques(tuple(row), 1.0, mode, p)[1] for row, mode in zip(states, modes, strict=True)]
+    assert max(map(abs, second[:first])) <= 6.0 + 1e-9
+    assert states[-1, 4] > 0.01
