@@ -46,8 +46,9 @@ class PlantSlave(SlaveBase):
     """A plant driven by a torque that is limited and may come late; subclasses hold its state and move it."""
 
     # The hidden attribute that model exchange integrates; a plant's `continuous_states` are name, unit, nominal value
-    # and meaning of its items, `jumping_states` the names of those that events may set anew. Directional derivatives are of its `response`: a function of hidden attributes and
-    # inputs by their names, which returns the derivatives of the states, and `response_outputs`.
+    # and meaning of its items, `jumping_states` the names of those that events may set anew. Directional derivatives
+    # are of its `response`: a function of hidden attributes and inputs by their names, which returns the derivatives
+    # of the states, and `response_outputs`.
     state_attribute: ClassVar[str] = "_x"
 
     _requests: Requests

@@ -139,7 +139,7 @@ def linear_rates(x: State, constant: float, mode: Mode, p: Parameters, torques: 
     )
 
 
-def reported_contacts(x: State, mode: Mode, p: Parameters) -> tuple[int, int]:
+def contact_outputs(x: State, mode: Mode, p: Parameters) -> tuple[int, int]:
     """Return the flanks (-1, 0, 1) that touch; without a gap, those that the shafts are wound to."""
     first, second = twists(x, p)
     return (

@@ -86,7 +86,7 @@ def with_item(mode: Mode, place: int, item: int) -> Mode:
     )
 
 
-def switched(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> tuple[State, Mode]:
+def switch_mode(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> tuple[State, Mode]:
     """Return state and mode after the guard ``which`` has ended ``mode``."""
     pair = which // 2
     side = 1 if which % 2 == 0 else -1
@@ -101,20 +101,20 @@ def switched(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> tup
     return (x, with_item(mode, pair, slip_after_stop(push, friction_levels(p)[pair - 2])))
 
 
-def settled(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State, Mode]:
+def settle_mode(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State, Mode]:
     """Return state and mode once no guard is violated any more at this moment: contacts first, then friction."""
     for _ in range(2):
         for which in range(GUARDS):
             if is_violated(x, mode, which, p, T_l):
-                x, mode = switched(x, mode, which, p, T_l)
+                x, mode = switch_mode(x, mode, which, p, T_l)
     return (x, mode)
 
 
 def after_events(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> tuple[State, Mode]:
     """Return state and mode after an event (``NO_EVENT``: none is known), settled at the inputs of the moment."""
     if which != NO_EVENT:
-        x, mode = switched(x, mode, which, p, T_l)
-    return settled(x, mode, p, T_l)
+        x, mode = switch_mode(x, mode, which, p, T_l)
+    return settle_mode(x, mode, p, T_l)
 
 
 def state_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:

@@ -26,7 +26,7 @@ from .train_equations import (
     outside_torques,
     twists,
 )
-from .train_modes import GUARDS, guard, guard_room, is_in_use, settled, switched
+from .train_modes import GUARDS, guard, guard_room, is_in_use, settle_mode, switch_mode
 
 # By what twists beyond the gaps (two), speeds (three), T_m, request and constant torques on the three bodies move a
 # state in one step.
@@ -162,7 +162,7 @@ def change(row: Row, first: float, second: float, x: State, torques: Torques) ->
     return moving + (g * torques[0] + m * torques[1] + s * torques[2] + load * torques[3])
 
 
-def moved_by(rows: Transition, first: float, second: float, x: State, torques: Torques) -> State:
+def multiply(rows: Transition, first: float, second: float, x: State, torques: Torques) -> State:
     """Return the state after one product with a transition matrix."""
     return (
         x[0] + change(rows[0], first, second, x, torques),
@@ -181,12 +181,12 @@ def leap(x: State, mode: Mode, p: Parameters, torques: Torques, table: Table) ->
     first -= mode[0] * p.alpha_1
     second -= mode[1] * p.alpha_2
     if mode[0] == 0 and mode[1] == 0:
-        return moved_by(table[0], first, second, x, torques)
+        return multiply(table[0], first, second, x, torques)
     if mode[1] == 0:
-        return moved_by(table[1], first, second, x, torques)
+        return multiply(table[1], first, second, x, torques)
     if mode[0] == 0:
-        return moved_by(table[2], first, second, x, torques)
-    return moved_by(table[3], first, second, x, torques)
+        return multiply(table[2], first, second, x, torques)
+    return multiply(table[3], first, second, x, torques)
 
 
 def is_clear(x: State, after: State, mode: Mode, p: Parameters, torques: Torques, h: float) -> bool:
@@ -226,15 +226,15 @@ def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float,
     elapsed = 0.0
     events = 0
     pieces = 0
-    x, mode = settled(x, mode, p, T_l)
+    x, mode = settle_mode(x, mode, p, T_l)
     while elapsed < h:
         x, elapsed, pieces, which = series_to_event(x, mode, p, u, T_l, h, elapsed, pieces)
         if which == TOO_MUCH or events >= MAX_EVENTS:
-            return (refused(), mode)
+            return (no_state(), mode)
         if which == NO_EVENT:
             return (x, mode)
-        x, mode = switched(x, mode, which, p, T_l)
-        x, mode = settled(x, mode, p, T_l)
+        x, mode = switch_mode(x, mode, which, p, T_l)
+        x, mode = settle_mode(x, mode, p, T_l)
         events += 1
     return (x, mode)
 
@@ -252,12 +252,12 @@ def advance_to_event(
         after = leap(x, mode, p, torques, table)
         if is_clear(x, after, mode, p, torques, h):
             return (after, mode, h, NO_EVENT)
-    x, mode = settled(x, mode, p, T_l)
+    x, mode = settle_mode(x, mode, p, T_l)
     x, elapsed, _, which = series_to_event(x, mode, p, u, T_l, h, 0.0, 0)
-    return (refused() if which == TOO_MUCH else x, mode, elapsed, which)
+    return (no_state() if which == TOO_MUCH else x, mode, elapsed, which)
 
 
-def refused() -> State:
+def no_state() -> State:
     """Return the state that says that a step has no result: NaN throughout."""
     nan = float("nan")
     return (nan, nan, nan, nan, nan, nan, nan)

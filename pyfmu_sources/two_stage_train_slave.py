@@ -11,7 +11,7 @@ from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .plant_slave import KNOWN_STEPS, T_L, PlantSlave, input_variables, parameter_variable, start_variable
 from .slave_base import TOO_STIFF, StepRefusedError
-from .train_equations import PARAMETERS, Mode, State, TrainParameters, initial_mode, reported_contacts
+from .train_equations import PARAMETERS, Mode, State, TrainParameters, contact_outputs, initial_mode
 from .train_modes import Indicators, Outputs, after_events, indicators, output_rates, rates_and_outputs, state_rates
 from .train_steps import Table
 
@@ -179,6 +179,6 @@ class TwoStageTrain(PlantSlave):
         _, outputs = rates_and_outputs(self._x, self._mode, self._p, 0.0, 0.0)
         for n in range(len(outputs)):
             self.real[FIRST_OUTPUT + n] = outputs[n]
-        contact_1, contact_2 = reported_contacts(self._x, self._mode, self._p)
+        contact_1, contact_2 = contact_outputs(self._x, self._mode, self._p)
         self.integer[CONTACT_1] = contact_1
         self.integer[CONTACT_2] = contact_2
