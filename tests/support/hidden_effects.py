@@ -68,6 +68,10 @@ MACHINES: dict[str, tuple[dict[str, float], float]] = {
     "servo": ({"J_m": 0.02, "J_l": 1.5, "k": 1200.0, "c": 0.6, "b_m": 0.02, "b_l": 0.4, "i": 10.0, "tau": 0.05}, 0.035),
     "press": ({"J_m": 0.5, "J_l": 1.0, "k": 4000.0, "c": 4.0, "b_m": 0.2, "b_l": 0.5, "i": 2.0, "tau": 0.2}, 1.0),
 }
+# Friction that differs by direction -> the viscous friction that it is part of. Beyond that it would drive the machine:
+# with a b that is up to 5 % off, a size stays within four fifths of it.
+VISCOUS = {"dv_m": "b_m", "dv_l": "b_l"}
+MOST_OF_VISCOUS = 0.8
 GAPS = (0.3, 3.0)  # half-gaps of the records with one encoder, in typical (rms) twists
 
 # Unit of each size, in powers of a record's torque, load torque, speeds, load angle and twist: on another machine than
@@ -264,6 +268,9 @@ def scaled(effects: dict[str, float], size: str, share: float, ways: Ways = Ways
     elif size == "slew":
         # The request of the thesis's records changes by up to 9000 N.m/s.
         changed["slew"] = 9000.0 * MACHINES[ways.machine][1] * (1.0 - effects["slew"] * share)
+    elif size in VISCOUS:
+        most = MOST_OF_VISCOUS * MACHINES[ways.machine][0][VISCOUS[size]]
+        changed[size] = min(effects[size] * share, most)
     elif size == "stop":
         changed["stop"] = effects["stop"] / share  # the farther out, the less it is reached
     elif size == "hard":
