@@ -182,13 +182,19 @@ class FitProblem:
 
         Args:
             residual: (rows,) at the point.
+
+        Raises:
+            LinAlgError: there are none, since the machine runs away.
         """
         steps = [self._small_step(point, one) if isinstance(one, int) else 1.0 for one in coordinates]
         points = [self.move_point(point, [one], np.array([s])) for one, s in zip(coordinates, steps, strict=True)]
         columns = self.whiten_residuals(points)
         if not columns:  # nothing is uncertain
             return np.zeros((residual.size, 0))
-        return np.column_stack([(found - residual) / s for found, s in zip(columns, steps, strict=True)])
+        slopes = np.column_stack([(found - residual) / s for found, s in zip(columns, steps, strict=True)])
+        if not np.isfinite(np.linalg.norm(slopes)):  # LAPACK would print a line before it says so
+            raise np.linalg.LinAlgError("the machine runs away")
+        return slopes
 
     def _small_step(self, point: ModelPoint, number: int) -> float:
         """Return a small share of a parameter's nominal value, away from a limit that is near."""
