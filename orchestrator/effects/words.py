@@ -23,5 +23,9 @@ def place_words(name: str, site: str) -> str:
 
 def list_effects(labels: Sequence[str]) -> str:
     """Return effects in words, as a list in a sentence."""
-    words = [effect_words(label) for label in labels]
+    return list_words([effect_words(label) for label in labels])
+
+
+def list_words(words: Sequence[str]) -> str:
+    """Return words as a list in a sentence."""
     return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.diagnose import diagnose
+from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.summary import sureness, words_on_test_data
 from orchestrator.diagnosis.result import SignalMisfit
 from orchestrator.diagnosis.result import TestMisfit as MisfitOnTest
+from orchestrator.diagnosis.selection.evidence import acts_one_way
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model, read_model
@@ -90,6 +92,15 @@ def test_a_dead_time_is_a_few_cycles_of_the_log_and_none_at_its_bound(model: Mod
         point = ModelPoint.nominal(balance.parameters)
         assert balance.is_possible(label, point.with_effect(label, (0.03,)))
         assert not balance.is_possible(label, point.with_effect(label, (effect.upper[0],)))
+
+
+def test_friction_of_a_body_that_turns_one_way_is_a_constant(model: Model) -> None:
+    label = "coulomb_friction@motor"
+    for ways, constant in ((0.0, True), (8.0, False)):
+        record = axis_record(values(model, **{FRICTION: 0.8}), 3, "axis", slowest=-ways if ways else 2.0)
+        problem = fit_problem([balance_of(record, model, SETTINGS)], SETTINGS.fit)
+        point = problem.start.with_effect(label, (0.8, np.log(1e-3)))
+        assert acts_one_way(problem, point, label) is constant
 
 
 def test_a_rate_is_limited_where_the_request_goes_beyond_it_at_times(model: Model) -> None:

@@ -73,6 +73,16 @@ def test_one_effect_is_named_with_its_size(effects, label, parameter, value, tol
     assert any(label.partition("@")[0].split("_")[0] in line.lower() for line in summarise(found))
 
 
+def test_friction_of_motion_in_one_direction_is_told_from_no_constant() -> None:
+    u = np.repeat(np.random.default_rng(3).uniform(0.5, 6.0, 15), 160)
+    record = record_of({"Fc_l": 2.5}, 3, 12.0, u=u, x0={"omega_m": 6.0, "omega_l": 1.5})
+    found = diagnose(record, MODEL)
+    (effect,) = found.graded(Grade.LIKELY)
+    assert effect.grade is Grade.LIKELY
+    assert {effect.label, *effect.evidence.family} >= {"coulomb_friction@load", "load_torque@load"}
+    assert " (or " in next(summarise(found))
+
+
 def test_two_effects_of_a_closed_loop() -> None:
     found = diagnose(record_of({"alpha": 0.004, "Fc_m": 0.8}, 31, 20.0, excitation="closed_loop"), MODEL)
     assert {"backlash@shaft"} <= set(likely(found))

@@ -7,10 +7,11 @@ import pytest
 
 from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
+from orchestrator.diagnosis.report.summary import percent
 from orchestrator.diagnosis.selection.evidence import effect_evidence, leave_out_possible, size_over_error
 from orchestrator.diagnosis.selection.outcome import RecordEvidence
 from orchestrator.diagnosis.selection.screening import products_with_waves
-from orchestrator.diagnosis.selection.search import search_effects
+from orchestrator.diagnosis.selection.search import _Search, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings, FitSettings, SelectionSettings
 from tests.support.linear_model import LinearModel, linear_problem
 
@@ -50,6 +51,29 @@ def test_an_effect_whose_fit_has_no_solution_is_passed_over(monkeypatch):
     assert search_effects(problem, SETTINGS).final.labels == ("a@motor",)
 
 
+def test_derivatives_without_bounds_are_no_matter_for_lapack(capfd):
+    problem = linear_problem({"a@motor": 0.4})
+    object.__setattr__(problem, "whiten_residuals", lambda points: [np.full(problem.blocks.size, np.inf)] * len(points))
+    with pytest.raises(np.linalg.LinAlgError, match="runs away"):
+        problem.jacobian(problem.start, [0], np.zeros(problem.blocks.size))
+    assert "".join(capfd.readouterr()) == ""
+
+
+def test_no_effect_explains_more_than_what_is_missing(monkeypatch):
+    found = search_effects(linear_problem({"a@motor": 0.4}), SETTINGS)
+    missing = iter((1.0, 0.1, 3.98, 0.9, 0.1, 0.2))  # base, final; without it, before it, with it; of itself
+    monkeypatch.setattr("orchestrator.diagnosis.selection.evidence.missing_torque", lambda *points: next(missing))
+    (evidence,) = effect_evidence(found)
+    assert evidence.share == 1.0
+    assert [percent(share) for share in (1.0, 0.996, 0.88, 0.004, 0.0)] == [
+        "all",
+        "over 99 %",
+        "88 %",
+        "under 1 %",
+        "none",
+    ]
+
+
 def test_chance_is_rarely_found():
     problems = [linear_problem(dict.fromkeys(NAMES, 0.0), seed=seed) for seed in range(12)]
     assert sum(len(search_effects(problem, SETTINGS).final.labels) for problem in problems) <= 1
@@ -71,6 +95,20 @@ def test_laws_of_two_kinds_that_do_the_same_are_a_family_though_one_is_more_exac
         found = search_effects(problem, SETTINGS)
         assert found.final.labels == ("a@motor",)
         assert found.reviews["a@motor"].family == family
+
+
+def test_what_does_the_same_is_a_family_though_its_gain_is_no_surer():
+    problem = linear_problem(
+        {"a@motor": 0.4, "b@motor": 0.0}, alike={"b@motor": "a@motor"}, kinds={"b@motor": "constant"}
+    )
+    found = search_effects(problem, SETTINGS)
+    (label,) = found.final.labels
+    review = found.reviews[label]
+    unsure = [replace(one, comparison=replace(one.comparison, t=2.3)) for one in review.tried]
+    chosen = next(one for one in unsure if one.label == label)
+    search = _Search(SETTINGS, lambda what: None, lambda: False)
+    step = search._simplest(problem, review.before, chosen, unsure)
+    assert {step.taken, *step.family} == {"a@motor", "b@motor"}
 
 
 def test_no_more_effects_than_the_settings_allow():

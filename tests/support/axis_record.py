@@ -19,10 +19,14 @@ relative_uncertainty = 0.1
 """
 
 
-def axis_record(p: Sequence[float], seed: int, name: str) -> Record:
-    """Return 8 s at 200 Hz of an axis with parameters ``p``, its encoder with a noise of 0.1 mrad."""
+def axis_record(p: Sequence[float], seed: int, name: str, slowest: float = -8.0) -> Record:
+    """Return 8 s at 200 Hz of an axis with parameters ``p``, its encoder with a noise of 0.1 mrad.
+
+    Args:
+        slowest: least torque of the steps [N.m], up to 8; above the friction the axis turns one way.
+    """
     rng, values = np.random.default_rng(seed), AxisParameters._make(p)
-    u = np.repeat(rng.uniform(-8.0, 8.0, 100), 16)
+    u = np.repeat(rng.uniform(slowest, 8.0, 100), 16)
     x, mode, y = axis.start(0.0, 0.0, 0.0, values), 0, []
     for value in u:
         y.append(x[0])

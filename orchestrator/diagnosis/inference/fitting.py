@@ -63,18 +63,18 @@ def jackknife_covariance(shifts: Array) -> Array:
     return np.asarray((len(shifts) - 1) / len(shifts) * off.T @ off)
 
 
-def fit_model(problem: FitProblem, point: ModelPoint, iterations: int = 0) -> FittedModel:
+def fit_model(problem: FitProblem, point: ModelPoint, iterations: int | None = None) -> FittedModel:
     """Fit a model by Gauss and Newton's steps, damped where a step does not help.
 
     Args:
-        iterations: steps at most; 0: as the settings say.
+        iterations: steps at most; 0: the model as it is; None: as the settings say.
     """
     coordinates = problem.coordinates(point)
     (residual,) = problem.whiten_residuals([point])
     prior, slopes = problem.prior(point, coordinates)
     cost, damping = float(residual @ residual + prior @ prior), 1e-6
     jacobian = problem.jacobian(point, coordinates, residual)
-    for _ in range(iterations or problem.settings.iterations):
+    for _ in range(problem.settings.iterations if iterations is None else iterations):
         normal, gradient = jacobian.T @ jacobian + np.diag(slopes**2), jacobian.T @ residual + slopes * prior
         step = None
         for _ in range(4):

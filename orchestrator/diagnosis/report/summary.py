@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, Nuisance, ValueEstimate
 from orchestrator.diagnosis.selection.grading import GRADE_RULES
 from orchestrator.diagnosis.selection.outcome import Grade
-from orchestrator.effects.words import effect_words, list_effects
+from orchestrator.effects.words import effect_words, list_effects, list_words
 from orchestrator.plants.description import Plant
 from orchestrator.shared.play import Play
 
@@ -88,15 +88,21 @@ def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
         hint = f" A hint, too weak to be an answer: {list_effects(near)}." if near else ""
         return f"Verdict: {diagnosis.verdict}. {said}.{hint}"
     if diagnosis.verdict == "effects":
-        named = [effect.label for effect in diagnosis.graded(Grade.LIKELY)]
+        named = [_name_with_others(effect) for effect in diagnosis.graded(Grade.LIKELY)]
         return (
-            f"Verdict: effects. The {compared} lacks {list_effects(named)}."
+            f"Verdict: effects. The {compared} lacks {list_words(named)}."
             if named
             else "Verdict: effects, in the log alone."
         )
     why = "no effect of the library is likely" if diagnosis.searched else "no search was made"
     text = f"Verdict: unknown. The {compared} misses something, and {why}."
     return text + (f" Possible: {list_effects(near)}." if near else "")
+
+
+def _name_with_others(effect: GradedEffect) -> str:
+    """Return an effect in words; one that is not told from another kind of law, with all of these."""
+    others = map(effect_words, effect.evidence.family if effect.evidence.foreign_family else ())
+    return effect_words(effect.label) + (f" (or {' or '.join(others)})" if effect.evidence.foreign_family else "")
 
 
 def play_of(diagnosis: Diagnosis) -> Play | None:
@@ -154,9 +160,9 @@ def words_on_test_data(effect: GradedEffect) -> str:
 
 def percent(share: float) -> str:
     """Return a share in words."""
-    if share <= 0.0:
-        return "none"
-    return "under 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
+    if not 0.0 < share < 1.0:
+        return "none" if share <= 0.0 else "all"
+    return "under 1 %" if share < 0.01 else "over 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
 
 
 def sureness(effect: GradedEffect) -> str:

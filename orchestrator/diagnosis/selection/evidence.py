@@ -17,6 +17,8 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 
 Array = NDArray[np.float64]
 FREE_SPREAD = 30.0  # of a parameter whose prior is off
+ACTIVE = 0.5  # of the largest weight, from which a row counts whole
+ONE_WAY = 0.05  # share of a torque's power that varies, up to which it is a constant: one row of eighty the other way
 
 
 def record_evidence(result: SearchResult) -> RecordEvidence:
@@ -44,14 +46,31 @@ def _effect_evidence(result: SearchResult, label: str, base: float, left: float)
     assert leaving is not None
     assert entry is not None
     without, before, after = (missing_torque(problem, one.point) for one in (review.before, step.before, entry.fitted))
-    kinds = {problem.effects[other].kind for other in review.family}
+    kinds = {effect.kind, *(problem.effects[other].kind for other in review.family)}
+    family = review.family
+    if kinds == {"friction"} and acts_one_way(problem, final.point, label):
+        kinds, family = {*kinds, "constant"}, (*family, f"constant_torque@{effect.site}")
     return EffectEvidence(
         label, effect.kind, max(leaving.comparison.t, entry.comparison.t),
-        max(leaving.comparison.gain, entry.comparison.gain), max(without - left, before - after) / base,
-        size_over_error(problem, final, label), review.family, bool(kinds - {effect.kind}),
+        max(leaving.comparison.gain, entry.comparison.gain), min(max(without - left, before - after) / base, 1.0),
+        size_over_error(problem, final, label), family, len(kinds) > 1,
         problem.is_possible(label, final.point),
         torque=missing_torque(problem, final.point.without_effects([label]), final.point),
     )  # fmt: skip
+
+
+def acts_one_way(problem: FitProblem, point: ModelPoint, label: str) -> bool:
+    """Tell whether an effect is a constant torque to the records: dry friction of a body that turns one way alone."""
+    square = variance = 0.0
+    points = (problem.record_points(one) for one in (point, point.without_effects([label])))
+    for model, *seen in zip(problem.models, *points, strict=True):
+        plain = band_only(model, problem.settings)
+        with_it, without = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen))
+        for torque, active in zip(with_it - without, plain.active, strict=True):
+            moving = torque[active > ACTIVE * active.max()]
+            square += float(moving @ moving)
+            variance += float(moving.size * np.var(moving)) if moving.size else 0.0
+    return variance < ONE_WAY * square
 
 
 def missing_torque(problem: FitProblem, point: ModelPoint, other: ModelPoint | None = None) -> float:

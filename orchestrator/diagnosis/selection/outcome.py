@@ -114,7 +114,7 @@ class EffectEvidence:
     Attributes:
         t: paired gain over its standard error.
         gain: share of the squared error that it takes of what is left without it.
-        share: share of the missing torque that it explains.
+        share: share of the missing torque that it explains: what comes back without it, all of it at most.
         size_t: its sizes over their errors.
         family: labels that the record does not tell from it.
         foreign_family: one of them is of another kind.

@@ -106,7 +106,9 @@ class _Search:
             problem, model = result.problem, result.final
             without = fit_model(problem, model.point.without_effects([label]), 3)
             reviewed = TriedEffect(label, compare(without, model), model)
-            tried = self._try_effects(problem, without, frozenset((label,)), self.settings.refined)
+            # What stands for it begins at the values of the model with it: without it, they may be led far astray.
+            start = fit_model(problem, model.point.without_effects([label]), 0)
+            tried = self._try_effects(problem, without, frozenset((label,)), self.settings.refined, start)
             step = self._simplest(problem, without, reviewed, (reviewed, *tried))
             result = replace(result, reviews={**result.reviews, step.taken: step})
             if step.taken != label:
@@ -204,7 +206,8 @@ class _Search:
         """Return the step with the simplest of the effects over which the best one gains nothing.
 
         Its family are these, and those of another kind over which it gains next to nothing of the whole error: what is
-        left of two laws that do the same differs by how exact either is, and no law is.
+        left of two laws that do the same differs by how exact either is, and no law is. That their gain is no chance
+        is asked of the one that is chosen.
         """
         alike = [one for one in tried if one is best or self._is_alike(problem, model, best, one)]
         chosen = min(alike, key=lambda trial: (problem.effects[trial.label].law_values, -trial.comparison.gain))
@@ -212,19 +215,21 @@ class _Search:
         family = [
             one.label for one in tried
             if one is not chosen and (one in alike or (
-                problem.effects[one.label].kind != kind and one.fitted.score < most and self._pays(problem, model, one)
+                problem.effects[one.label].kind != kind and one.fitted.score < most
+                and one.comparison.gain >= self.settings.least_gain and self._is_allowed(problem, model, one)
             ))
         ]  # fmt: skip
         return SearchStep(model, tuple(tried), chosen.label, tuple(family))
 
     def _try_effects(
-        self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int
-    ) -> list[TriedEffect]:
-        screening = Screening(problem, model)
-        tried = []
-        for screened in screening.screen(self._candidates(problem, model, refused))[:count]:
+        self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int,
+        start: FittedModel | None = None,
+    ) -> list[TriedEffect]:  # fmt: skip
+        """Return the most promising effects, fitted on top of a model from its values or those of a ``start``."""
+        start, tried = start or model, []
+        for screened in Screening(problem, start).screen(self._candidates(problem, model, refused))[:count]:
             try:
-                fitted = fit_model(problem, start_of_fit(model, screened))
+                fitted = fit_model(problem, start_of_fit(start, screened))
             except np.linalg.LinAlgError:  # the machine runs away with it
                 continue
             tried.append(TriedEffect(screened.label, compare(model, fitted), fitted))
@@ -241,7 +246,10 @@ class _Search:
 
     def _pays(self, problem: FitProblem, model: FittedModel, tried: TriedEffect) -> bool:
         """Tell whether an effect gains enough, is possible, and pushes no parameter out of the model file."""
-        if not (self._gains(tried.comparison) and problem.is_possible(tried.label, tried.fitted.point)):
+        return self._gains(tried.comparison) and self._is_allowed(problem, model, tried)
+
+    def _is_allowed(self, problem: FitProblem, model: FittedModel, tried: TriedEffect) -> bool:
+        if not problem.is_possible(tried.label, tried.fitted.point):
             return False
         before, after = farthest_parameter(problem, model), farthest_parameter(problem, tried.fitted)
         return after < max(self.settings.prior_deviations, before + 1.0)
