@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from orchestrator.control.harmonic import harmonic_cycle
 from orchestrator.control.standstill import forecast_rest
 from orchestrator.plants.design import DrivetrainValues, design_regulator, five_state_model
 from tests.support import independent_plant
@@ -56,7 +57,7 @@ def main() -> None:
     parser.add_argument("--loops", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    right = wrong = 0
+    right = wrong = harmonic_right = harmonics = 0
     print("loop, forecast: twist/alpha, load/alpha, Hz; simulated: the same")
     for n in range(arguments.loops):
         values, gains = draw_loop(np.random.default_rng([arguments.seed, n]))
@@ -78,6 +79,11 @@ def main() -> None:
         same = bool(f.cycles) == (best[1] > 0.0)
         near = same and np.allclose((f.twist, f.load, f.frequency), best, rtol=0.1)
         right += near
+        harmonic = harmonic_cycle(values, gains, STEP)
+        if harmonic is not None:
+            harmonics += 1
+            said = (harmonic.twist, harmonic.load, harmonic.frequency)
+            harmonic_right += np.allclose(said, best, rtol=0.1)
         wrong += best[1] > 0.0 and not f.cycles
         print(
             f"{n} {f.twist:.2f} {f.load:.2f} {f.frequency:.2f} {'' if f.settled else 'unsettled'}; "
@@ -85,6 +91,7 @@ def main() -> None:
             flush=True,
         )
     print(f"within 10 %: {right} of {arguments.loops}; called still, but cycles: {wrong}")
+    print(f"describing function, twists of two half-gaps and more, within 10 %: {harmonic_right} of {harmonics}")
 
 
 if __name__ == "__main__":

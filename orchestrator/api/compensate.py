@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
+from orchestrator.api.at_rest import margins_text, rest_forecast, rest_text
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.control.loops import FMUS, LAWS, ControlTask, make_loop
 from orchestrator.control.measures import LoopMeasures, bound_path, bound_time, first_path, measure_loop
-from orchestrator.control.standstill import RestForecast, forecast_rest
 from orchestrator.scenarios.scenario import simulate
 from orchestrator.shared.output import write_columns
-from orchestrator.shared.results.compensate import CompensateFound, ForecastFound, LawFound
+from orchestrator.shared.results.compensate import CompensateFound, LawFound
+from orchestrator.shared.results.regulator import ForecastFound
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ class CompensateResult(PlottedResult):
     laws: tuple[LawFound, ...]
     bound: float
     task: ControlTask
-    forecast: RestForecast
+    forecast: ForecastFound
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -78,36 +79,17 @@ class CompensateResult(PlottedResult):
         bound = (
             f"No traversal from rest that lands at {self.task.impact_speed:g} rad/s takes less than {self.bound:.4f} s."
         )
-        return [table(title, HEAD, rows), bound, self._at_rest()]
-
-    def _at_rest(self) -> str:
-        """Say what the plain LQR does by its gains alone."""
-        f = self.forecast
-        rest = f"cycles at {f.frequency:.3g} Hz, its load by {f.load:.3g} half-gaps" if f.cycles else "is still at rest"
-        return (
-            f"Without friction and load the plain LQR {rest}, by its gains alone. Without a gap it bears "
-            f"{1e3 * f.margins.delay:.3g} ms of further delay, and has a phase margin of "
-            f"{np.degrees(f.margins.phase):.3g} degrees. Its request moves {f.rank} of 6 states: not the load torque."
-        )
+        return [table(title, HEAD, rows), bound, rest_text(self.forecast, "the plain LQR"), margins_text(self.forecast)]
 
     def results(self, place: Path | None = None) -> CompensateFound:
         """Return what ``compensate.json`` says."""
         times, path = bound_path(self.task, self.task.impact_speed)
-        f = self.forecast
         return CompensateFound(
             alpha=self.task.alpha,
             tau=self.task.tau,
             impact_speed=self.task.impact_speed,
             bound=self.bound,
-            forecast=ForecastFound(
-                cycles=f.cycles,
-                twist=f.twist,
-                load=f.load,
-                frequency=f.frequency,
-                phase_margin=f.margins.phase,
-                delay_margin=f.margins.delay if np.isfinite(f.margins.delay) else None,
-                rank=f.rank,
-            ),
+            forecast=self.forecast,
             laws=self.laws,
             bound_speeds=tuple(_BOUND_SPEEDS.tolist()),
             bound_times=tuple(bound_time(self.task, speed) for speed in _BOUND_SPEEDS.tolist()),
@@ -180,7 +162,7 @@ def compensate(
             path = first_path(run, task) if not path[0].size else path
             progress(n * plants + plant + 1, len(LAWS) * plants)
         laws.append(_summarise(law, measured, path))
-    forecast = forecast_rest(task.nominal, task.gains(), task.sample_time)
+    forecast = rest_forecast(task.nominal, task.gains(), task.sample_time)
     return CompensateResult(tuple(laws), bound_time(task, impact_speed), task, forecast, given)
 
 

@@ -6,6 +6,7 @@ out the gap is small. It ends in rest or in the outermost cycle. So the motion i
 several starts, exactly between samples of the controller but for the instant of a contact, until it repeats.
 """
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -24,7 +25,7 @@ from orchestrator.plants.design import (
 
 Array = NDArray[np.float64]
 
-PARTS = 4  # of a sample, within which a contact is taken to last or not to
+LONGEST_PART = 2.5e-4  # of a sample, within which a contact is taken to last or not to [s]
 LONGEST = 240.0  # that a start is followed [s]
 PIECE = 10.0  # after which a motion is judged [s]
 STILL = 0.05  # motion of the load in a piece, over the half-gap, that is rest
@@ -87,7 +88,8 @@ def forecast_rest(
         ScenarioError: the loop is unstable even without a gap.
     """
     matrices = _matrices(values, np.asarray(gains), sample_time, delay)
-    _require_stable(matrices)
+    parts = n_parts(sample_time)
+    _require_stable(matrices, parts)
     state = np.zeros((6 + delay + 1, len(STARTS)))
     state[-1] = 1.0
     state[2], state[3] = np.array(STARTS).T
@@ -96,7 +98,7 @@ def forecast_rest(
     before = np.full(len(STARTS), np.inf)
     settled = np.zeros(len(STARTS), dtype=bool)
     for _ in range(round(LONGEST / PIECE)):
-        twist, load, state = _follow(matrices, state, rows, values.i)
+        twist, load, state = _follow(matrices, state, (rows, parts), values.i)
         size = 0.5 * np.ptp(load, axis=0)
         settled = (np.abs(size - before) < REPEATED * size) | (size < STILL)
         if settled.all():
@@ -113,14 +115,9 @@ def forecast_rest(
 
 
 def loop_margins(model: LinearModel, gains: tuple[float, ...], sample_time: float, delay: int = 0) -> Margins:
-    """Return the margins of ``L(z) = K (z - A)^-1 B z^-delay`` at the request [states of ``model``]."""
-    A, B = discretise(model, sample_time)
+    """Return the margins of the loop at the request [states of ``model``]."""
     angles = np.geomspace(1e-4 * sample_time, np.pi, FREQUENCIES)
-    z = np.exp(1j * angles)
-    poles, vectors = np.linalg.eig(A)
-    left = np.asarray(gains) @ vectors
-    right = np.linalg.solve(vectors, B[:, 0].astype(complex))
-    L = ((left * right) / (z[:, None] - poles)).sum(axis=1) * z**-delay
+    L = loop_response(model, gains, sample_time, delay, angles)
     phase = np.unwrap(np.angle(L))
     size = np.abs(L)
     crossed = np.flatnonzero(np.diff(np.floor((phase - np.pi) / (2.0 * np.pi))) != 0)
@@ -135,6 +132,19 @@ def loop_margins(model: LinearModel, gains: tuple[float, ...], sample_time: floa
         float(least.min(initial=np.pi)),
         float(times.min(initial=np.inf)),
     )
+
+
+def loop_response(
+    model: LinearModel, gains: tuple[float, ...], sample_time: float, delay: int, angles: Array
+) -> NDArray[np.complex128]:
+    """Return ``L(z) = K (z - A)^-1 B z^-delay`` at the angles of ``z`` [rad], shape (n,)."""
+    A, B = discretise(model, sample_time)
+    z = np.exp(1j * angles)
+    poles, vectors = np.linalg.eig(A)
+    left = np.asarray(gains) @ vectors
+    right = np.linalg.solve(vectors, B[:, 0].astype(complex))
+    response: NDArray[np.complex128] = ((left * right) / (z[:, None] - poles)).sum(axis=1) * z**-delay
+    return response
 
 
 def _matrices(values: DrivetrainValues, gains: Array, sample_time: float, delay: int) -> tuple[Array, Array, Array]:
@@ -159,26 +169,40 @@ def _matrices(values: DrivetrainValues, gains: Array, sample_time: float, delay:
     sample[5 : 5 + delay] = np.eye(n)[6 : 6 + delay]
     sample[5 + delay] = 0.0
     sample[5 + delay, :5] = -gains
-    part = sample_time / PARTS
+    part = sample_time / n_parts(sample_time)
     return expm(gap * part), expm(contact * part), sample
 
 
-def _require_stable(matrices: tuple[Array, Array, Array]) -> None:
+def n_parts(sample_time: float) -> int:
+    """Return into how many parts a sample [s] is cut."""
+    return math.ceil(sample_time / LONGEST_PART - 1e-9)
+
+
+def _require_stable(matrices: tuple[Array, Array, Array], parts: int) -> None:
     """Refuse a loop whose teeth always touch and that is unstable: far out every loop with a gap is that one."""
     _, contact, sample = matrices
-    step = np.linalg.matrix_power(contact[:-1, :-1], PARTS) @ sample[:-1, :-1]
+    step = np.linalg.matrix_power(contact[:-1, :-1], parts) @ sample[:-1, :-1]
     largest = float(np.abs(np.linalg.eigvals(step)).max())
     if largest >= 1.0:
-        raise ScenarioError(f"`gains` must be stable without a gap, but grow by {largest:.4g} in a sample", "gains")
+        late = len(sample) - 7
+        raise ScenarioError(
+            f"`gains` must make a loop that is stable without a gap, but with a `delay` of {late} it grows "
+            f"{largest:.4g} times in a sample",
+            "gains",
+            "delay",
+        )
 
 
-def _follow(matrices: tuple[Array, Array, Array], state: Array, rows: int, i: float) -> tuple[Array, Array, Array]:
+def _follow(
+    matrices: tuple[Array, Array, Array], state: Array, counts: tuple[int, int], i: float
+) -> tuple[Array, Array, Array]:
     """Return twist and load angle at each sample, shape (rows, starts), and the state behind them."""
     gap, contact, sample = matrices
+    rows, parts = counts
     twist, load = np.empty((rows, state.shape[1])), np.empty((rows, state.shape[1]))
     for row in range(rows):
         state = sample @ state
-        for _ in range(PARTS):
+        for _ in range(parts):
             phi = state[0] / i - state[2]
             side = np.where(phi > 1.0, 1.0, np.where(phi < -1.0, -1.0, 0.0))
             turned = state * np.where(side < 0.0, -1.0, 1.0)

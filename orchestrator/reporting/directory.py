@@ -14,6 +14,7 @@ from orchestrator.reporting.pages import (
     estimate,
     generic,
     inspect,
+    regulator,
     simulate,
     sweep,
     thesis,
@@ -24,7 +25,7 @@ from orchestrator.shared.source_tree import import_masters
 
 PAGE = "report.html"
 COMMANDS = (
-    "build", "check", "simulate", "sweep", "inspect", "estimate", "diagnose", "calibrate", "compensate",
+    "build", "check", "simulate", "sweep", "inspect", "estimate", "diagnose", "calibrate", "regulator", "compensate",
     "thesis", "ssp", "bench",
 )  # fmt: skip
 
@@ -47,6 +48,7 @@ _BUILDERS: dict[str, Callable[[ResultDocument], Report]] = {
     "diagnose": diagnose.build,
     "estimate": estimate.build,
     "inspect": inspect.build,
+    "regulator": regulator.build,
     "simulate": simulate.build,
     "ssp": simulate.build,
     "sweep": sweep.build,

@@ -90,5 +90,5 @@ def test_weights_that_damp_the_load_are_still_on_a_fast_drive():
 
 def test_a_loop_that_is_unstable_without_a_gap_is_refused():
     values, gains = gains_of(5e-3, THESIS)
-    with pytest.raises(ScenarioError, match="must be stable without a gap"):
+    with pytest.raises(ScenarioError, match="stable without a gap, but with a `delay` of 6 it grows"):
         forecast_rest(values, gains, STEP, delay=6)

@@ -2,7 +2,8 @@
 
 from statistics import median
 
-from orchestrator.reporting.model import Facts, Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.model import Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.pages.regulator import rest_facts
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
 from orchestrator.shared.results.compensate import CompensateFound
@@ -26,7 +27,7 @@ def build(source: ResultDocument) -> Report:
         ),
         sections=(
             _table(results),
-            *_forecast(results),
+            *rest_facts(results.forecast, "The plain LQR"),
             Plot("Traversals", "time [s]", "impact [rad/s]", (bound, *clouds), log_x=True, log_y=True),
             Plot(
                 "The first traversal of each law",
@@ -38,23 +39,6 @@ def build(source: ResultDocument) -> Report:
         origin=source.origin(),
         downloads=source.downloads(),
     )
-
-
-def _forecast(results: CompensateFound) -> tuple[Facts, ...]:
-    """Return what the plain LQR does by its gains alone; nothing where the file does not say it."""
-    f = results.forecast
-    if f is None:
-        return ()
-    late = None if f.delay_margin is None else 1e3 * f.delay_margin
-    items = (
-        ("without friction and load", "cycles" if f.cycles else "still"),
-        ("amplitude of the load [half-gaps]", f.load),
-        ("frequency [Hz]", f.frequency),
-        ("phase margin without a gap [rad]", f.phase_margin),
-        ("delay margin without a gap [ms]", late),
-        ("states of six that the request moves", f.rank),
-    )
-    return (Facts("The plain LQR at rest, by its gains", items),)
 
 
 def _table(results: CompensateFound) -> ReportTable:

@@ -3,6 +3,7 @@
 import msgspec
 
 from orchestrator.shared.results import ResultData
+from orchestrator.shared.results.regulator import ForecastFound
 
 
 class LawFound(msgspec.Struct, frozen=True):
@@ -22,22 +23,6 @@ class LawFound(msgspec.Struct, frozen=True):
     impacts: tuple[float, ...] = ()
     path_times: tuple[float, ...] = ()
     path: tuple[float, ...] = ()
-
-
-class ForecastFound(msgspec.Struct, frozen=True):
-    """The plain LQR at rest, without friction and load, by its gains alone.
-
-    ``twist`` and ``load`` are amplitudes over the half-gap, ``frequency`` [Hz]; margins [rad], [s]; ``rank`` of six
-    states.
-    """
-
-    cycles: bool
-    twist: float
-    load: float
-    frequency: float
-    phase_margin: float
-    delay_margin: float | None
-    rank: int
 
 
 class CompensateFound(ResultData, frozen=True, kw_only=True):

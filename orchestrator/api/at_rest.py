@@ -1,0 +1,68 @@
+"""What a loop with a gap will do at rest, as results and commands say it."""
+
+import math
+
+from orchestrator.control.harmonic import harmonic_cycle
+from orchestrator.control.standstill import LONGEST, forecast_rest
+from orchestrator.plants.design import DrivetrainValues
+from orchestrator.shared.results.regulator import ForecastFound
+
+
+def rest_forecast(
+    values: DrivetrainValues, gains: tuple[float, ...], sample_time: float, delay: int = 0
+) -> ForecastFound:
+    """Return what the loop ``u = -K x`` does at rest, with its margins.
+
+    Args:
+        gains: for ``REGULATOR_STATES``.
+        sample_time: of the controller [s].
+        delay: of the request [samples].
+
+    Raises:
+        ScenarioError: the loop is unstable even without a gap.
+    """
+    f = forecast_rest(values, gains, sample_time, delay)
+    harmonic = harmonic_cycle(values, gains, sample_time, delay)
+    m = f.margins
+    return ForecastFound(
+        cycles=f.cycles,
+        twist=f.twist,
+        load=f.load,
+        frequency=f.frequency,
+        phase_margin=m.phase,
+        delay_margin=_finite(m.delay),
+        rank=f.rank,
+        settled=f.settled,
+        harmonic_load=None if harmonic is None else harmonic.load,
+        harmonic_frequency=None if harmonic is None else harmonic.frequency,
+        lower_gain=m.lower or None,
+        upper_gain=_finite(m.upper),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def rest_text(f: ForecastFound, loop: str) -> str:
+    """Say in one line what ``loop`` does at rest by its gains alone."""
+    if f.cycles:
+        rest = f"cycles at {f.frequency:.3g} Hz: its load by {f.load:.3g} half-gaps, its twist by {f.twist:.3g}"
+    else:
+        rest = "comes to rest"
+    if f.harmonic_load is not None:
+        rest += f" (describing function: {f.harmonic_load:.3g} half-gaps at {f.harmonic_frequency:.3g} Hz)"
+    if not f.settled:
+        rest += f"; its motion did not repeat itself within {LONGEST:g} s"
+    return f"Without friction, load and limit of the torque {loop} {rest}."
+
+
+def margins_text(f: ForecastFound) -> str:
+    """Say in one line which margins the loop has without a gap, and what it cannot move."""
+    late = "any further delay" if f.delay_margin is None else f"{1e3 * f.delay_margin:.3g} ms of further delay"
+    most = "any number of" if f.upper_gain is None else f"{f.upper_gain:.3g}"
+    return (
+        f"Without a gap it bears {late}, {math.degrees(f.phase_margin):.3g} degrees of phase, and a gain from "
+        f"{f.lower_gain or 0.0:.3g} to {most} times as large. "
+        f"Its request moves {f.rank} of 6 states: not the load torque."
+    )

@@ -1,0 +1,59 @@
+"""``regulator``: gains of an LQR for a machine, and what its loop does at rest."""
+
+import argparse
+from pathlib import Path
+
+from orchestrator.api.records import read_model
+from orchestrator.api.regulator import design_regulator
+from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, TORQUE_WEIGHT
+from orchestrator.commands._console import print_blocks
+from orchestrator.errors import ScenarioError
+from orchestrator.shared.output import stage_output
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add machine, weights and timing."""
+    parser.add_argument(
+        "--model", type=Path, metavar="FILE.toml", help="the machine, as `estimate` takes it (default: the thesis's)"
+    )
+    weights = ",".join(f"{weight:g}" for weight in STATE_WEIGHTS)
+    parser.add_argument(
+        "--state-weights",
+        metavar="Q,Q,Q,Q,Q",
+        help=f"of theta_m, omega_m, theta_l, omega_l, T_m (default: {weights})",
+    )
+    parser.add_argument(
+        "--torque-weight", type=float, default=TORQUE_WEIGHT, metavar="R", help="of the request (default: %(default)s)"
+    )
+    parser.add_argument("--gains", metavar="K,K,K,K,K", help="judge these gains, and design none")
+    parser.add_argument(
+        "--sample-time", type=float, default=SAMPLE_TIME, metavar="S", help="of the controller (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--delay", type=int, default=0, metavar="N", help="of the request, in samples (default: %(default)s)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Design, print and write."""
+    with stage_output(arguments.out) as folder:
+        result = design_regulator(
+            read_model(arguments.model),
+            state_weights=_numbers("--state-weights", arguments.state_weights),
+            torque_weight=arguments.torque_weight,
+            gains=_numbers("--gains", arguments.gains),
+            sample_time=arguments.sample_time,
+            delay=arguments.delay,
+        )
+        result.write(folder, arguments.out)
+    print_blocks(result.blocks())
+    print(f"Written to {arguments.out}: report.html, regulator.json, parameters.toml, loop.csv")
+    return 0
+
+
+def _numbers(flag: str, text: str | None) -> tuple[float, ...] | None:
+    """Return the numbers of a list with commas."""
+    try:
+        return None if text is None else tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise ScenarioError(f"`{flag}` must be numbers separated by commas, but is {text!r}") from None

@@ -1,0 +1,59 @@
+"""The page of ``regulator``: gains, what the loop does at rest, and its response at the request."""
+
+import math
+
+from orchestrator.reporting.model import Facts, Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.source import ResultDocument
+from orchestrator.shared.results import read
+from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound
+
+
+def build(source: ResultDocument) -> Report:
+    """Return the page."""
+    results = read(source.results, RegulatorFound)
+    f = results.forecast
+    rest = f"cycles at {f.frequency:.3g} Hz, its load by {f.load:.3g} half-gaps" if f.cycles else "comes to rest"
+    phases = tuple(math.degrees(phase) for phase in results.phases)
+    return Report(
+        title="Regulator of a drivetrain with a gap",
+        summary=f"Without friction, load and limit of the torque the loop {rest}, by its gains alone.",
+        sections=(
+            ReportTable("Gains", (TableColumn("gain"), TableColumn("value", digits=9)), tuple(results.gains.items())),
+            *rest_facts(f, "The loop"),
+            Plot(
+                "The loop without a gap, cut at the request",
+                "frequency [Hz]",
+                "gain",
+                (Series("gain", results.frequencies, results.response),),
+                log_x=True,
+                log_y=True,
+            ),
+            Plot(
+                "Its phase",
+                "frequency [Hz]",
+                "phase [deg]",
+                (Series("phase", results.frequencies, phases),),
+                log_x=True,
+            ),
+        ),
+        origin=source.origin(),
+        downloads=source.downloads(),
+    )
+
+
+def rest_facts(f: ForecastFound | None, loop: str) -> tuple[Facts, ...]:
+    """Return what a loop does by its gains alone; nothing where the file does not say it."""
+    if f is None:
+        return ()
+    items = (
+        ("without friction and load", "cycles" if f.cycles else "still"),
+        ("amplitude of the load [half-gaps]", f.load),
+        ("amplitude of the twist [half-gaps]", f.twist),
+        ("frequency [Hz]", f.frequency),
+        ("load by the describing function [half-gaps]", f.harmonic_load),
+        ("phase margin without a gap [rad]", f.phase_margin),
+        ("delay margin without a gap [ms]", None if f.delay_margin is None else 1e3 * f.delay_margin),
+        ("largest factor of the gain without a gap", f.upper_gain),
+        ("states of six that the request moves", f.rank),
+    )
+    return (Facts(f"{loop} at rest, by its gains", items),)
