@@ -23,6 +23,8 @@ from orchestrator.api.pair import PairResult as PairResult
 from orchestrator.api.pair import run_pair as run_pair
 from orchestrator.api.records import read_model as read_model
 from orchestrator.api.records import read_record as read_record
+from orchestrator.api.regulator import RegulatorResult as RegulatorResult
+from orchestrator.api.regulator import design_regulator as design_regulator
 from orchestrator.api.report import report as report
 from orchestrator.api.scenario_sweep import ScenarioSweepResult as ScenarioSweepResult
 from orchestrator.api.scenario_sweep import sweep_scenario as sweep_scenario

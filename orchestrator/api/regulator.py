@@ -34,7 +34,7 @@ class RegulatorResult(PlottedResult):
 
     Attributes:
         gains: of ``theta_m``, ``omega_m``, ``theta_l``, ``omega_l`` and ``T_m``.
-        values: the machine.
+        values: inertias, shaft, friction and drive that it is made for.
         sample_time: [s].
         delay: of the request [samples].
         forecast: what the loop does at rest, and its margins.
