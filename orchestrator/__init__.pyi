@@ -19,6 +19,8 @@ from orchestrator.api.estimate import EstimateResult as EstimateResult
 from orchestrator.api.estimate import estimate as estimate
 from orchestrator.api.inspect import InspectResult as InspectResult
 from orchestrator.api.inspect import inspect as inspect
+from orchestrator.api.locate_gap import LocationResult as LocationResult
+from orchestrator.api.locate_gap import locate_gap as locate_gap
 from orchestrator.api.pair import PairResult as PairResult
 from orchestrator.api.pair import run_pair as run_pair
 from orchestrator.api.records import read_model as read_model

@@ -6,6 +6,7 @@ from typing import Any
 from orchestrator.api.records import as_record
 from orchestrator.errors import ScenarioError
 from orchestrator.estimation.zeros import set_zeros
+from orchestrator.plants.known.two_stage_train import TRAIN
 from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
@@ -22,6 +23,12 @@ def plausible_record(record: Record | Path | str, model: Model, motor_only: bool
 
 def require_linear(model: Model) -> None:
     """Refuse models that the estimators would not see whole."""
+    if model.fmu == TRAIN:
+        raise ScenarioError(
+            f"{model.source}: `fmu` must be Drivetrain here, but is {TRAIN}: `locate_gap`, or the command `estimate`, "
+            "says in which of its stages the gap is",
+            "fmu",
+        )
     if model.fmu != "Drivetrain":
         raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain to have a gap, but is {model.fmu}")
     for name, entry in model.parameters.items():

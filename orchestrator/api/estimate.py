@@ -58,7 +58,7 @@ class EstimateResult(PlottedResult):
 
     command: ClassVar[str] = "estimate"
     replaces: ClassVar[tuple[str, ...]] = (
-        *(f"estimate_{name}.png" for name in ("fit", "profile", "online", "flanks")),
+        *(f"estimate_{name}.png" for name in ("fit", "profile", "online", "flanks", "stages")),
         *(f"{DIAGNOSIS}/{name}" for name in DiagnosisResult.replaces),
     )
     record: Record

@@ -31,6 +31,7 @@ LIBRARIES = (
     (f"{_PLANTS}.linear", False),
     (f"{_PLANTS}.requests", False),
     ("orchestrator.estimation.kernel", False),
+    ("orchestrator.estimation.stages.kernel", False),
     ("orchestrator.estimation.flanks.chain", False),
     ("orchestrator.estimation.online", True),
     ("orchestrator.diagnosis.fmu.loop_kernel", False),

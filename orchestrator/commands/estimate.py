@@ -17,6 +17,7 @@ from orchestrator.api.arguments import choose_settings
 from orchestrator.api.design import DEFAULT_SIZE, RANGES, DesignResult, check_design, design
 from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.estimate import DIAGNOSIS, EstimateResult, estimate
+from orchestrator.api.locate_gap import TRAIN, complete_record, locate_gap, require_train
 from orchestrator.api.records import read_model
 from orchestrator.api.shown import Block
 from orchestrator.commands._budget import Budget
@@ -109,6 +110,8 @@ def run(args: argparse.Namespace) -> int:
     """Estimate or design, print tables, write JSON, CSV and report."""
     options = _design_options(args)
     model = read_model(args.model)
+    if model.fmu == TRAIN:
+        return _locate(args, model)
     require_linear(model)
     settings = choose_settings(args.settings, EstimationSettings)
     reading = reading_of(args)
@@ -161,6 +164,33 @@ def run(args: argparse.Namespace) -> int:
         write_report(folder, "estimate")
     print_blocks([*blocks, f"Written to {args.out}"])
     return INTERRUPTED if interrupted else 0
+
+
+def _locate(args: argparse.Namespace, model: Model) -> int:
+    """Say in which stage of a train the gap is."""
+    for name in ("method", "motor_only", "design", "cost"):
+        if getattr(args, name):
+            raise ScenarioError(f"`{name}` must be left out with a {TRAIN}, but is given", name)
+    if len(args.records) != 1:
+        raise ScenarioError(f"`DATA` must be one record with a {TRAIN}, but is {len(args.records)}")
+    settings = choose_settings(args.settings, EstimationSettings)
+    require_train(model)
+    record = complete_record(args.records[0], model, **reading_of(args))
+    limit = math.inf if args.time_limit is None else args.time_limit
+    with Stages() as stages:
+        stages.begin("trying sizes", 0.0)
+        found = locate_gap(
+            record,
+            model,
+            time_limit=limit,
+            settings=settings,
+            progress=lambda work, stage, share: stages.at(stage, share),
+        )
+    given = {name: _plain(value) for name, value in vars(args).items() if name not in ("run", "command", "pictures")}
+    with stage_output(args.out, found.replaces) as folder:
+        found.write(folder, args.out, {"record": str(args.records[0])} | given, args.pictures)
+    print_blocks([*what_was_read([record]), *found.blocks(), f"Written to {args.out}"])
+    return 0
 
 
 def _tell_cost(records: list[Record], model: Model, args: argparse.Namespace, settings: EstimationSettings) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestrator.estimation.cramer_rao import error_bound_of_fit
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import GapFit, Likelihood
+from orchestrator.estimation.likelihood import Fit, GapFit, Likelihood
 from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
 from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate
@@ -22,7 +22,7 @@ def describe(fit: GapFit) -> Estimate:
     settings = fit.likelihood.settings.verdict
     alpha, error, column = _gap_of(fit)
     curve = profile(fit)
-    wider = max(_misfit_variance(fit), _block_variance(fit, column, settings.blocks))
+    wider = max(_misfit_variance(fit), block_variance(fit, column, settings.blocks))
     low, high = curve.interval(alpha, NORMAL_95**2 * wider)
     # A profile point that is not quite the maximum makes the interval too short, never too long.
     half = NORMAL_95 * math.sqrt(wider) * error
@@ -77,7 +77,7 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
         "cramer_rao": error_bound_of_fit(likelihood, fit),
         "deviance": fit.point.deviance,
         "parameters": _parameters(likelihood, fit),
-        "innovation_autocorrelation": [float(_autocorrelation(white[:, n])) for n in range(white.shape[1])],
+        "innovation_autocorrelation": [float(autocorrelation(white[:, n])) for n in range(white.shape[1])],
         "torque_noise": list(likelihood.noise(fit.point.theta).torque),
         "measurement_noise": list(likelihood.noise(fit.point.theta).measured[: white.shape[1]]),
     }
@@ -98,7 +98,7 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
 
 
-def _block_variance(fit: GapFit, column: int, blocks: int) -> float:
+def block_variance(fit: Fit[Any], column: int, blocks: int) -> float:
     """Return the variance of an unknown that blocks of the record show, over that of white one-step errors.
 
     It is one where it is no more than chance makes it. Godambe's information from blocks (White 1982; Kuensch 1989):
@@ -174,7 +174,7 @@ def _model_warning(
     )
 
 
-def _autocorrelation(white: Array) -> float:
+def autocorrelation(white: Array) -> float:
     """Return the autocorrelation at lag one."""
     centred = white - white.mean()
     return float(np.sum(centred[1:] * centred[:-1]) / max(float(np.sum(centred**2)), 1e-300))

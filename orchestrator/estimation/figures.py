@@ -1,7 +1,7 @@
 """Figures of an estimate and of a record, drawn with matplotlib's object interface (no global state, no display)."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -155,3 +155,32 @@ def draw_record(path: Path, record: Record, bands: Sequence[tuple[float, float, 
     axes[-1].set_ylabel("torque power [%]")
     axes[-1].set_xlabel("band [Hz]")
     figure.savefig(path, dpi=DPI)
+
+
+def draw_stages(path: Path, record: Record, curves: Mapping[str, Array], halves: Sequence[float]) -> None:
+    """Draw the twists of both stages, time in the gap shaded and flanks dashed, and the one-step errors.
+
+    Args:
+        curves: those of a ``Location``.
+        halves: half-gap of each stage [rad]; NaN where it is open.
+    """
+    figure, axes = _figure(3, (9.0, 7.5))
+    contacts = 3.0 * curves["contact_1"] + curves["contact_2"]
+    span = _liveliest(record, contacts)
+    t = curves["time"][span]
+    for n, half in enumerate(halves, start=1):
+        axis = axes[n - 1]
+        axis.plot(t, 1e3 * curves[f"twist_{n}"][span], color=BLUE, linewidth=1.0, label=f"stage {n}, fitted")
+        for sign in (-1.0, 1.0) if math.isfinite(half) else ():
+            axis.axhline(sign * 1e3 * half, color=ORANGE, linewidth=0.8, linestyle="--")
+        shade_gap(axis, t, curves[f"contact_{n}"][span])
+        axis.set_ylabel("twist [mrad]")
+    for name, colour, label in (("m", BLUE, "motor encoder"), ("l", ORANGE, "load encoder")):
+        axes[2].plot(t, 1e3 * curves[f"one_step_error_{name}"][span], color=colour, linewidth=0.7, label=label)
+    axes[2].set_ylabel("one-step error [mrad]")
+    axes[2].set_xlabel("time [s]")
+    for axis in axes:
+        axis.legend(loc="upper right", fontsize=8)
+        axis.grid(alpha=0.25)
+        axis.margins(x=0.0)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})

@@ -8,19 +8,20 @@ In all functions: ``theta``: (unknowns,); ``free``: (k,) indices of the free unk
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Self
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels, affine_model, innovations
-from orchestrator.estimation.problem import IMPULSE, OFFSET, SAMPLED, SCALE, STATE_NAMES, GapProblem
+from orchestrator.estimation.problem import IMPULSE, OFFSET, SAMPLED, SCALE, STATE_NAMES, GapProblem, Unknown
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.shared.inference.inverse import pseudo_inverse
 from pyfmu_sources.equations import NAMES, DrivetrainParameters
@@ -44,71 +45,67 @@ class Point:
     result: Innovations = field(repr=False)
 
 
-@dataclass(frozen=True)
-class GapFit:
-    """A maximum of the likelihood.
+class UnknownProblem(Protocol):
+    """What is unknown: see :class:`orchestrator.estimation.problem.GapProblem`."""
 
-    Attributes:
-        free: (k,) indices of the unknowns that were fitted.
-        information: (k, k) Fisher information of the free unknowns, prior included.
-        converged: whether the last step changed the objective by less than the tolerance.
-        likelihood: the likelihood with what the fit has learnt of it, for the next fit.
-    """
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Return every unknown, in the order of the vector."""
 
-    point: Point
-    free: NDArray[np.int64]
-    information: Array
-    iterations: int
-    converged: bool
-    likelihood: "Likelihood" = field(repr=False)
+    @property
+    def outputs(self) -> Array:
+        """Return the measured angles (n, outputs) [rad]."""
 
-    @cached_property
-    def covariance(self) -> Array:
-        """Return the inverse (k, k) of the information."""
-        return inverse(self.information)
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the unknowns, in order."""
+
+    @property
+    def start(self) -> Array:
+        """Return the prior means."""
+
+    def index(self, name: str) -> int:
+        """Return the place of an unknown in the vector, from 0."""
 
 
-class Likelihood:
+P = TypeVar("P", bound=UnknownProblem)
+
+
+class FilterLikelihood(ABC, Generic[P]):
     """Evaluates a problem at vectors of unknowns; two threads share the runs of one derivative.
 
     ``soft`` blurs the flanks by the uncertainty of the twist, which smooths the likelihood for the start of a fit.
     ``information`` is the last Fisher information of each unknown; the difference quotients are scaled by it.
     Nothing of it changes once it is made: a fit returns another one with what it has learnt.
+
+    Attributes:
+        size: place of the gap's size among the unknowns.
     """
 
     def __init__(
-        self,
-        problem: GapProblem,
-        threads: int = 1,
-        settings: EstimationSettings = DEFAULT_SETTINGS,
-        effort: Effort | None = None,
+        self, problem: P, size: str, threads: int, settings: EstimationSettings, effort: Effort | None
     ) -> None:
         self.problem = problem
         self.settings = settings
         self.soft = False
-        names = problem.names
-        self._offset = names.index(OFFSET) if OFFSET in names else None
-        self._alpha = names.index("alpha")
-        self._impulse = names.index(IMPULSE)
+        self.size = problem.index(size)
         self.information = np.diag([(10.0 / u.scale) ** 2 for u in problem.unknowns])  # the last one known
         self._floor = np.array([(0.1 / u.scale) ** 2 for u in problem.unknowns])
-        self._places = [(n, NAMES.index(name)) for n, name in enumerate(names) if name in NAMES and name != OFFSET]
-        self._state = [problem.index(name) for name in STATE_NAMES]
-        self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
-        self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
-        self._scale = names.index(SCALE) if SCALE in names else None
-        self._sampled = names.index(SAMPLED) if SAMPLED in names else None
         self.effort = effort or Effort()
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._mean = problem.start
         self._weight = np.array([u.deviation**-2 if math.isfinite(u.deviation) else 0.0 for u in problem.unknowns])
+
+    @abstractmethod
+    def run(self, theta: Array, keep: bool = False) -> Innovations:
+        """Return the innovations at ``theta``."""
 
     def with_options(
         self,
         *,
         soft: bool | None = None,
         information: Array | None = None,
-        problem: GapProblem | None = None,
+        problem: P | None = None,
         effort: Effort | None = None,
     ) -> Self:
         """Return the likelihood with other flanks, information, bounds of the unknowns, or leave to go on.
@@ -132,37 +129,6 @@ class Likelihood:
     def first_damping(self) -> float:
         """Return the damping with which a fit starts."""
         return 1e-3 if self.soft else START_DAMPING
-
-    def parameters(self, theta: Array) -> DrivetrainParameters:
-        """Return the parameters ``p`` of a vector."""
-        p = list(self.problem.base)
-        for place, name in self._places:
-            p[name] = float(theta[place])
-        return DrivetrainParameters._make(p)
-
-    def noise(self, theta: Array) -> NoiseLevels:
-        """Return the noise levels of a vector."""
-        measured = [math.exp(min(max(theta[n], LEAST_LOG_NOISE), LARGEST_LOG_NOISE)) for n in self._noise]
-        motor, load = (math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._torque)
-        return NoiseLevels((measured[0], measured[-1]), (motor, load))
-
-    def run(self, theta: Array, keep: bool = False) -> Innovations:
-        """Return the innovations at ``theta``."""
-        self.effort.check()
-        record = self.problem.record
-        u = record.u
-        if self._sampled is not None and record.u_sampled is not None:
-            u = u + theta[self._sampled] * (record.u_sampled - u)
-        if self._scale is not None:
-            u = u * theta[self._scale]
-        model = affine_model(self.parameters(theta), float(theta[self._impulse]))
-        outputs, x0 = self.problem.outputs, theta[self._state]
-        if self._offset is not None:
-            shift = theta[self._offset]
-            outputs = outputs - np.array([0.0, shift])
-            x0 = x0 - np.array([0.0, 0.0, shift, 0.0, 0.0])
-        noise = self.noise(theta)
-        return innovations(model, u, outputs, record.step, x0, noise, keep, self.soft, record.u_deviation)
 
     def at(self, theta: Array) -> Point:
         """Return the likelihood at ``theta``; infinite where the filter diverges."""
@@ -205,7 +171,7 @@ class Likelihood:
         The first two are (k, n outputs), the matrix (k, k) takes a vector of unknowns to the directions.
         """
         base = point.result
-        basis = self._basis(free)
+        basis = self._basis(point.theta, free)
         lower, upper = (np.array([getattr(self.problem.unknowns[n], end) for n in free]) for end in ("lower", "upper"))
 
         def look(n: int, step: float) -> tuple[Array, Array]:
@@ -223,7 +189,7 @@ class Likelihood:
             with np.errstate(all="ignore"):  # threads of a pool do not have the caller's
                 if float(error @ error) > JUMP:
                     other = look(n, -self.difference)
-                    if float(other[0] @ other[0]) < float(error @ error):
+                    if 0.0 < float(other[0] @ other[0]) < float(error @ error):  # 0: beyond a bound
                         return other
             return error, spread
 
@@ -232,7 +198,7 @@ class Likelihood:
         spread = np.array([column[1] for column in columns])
         return error, spread, np.asarray(np.linalg.inv(basis))
 
-    def _basis(self, free: NDArray[np.int64]) -> Array:
+    def _basis(self, theta: Array, free: NDArray[np.int64]) -> Array:
         """Return a factor (k, k) of the covariance of the free unknowns; alpha never moves down along a column."""
         # What is hardly known must not be moved far: a tenth of its scale bounds the step.
         information = self.information[np.ix_(free, free)] + np.diag(self._floor[free])
@@ -240,15 +206,96 @@ class Likelihood:
         values, vectors = np.linalg.eigh(information / np.outer(diagonal, diagonal))
         values = np.maximum(values, 1e-13 * values[-1])
         basis = vectors / np.sqrt(values) / diagonal[:, None]
-        alpha = np.flatnonzero(free == self._alpha)
+        alpha = np.flatnonzero(free == self.size)
         if alpha.size:
             basis = basis * np.where(basis[alpha[0]] < 0.0, -1.0, 1.0)
         return np.asarray(basis)
 
 
-def maximise(
-    likelihood: Likelihood, start: Array, free: Sequence[int], iterations: int = 30, tolerance: float = 1e-2
-) -> GapFit:
+L = TypeVar("L", bound=FilterLikelihood[Any])
+
+
+@dataclass(frozen=True)
+class Fit(Generic[L]):
+    """A maximum of the likelihood.
+
+    Attributes:
+        free: (k,) indices of the unknowns that were fitted.
+        information: (k, k) Fisher information of the free unknowns, prior included.
+        converged: whether the last step changed the objective by less than the tolerance.
+        likelihood: the likelihood with what the fit has learnt of it, for the next fit.
+    """
+
+    point: Point
+    free: NDArray[np.int64]
+    information: Array
+    iterations: int
+    converged: bool
+    likelihood: L = field(repr=False)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Return the inverse (k, k) of the information."""
+        return inverse(self.information)
+
+
+class Likelihood(FilterLikelihood[GapProblem]):
+    """The likelihood of a record of the drivetrain."""
+
+    def __init__(
+        self,
+        problem: GapProblem,
+        threads: int = 1,
+        settings: EstimationSettings = DEFAULT_SETTINGS,
+        effort: Effort | None = None,
+    ) -> None:
+        super().__init__(problem, "alpha", threads, settings, effort)
+        names = problem.names
+        self._offset = names.index(OFFSET) if OFFSET in names else None
+        self._impulse = names.index(IMPULSE)
+        self._places = [(n, NAMES.index(name)) for n, name in enumerate(names) if name in NAMES and name != OFFSET]
+        self._state = [problem.index(name) for name in STATE_NAMES]
+        self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
+        self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
+        self._scale = names.index(SCALE) if SCALE in names else None
+        self._sampled = names.index(SAMPLED) if SAMPLED in names else None
+
+    def parameters(self, theta: Array) -> DrivetrainParameters:
+        """Return the parameters ``p`` of a vector."""
+        p = list(self.problem.base)
+        for place, name in self._places:
+            p[name] = float(theta[place])
+        return DrivetrainParameters._make(p)
+
+    def noise(self, theta: Array) -> NoiseLevels:
+        """Return the noise levels of a vector."""
+        measured = [math.exp(min(max(theta[n], LEAST_LOG_NOISE), LARGEST_LOG_NOISE)) for n in self._noise]
+        motor, load = (math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._torque)
+        return NoiseLevels((measured[0], measured[-1]), (motor, load))
+
+    def run(self, theta: Array, keep: bool = False) -> Innovations:
+        """Return the innovations at ``theta``."""
+        self.effort.check()
+        record = self.problem.record
+        u = record.u
+        if self._sampled is not None and record.u_sampled is not None:
+            u = u + theta[self._sampled] * (record.u_sampled - u)
+        if self._scale is not None:
+            u = u * theta[self._scale]
+        model = affine_model(self.parameters(theta), float(theta[self._impulse]))
+        outputs, x0 = self.problem.outputs, theta[self._state]
+        if self._offset is not None:
+            shift = theta[self._offset]
+            outputs = outputs - np.array([0.0, shift])
+            x0 = x0 - np.array([0.0, 0.0, shift, 0.0, 0.0])
+        noise = self.noise(theta)
+        return innovations(model, u, outputs, record.step, x0, noise, keep, self.soft, record.u_deviation)
+
+
+GapFit = Fit[Likelihood]
+
+
+def maximise(likelihood: L, start: Array, free: Sequence[int], iterations: int = 30, tolerance: float = 1e-2) -> Fit[L]:
     """Return the maximum of the likelihood reached from ``start`` over the ``free`` unknowns.
 
     Steps are damped until the objective falls; an unknown at its bound stays there while the score points outward.
@@ -271,8 +318,8 @@ def maximise(
         held = ((value <= lower) & (gradient > 0.0)) | ((value >= upper) & (gradient < 0.0))
         before = point.objective
         point, damping = _step(likelihood, point, places, gradient, information, held, (lower, upper), damping)
-        if likelihood.problem.index("alpha") in places:
-            fit = GapFit(point, places, information, done, False, likelihood)
+        if likelihood.size in places:
+            fit = Fit(point, places, information, done, False, likelihood)
             likelihood.effort.keep(fit, likelihood.problem.outputs.shape[0], point.objective)
         if before - point.objective < tolerance:
             # The first differences may have been taken too coarsely: look again with better ones.
@@ -281,11 +328,11 @@ def maximise(
                 continue
             converged = True
             break
-    return GapFit(point, places, information, done, converged, likelihood)
+    return Fit(point, places, information, done, converged, likelihood)
 
 
 def _step(
-    likelihood: Likelihood,
+    likelihood: L,
     point: Point,
     places: NDArray[np.int64],
     gradient: Array,

@@ -107,7 +107,7 @@ def transition(a: Matrix, b_u: Vector, b_1: Vector, h: float, phi: Matrix, gain_
                 phi[r, c] = other[r, c]
 
 
-def _first_root(v0: float, s0: float, v1: float, s1: float, h: float) -> float:
+def first_root(v0: float, s0: float, v1: float, s1: float, h: float) -> float:
     """Return the first time in (0, h] at which the cubic with these end values and slopes turns negative, or -1.0."""
     c1 = h * s0
     c2 = 3.0 * (v1 - v0) - h * (2.0 * s0 + s1)
@@ -158,13 +158,13 @@ def _next_event(normal: Vector, alpha: float, flank: int, x: Vector, end: Vector
             s = 1.0 if way == 0 else -1.0
             if alpha - s * d1 > reach and alpha - s * d0 > reach:
                 continue
-            when = _first_root(max(alpha - s * d0, 0.0), -s * w0, alpha - s * d1, -s * w1, h)
+            when = first_root(max(alpha - s * d0, 0.0), -s * w0, alpha - s * d1, -s * w1, h)
             if when >= 0.0 and (hit < 0.0 or when < hit):
                 hit, side = when, s
         return hit, side
     side = 1.0 if flank == 2 else -1.0
     if not (side * d1 - alpha > reach and side * d0 - alpha > reach):
-        hit = _first_root(max(side * d0 - alpha, 0.0), side * w0, side * d1 - alpha, side * w1, h)
+        hit = first_root(max(side * d0 - alpha, 0.0), side * w0, side * d1 - alpha, side * w1, h)
     return hit, side
 
 

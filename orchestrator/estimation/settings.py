@@ -101,6 +101,25 @@ class FlankSettings(Settings, frozen=True):
     block_rounds: Annotated[int, setting("rounds that a record without a block has", ge=1)] = 8
 
 
+class StageSettings(Settings, frozen=True):
+    """In which stage of a train the gap is."""
+
+    decisive: Annotated[
+        float, setting("log-likelihood by which an answer must fall behind the best to be excluded", gt=0)
+    ] = 8.0
+    shared: Annotated[float, share("least share of the gap that each stage has where both have one", le=0.5)] = 0.2
+    negligible: Annotated[
+        float, share("share of the gap below which a stage has none: contacts differ from the model's", le=0.5)
+    ] = 0.03
+    starts: Annotated[int, setting("further starts of a fit of both that is no optimum", ge=0)] = 4
+    restless: Annotated[
+        float, setting("variance of the share among blocks over that of noise, from which a fit is no optimum", ge=1)
+    ] = 4.0
+    misfit_widening: Annotated[
+        float, setting("factor on the intervals of sizes: what the model lacks is not white", ge=1)
+    ] = 1.3
+
+
 class TrustSettings(Settings, frozen=True):
     """Where green ends."""
 
@@ -116,6 +135,7 @@ class EstimationSettings(Settings, frozen=True):
     fit: MaximisationSettings = MaximisationSettings()
     verdict: GapVerdictSettings = GapVerdictSettings()
     flanks: FlankSettings = FlankSettings()
+    stages: StageSettings = StageSettings()
     trust: TrustSettings = TrustSettings()
 
 

@@ -8,8 +8,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from orchestrator.estimation.protocol import Estimate
-from orchestrator.estimation.settings import TrustSettings
+from orchestrator.estimation.settings import EstimationSettings, TrustSettings
+from orchestrator.estimation.stages.location import Location
 from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 FITTED = "maximum_likelihood"
@@ -31,6 +33,30 @@ def trust_of_estimates(
         else:
             found[estimate.method] = trust_of(_compare_methods(estimate, fit, own))
     return found
+
+
+def trust_of_location(location: Location, record: Record, model: Model, settings: EstimationSettings) -> Trust:
+    """Return how far the place of a gap can be trusted; an answer that is a set is honest, and no reason for doubt."""
+
+    def reasons() -> Iterator[Reason]:
+        if not location.converged:
+            yield Reason(Level.AMBER, "the fit stopped before it converged")
+        if location.answers and location.traversals < settings.trust.least_traversals:
+            yield Reason(Level.AMBER, f"the gap is traversed only {location.traversals} times")
+        if record.u_sampled is not None:
+            yield Reason(Level.AMBER, "the torque has rows of its own and was taken as held between them")
+        if record.u_deviation is not None:
+            yield Reason(Level.AMBER, "samples of the torque are missing and were interpolated")
+        chance = settings.verdict.chance_autocorrelation / math.sqrt(record.size)
+        worst = max(abs(value) for value in location.autocorrelation)
+        if worst > max(settings.verdict.notable_autocorrelation, chance):
+            yield Reason(
+                Level.AMBER,
+                f"the model does not explain the record (autocorrelation {worst:.2f} of the one-step errors)",
+            )
+        yield from _of_values(location.parameters, model, settings.trust)
+
+    return trust_of(reasons())
 
 
 def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Reason]:

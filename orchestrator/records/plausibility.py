@@ -26,12 +26,12 @@ NEAR_DEGREES = 0.3  # of a logarithm: an inertia this near to 1/57 of the model'
 
 
 def check_plausible(record: Record, model: Model) -> None:
-    """Refuse a record of a ``Drivetrain`` whose units, signs or columns cannot be what the format demands."""
-    if model.fmu != "Drivetrain":
+    """Refuse a record of one stage or two whose units, signs or columns cannot be what the format demands."""
+    if model.fmu not in ("Drivetrain", "TwoStageTrain"):
         return
     record = record.fill_missing()
-    parameters = {name: entry.value for name, entry in model.parameters.items()}
-    _check_rate(record, natural_frequency(model))
+    parameters = _of_one_stage({name: entry.value for name, entry in model.parameters.items()})
+    _check_rate(record, _frequency(parameters))
     if record.theta_l is not None:
         _check_slope(record, record.theta_l, parameters["i"])
     _check_inertia(record, parameters)
@@ -39,7 +39,19 @@ def check_plausible(record: Record, model: Model) -> None:
 
 def natural_frequency(model: Model) -> float:
     """Return how fast [rad/s] the shaft of a ``Drivetrain`` oscillates, its motor free to turn."""
-    p = {name: entry.value for name, entry in model.parameters.items()}
+    return _frequency({name: entry.value for name, entry in model.parameters.items()})
+
+
+def _of_one_stage(p: Mapping[str, float]) -> Mapping[str, float]:
+    """Return the parameters of a drivetrain that turns as a train of two stages does while all teeth touch."""
+    if "i_1" not in p:
+        return p
+    compliance = 1.0 / max(p["k_2"], 1e-9) + 1.0 / max(p["k_1"] * p["i_2"] ** 2, 1e-9)
+    inertia = p["J_m"] + p["J_s"] / p["i_1"] ** 2
+    return {"J_m": inertia, "J_l": p["J_l"], "k": 1.0 / compliance, "i": p["i_1"] * p["i_2"], "tau": p["tau"]}
+
+
+def _frequency(p: Mapping[str, float]) -> float:
     return math.sqrt(p["k"] * (1.0 / p["J_l"] + 1.0 / (p["J_m"] * p["i"] ** 2)))
 
 

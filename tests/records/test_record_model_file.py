@@ -52,7 +52,7 @@ def test_a_model_file_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ('fmu = "Gearbox"', "`fmu` in {} must be one of Drivetrain, ServoAxis, but is 'Gearbox'"),
+        ('fmu = "Gearbox"', "`fmu` in {} must be one of Drivetrain, ServoAxis, TwoStageTrain, but is 'Gearbox'"),
         ("fmu = 3", "`fmu` in {} must be text, but is a number"),
         ("fum = 3", "`fum` in {} must be one of fmu, header, parameters, encoders, columns"),
         ("parameters = []", "`parameters` in {} must be a table, but is a list"),

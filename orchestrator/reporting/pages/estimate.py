@@ -18,6 +18,7 @@ from orchestrator.reporting.model import (
     Text,
 )
 from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.pages.location import build_location
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument, numbers, words
 from orchestrator.reporting.trust import trust_badge, trust_section
@@ -36,6 +37,8 @@ ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder
 def build(source: ResultDocument) -> Report:
     """Return the page."""
     results = read(source.results, EstimateFound)
+    if results.location is not None:
+        return build_location(source, results, results.location)
     found = {name: e for name, e in results.estimates.items() if e.not_applicable is None}
     sections: list[Section] = trust_section(results.trust)
     sections += [*_diagnosis_sections(results), *_repeats(results)]

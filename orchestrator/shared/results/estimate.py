@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-from orchestrator.shared.results import Interval, LiveFound, Sizes, TrustFound, first_version
+from orchestrator.shared.results import GapFound, Interval, LiveFound, Sizes, TrustFound, first_version
 from orchestrator.shared.results.diagnose import DiagnoseFound
 
 
@@ -56,6 +56,24 @@ class ExcitationFound(msgspec.Struct, frozen=True):
     peak_motor_speed: float
 
 
+class LocationFound(msgspec.Struct, frozen=True, kw_only=True):
+    """Where the gap of a train of two stages is.
+
+    ``answers`` are what the record leaves possible, of "1", "2" and "both"; none where it shows no gap. ``stages`` are
+    half-gaps at each gear's output, ``behind`` is the log-likelihood by which each answer falls behind the best.
+    """
+
+    answers: tuple[str, ...]
+    answer: str
+    total: GapFound
+    stages: dict[str, GapFound]
+    behind: dict[str, float]
+    traversals: int
+    autocorrelation: tuple[float, float]
+    parameters: dict[str, dict[str, float]] = {}
+    unit: str = "rad"
+
+
 class EstimateFound(MethodFound, frozen=True, kw_only=True, omit_defaults=True):
     """``estimate``: the half-gap of the first method that applies, and of each; with a design the excitations."""
 
@@ -64,6 +82,7 @@ class EstimateFound(MethodFound, frozen=True, kw_only=True, omit_defaults=True):
     estimates: dict[str, MethodFound] = {}
     more_records: tuple[RecordFound, ...] | None = None
     repeats: RepeatsFound | None = None
+    location: LocationFound | None = None
     method: str | None = None
     play: Sizes | None = None
     live: LiveFound | None = None

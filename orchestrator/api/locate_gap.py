@@ -1,0 +1,234 @@
+"""In which stage of a train the gap is, from a measured record."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestrator.api.arguments import choose_settings
+from orchestrator.api.design import DesignResult
+from orchestrator.api.estimate import EstimateResult
+from orchestrator.api.methods import describe_record
+from orchestrator.api.numerics import numeric_errors
+from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.records import as_record
+from orchestrator.api.shown import Block, table
+from orchestrator.errors import RecordError, ScenarioError
+from orchestrator.estimation.effort import Stop, never
+from orchestrator.estimation.protocol import LEVEL
+from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
+from orchestrator.estimation.stages.locating import locate_gap as find_gap
+from orchestrator.estimation.stages.location import BOTH, Location, StageGap
+from orchestrator.estimation.stages.problem import GAPS
+from orchestrator.estimation.trust import trust_of_location
+from orchestrator.plants.known.two_stage_train import TRAIN
+from orchestrator.records.model_file import Model
+from orchestrator.records.plausibility import check_plausible
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import NORMAL_95
+from orchestrator.shared.output import write_columns
+from orchestrator.shared.results import GapFound
+from orchestrator.shared.results.estimate import EstimateFound, LocationFound
+from orchestrator.shared.settings import as_tables
+from orchestrator.shared.trust import Trust
+
+METHOD = "two_stages"
+HEAD = ("gap", "half-gap [rad]", "95 % interval [rad]")
+BEHIND = ("answer", "log-likelihood behind the best")
+
+
+@dataclass(frozen=True, repr=False)
+class LocationResult(PlottedResult):
+    """In which stage of a train the gap is, and how large it is in each.
+
+    Attributes:
+        record: motor and load angle, and the torque, as they were read.
+        model: what it was compared with.
+        location: what the fits say.
+        arguments: what was asked for.
+        settings: the thresholds that were used.
+    """
+
+    command: ClassVar[str] = "estimate"
+    replaces: ClassVar[tuple[str, ...]] = (*EstimateResult.replaces, *DesignResult.replaces)
+    record: Record
+    model: Model
+    location: Location
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    settings: EstimationSettings = DEFAULT_SETTINGS
+
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """What the record leaves possible, of "1", "2" and "both"; none where it shows no gap."""
+        return self.location.answers
+
+    @property
+    def stages(self) -> tuple[StageGap, StageGap]:
+        """Half-gap of each stage, at its gear's output [rad], with its interval."""
+        return self.location.stages
+
+    @property
+    def total(self) -> StageGap:
+        """Both half-gaps, seen from the load [rad], with their interval."""
+        return self.location.total
+
+    @property
+    def trust(self) -> Trust:
+        """How far the answer can be trusted, with the reasons."""
+        return trust_of_location(self.location, self.record, self.model, self.settings)
+
+    @property
+    def message(self) -> str:
+        """One sentence that says where the gap is."""
+        where, low = self.location.answer, self.location.total.interval[1]
+        if not self.answers:
+            return f"No gap is seen: with 95 % confidence both half-gaps together are below {low:.3g} rad at the load."
+        if len(self.answers) == 1:
+            return f"The gap is in {where}."
+        return (
+            f"The record leaves open where the gap is: {where}. A torque that reverses often, with a tone near the "
+            "intermediate shaft's own frequency, and less noise would tell."
+        )
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the answer, the sizes and by how much each answer falls behind."""
+        r = self.record
+        title = f"{r.source}: {r.duration:g} s at {1.0 / r.step:g} Hz, two encoders"
+        rows = [_row(f"stage {n}, at its gear's output", gap) for n, gap in enumerate(self.stages, start=1)]
+        rows.append(_row("both, seen from the load", self.total))
+        ways = [(_words(name), f"{behind:.1f}") for name, behind in self.location.behind.items()]
+        doubts = [f"The answer is {self.trust.level.word}: {reason}" for reason in self.trust.reasons]
+        return [table(title, HEAD, rows), table("Where the gap can be", BEHIND, ways), self.message, *doubts]
+
+    def results(self, place: Path | None = None) -> EstimateFound:
+        """Return what ``estimate.json`` says.
+
+        Args:
+            place: the folder of the result; nothing in it is named.
+        """
+        found = self.location
+        seen = bool(found.answers)
+        deviation = (found.total.interval[1] - found.total.alpha) / NORMAL_95
+        return EstimateFound(
+            alpha=found.total.alpha,
+            standard_error=deviation if seen else None,
+            interval=found.total.interval,
+            level=LEVEL,
+            unit="rad",
+            visible=seen,
+            message=self.message,
+            trust=self.trust.to_result(),
+            record=describe_record(self.record),
+            method=METHOD,
+            location=LocationFound(
+                answers=found.answers,
+                answer=found.answer,
+                total=_gap_found(found.total),
+                stages={str(n): _gap_found(gap) for n, gap in enumerate(found.stages, start=1)},
+                behind=found.behind,
+                traversals=found.traversals,
+                autocorrelation=found.autocorrelation,
+                parameters=found.parameters,
+            ),
+            settings=as_tables(self.settings),
+        )
+
+    def write_data(self, folder: Path) -> None:
+        """Write ``stages.csv``: record, fit, twist and flank of each stage, one-step errors."""
+        write_columns(folder / "stages.csv", self.location.curves, lambda v: "" if math.isnan(v) else f"{v:.10g}")
+
+    def draw(self, path: Path) -> None:
+        """Draw the twist of each stage against its flanks.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+        """
+        from orchestrator.estimation.figures import draw_stages
+
+        draw_stages(path, self.record, self.location.curves, [gap.alpha for gap in self.stages])
+
+    def draw_files(self, folder: Path) -> None:
+        """Draw the twist of each stage against its flanks."""
+        self.draw(folder / "estimate_stages.png")
+
+
+def locate_gap(
+    record: Record | Path | str,
+    model: Model,
+    *,
+    time_limit: float = math.inf,
+    settings: EstimationSettings | Path | str | None = None,
+    progress: Callable[[str, str, float], None] = lambda work, stage, share: None,
+    stop: Stop = never,
+) -> LocationResult:
+    """Find out in which stage of a train of two stages the gap is.
+
+    Args:
+        record: a measured record with torque, motor and load angle, or its path.
+        model: of a ``TwoStageTrain``, as ``read_model`` returns it.
+        time_limit: [s], after which the fit is given up (default: never).
+        settings: thresholds, or the path of a TOML file with those that differ from the default.
+        progress: called with the piece of work, its stage, and the share that is behind.
+        stop: asked again and again: a text ends the work without a result.
+
+    Returns:
+        The answer, which is a set where the record does not tell, and the half-gaps with intervals.
+
+    Raises:
+        RecordError: the record is wrong, lacks a column, or does not fit the model at all.
+        ScenarioError: the model is of another plant, or states what is fitted.
+        ConvergenceError: no fit is found, or not within the time limit.
+
+    Examples:
+        >>> found = oc.locate_gap("train.csv", oc.read_model("train.toml"))
+        >>> found.answers, found.message
+        (('2',), 'The gap is in stage 2.')
+    """
+    chosen = choose_settings(settings, EstimationSettings)
+    require_train(model)
+    measured = complete_record(record, model)
+    with numeric_errors(f"{measured.source}: no train can be fitted to this record"):
+        found = find_gap(measured, model, chosen, time_limit, lambda stage, share: progress(METHOD, stage, share), stop)
+    given = {"record": measured.source, "model": model.source, "method": METHOD}
+    return LocationResult(measured, model, found, given, chosen)
+
+
+def complete_record(record: Record | Path | str, model: Model, **reading: Any) -> Record:
+    """Return a record that has all that a train needs and can be one of it."""
+    measured = as_record(record, model, **reading)
+    if measured.theta_l is None:
+        raise RecordError(
+            f"{measured.source}: column `theta_l` must be there to tell in which stage the gap is, but is not: log the "
+            "load's angle, or name its column by `[columns.theta_l] name = ...` in the model file"
+        )
+    check_plausible(measured, model)
+    return measured
+
+
+def require_train(model: Model) -> None:
+    """Refuse models of other plants, and those that state what is fitted."""
+    if model.fmu != TRAIN:
+        raise ScenarioError(f"{model.source}: `fmu` must be {TRAIN} to have two stages, but is {model.fmu}", "fmu")
+    for name, entry in model.parameters.items():
+        plain = name in model.plant.linear or name in ("i_1", "i_2", *GAPS)
+        default = next(row.default for row in model.plant.table if row.name == name)
+        if not plain and (entry.value != default or entry.uncertainty > 0.0):
+            raise ScenarioError(
+                f"{model.source}: `{name}` must be left out for `estimate`, which fits friction, lateness and zeros "
+                f"itself, but is {entry.value:g}",
+                name,
+            )
+
+
+def _row(name: str, gap: StageGap) -> list[str]:
+    low, high = gap.interval
+    return [name, f"{gap.alpha:.5g}" if math.isfinite(gap.alpha) else "open", f"{low:.5g} to {high:.5g}"]
+
+
+def _words(answer: str) -> str:
+    return "both stages" if answer == BOTH else f"stage {answer} alone"
+
+
+def _gap_found(gap: StageGap) -> GapFound:
+    return GapFound(gap.alpha if math.isfinite(gap.alpha) else None, *gap.interval)

@@ -1,0 +1,218 @@
+"""The fits of one record of a train: a gap in stage 1 alone, in stage 2 alone, in both, and wherever it is.
+
+While an intermediate shaft floats between two gaps, small errors of the model send it elsewhere: the likelihood has
+many optima in the share of the gap that stage 2 has. It is smooth where the filter trusts the model of motor and load
+little, and that of the intermediate shaft, on which nothing unknown acts, much. So fits begin there, from a grid of
+sizes and then of shares, and the torque noise falls for as long as the likelihood rises. The free fit starts from the
+best of all, so that no model that it holds is better than it.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.errors import ConvergenceError
+from orchestrator.estimation.description import block_variance
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.likelihood import Fit, Point, maximise
+from orchestrator.estimation.settings import StageSettings
+from orchestrator.estimation.stages.likelihood import StagesLikelihood
+from orchestrator.estimation.stages.problem import BODIES, SHARE, TOTAL, TWIST
+
+GRID = tuple(1e-3 * 1.4**n for n in range(18))  # rad, to a third of a radian
+SHARES = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
+COARSE, MIDDLE, FINE = 0.3, (0.1, 0.03), 0.01  # torque noise at the motor [N.m.s^0.5] of a drive of ``USUAL`` N.m
+USUAL = 20.0
+QUIET = 0.2  # torque noise of the intermediate shaft over that of the motor, for its inertia
+PLACES = (-1.0, 0.0, 1.0)  # of the intermediate shaft within the first gap at the first row, in half-gaps
+NOISE_STEPS = (-3.0, -1.0, 1.0)  # of a logarithm
+
+StagesFit = Fit[StagesLikelihood]
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class StageFits:
+    """The best fit under each answer; ``free`` is at least as good as all others."""
+
+    first: StagesFit
+    second: StagesFit
+    both: StagesFit
+    free: StagesFit
+
+
+def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Report) -> StageFits:
+    """Return the fits of a record; ``report`` is called with what is done, and the share of the work behind."""
+    report("trying sizes", 0.0)
+    coarse = _fit_size(likelihood)
+    report("fitting a gap in both stages", 0.15)
+    floating = _bound_share(likelihood, settings.shared)
+    start = min(_try_shares(coarse.likelihood, coarse.point.theta, SHARES), key=_objective).theta
+    both = _fit_both(floating, start, FINE)
+    both = _better(both, _fit_both(floating, _renew(both), FINE))
+    singles = []
+    for share, done in ((0.0, 0.5), (1.0, 0.7)):
+        report(f"fitting a gap in stage {1 + round(share)} alone", done)
+        starts = [coarse.point.theta, with_noise(likelihood, both.point.theta, MIDDLE[-1])]
+        tried = [p for theta in starts for p in _try_shares(coarse.likelihood, theta, [share])]
+        singles.append(_finish(coarse.likelihood, min(tried, key=_objective), _all_but(likelihood, SHARE)))
+    report("fitting the share of each stage", 0.85)
+    free = _free(likelihood, both, *singles)
+    for n in range(settings.starts):
+        if not settings.shared < _share(free) < 1.0 - settings.shared or _scatter(free) < settings.restless:
+            break
+        both = _better(both, _fit_both(floating, _renew(free), (FINE, MIDDLE[-1])[n % 2]))
+        free = _better(free, _free(likelihood, both))
+    for n, share in enumerate((0.0, 1.0)):  # what the free fit has learnt, the nearest single one should know
+        if abs(_share(free) - share) < settings.shared:
+            singles[n] = _better(singles[n], _fit_at(free, share))
+    if min(fit.point.objective for fit in (both, *singles)) < free.point.objective:
+        free = _free(likelihood, both, *singles)
+    return StageFits(singles[0], singles[1], both, free)
+
+
+def _better(*fits: StagesFit) -> StagesFit:
+    return min(fits, key=lambda fit: fit.point.objective)
+
+
+def _free(likelihood: StagesLikelihood, *fits: StagesFit) -> StagesFit:
+    """Return the fit with the share free that starts from the best."""
+    best = _better(*fits)
+    return maximise(
+        best.likelihood.with_options(problem=likelihood.problem), best.point.theta, _all_but(likelihood), 15, 0.1
+    )
+
+
+def _scatter(fit: StagesFit) -> float:
+    """Return by what blocks of the record differ on the share, over what noise does; much, and a fit is no optimum."""
+    column = list(fit.free).index(fit.likelihood.problem.index(SHARE))
+    return block_variance(fit, column, fit.likelihood.settings.verdict.blocks)
+
+
+def _renew(fit: StagesFit) -> Array:
+    """Return the best vector at another share, with some torque noise: where a fit begins anew."""
+    theta = with_noise(fit.likelihood, fit.point.theta, FINE)
+    return min(_try_shares(fit.likelihood, theta, SHARES), key=_objective).theta
+
+
+def _bound_share(likelihood: StagesLikelihood, shared: float) -> StagesLikelihood:
+    """Return the likelihood in which each stage has at least a share of the gap."""
+    problem = likelihood.problem
+    unknowns = list(problem.unknowns)
+    place = problem.index(SHARE)
+    unknowns[place] = replace(unknowns[place], lower=shared, upper=1.0 - shared)
+    return likelihood.with_options(problem=replace(problem, unknowns=tuple(unknowns)))
+
+
+def with_noise(likelihood: StagesLikelihood, theta: Array, level: float) -> Array:
+    """Return a vector with the torque noise at a level, that of the intermediate shaft far below the others."""
+    problem, theta = likelihood.problem, theta.copy()
+    quiet = QUIET * problem.base["J_s"] / problem.base["J_m"]
+    for body, unit in zip(BODIES, problem.units, strict=True):
+        value = level * unit / USUAL * (quiet if body == "middle" else 1.0)
+        unknown = problem.unknowns[problem.index(f"log_torque_{body}")]
+        theta[problem.index(unknown.name)] = min(max(math.log(value), unknown.lower), unknown.upper)
+    return theta
+
+
+def _objective(point: Point) -> float:
+    return point.objective
+
+
+def _share(fit: StagesFit) -> float:
+    return float(fit.point.theta[fit.likelihood.problem.index(SHARE)])
+
+
+def _all_but(likelihood: StagesLikelihood, *names: str) -> list[int]:
+    """Return the places of all unknowns but those of these names; "torque" stands for all torque noise."""
+    noise = [f"log_torque_{body}" for body in BODIES] if "torque" in names else []
+    return [n for n, name in enumerate(likelihood.problem.names) if name not in (*names, *noise)]
+
+
+def _fit_size(likelihood: StagesLikelihood) -> StagesFit:
+    """Return a rough fit with a gap in stage 1 alone, which has about the size of any."""
+    problem = likelihood.problem
+    start = with_noise(likelihood, problem.start, COARSE)
+    start[problem.index(SHARE)] = 0.0
+    points = []
+    for size in GRID:
+        start[problem.index(TOTAL)] = size
+        points.append(likelihood.at(start.copy()))
+    best = min(points, key=_objective)
+    if not math.isfinite(best.objective):
+        raise ConvergenceError("the likelihood must be finite somewhere, but no start led to one; check the units")
+    free = _all_but(likelihood, "torque", SHARE)
+    fit = maximise(likelihood, best.theta, free, 4, tolerance=2.0)
+    for level in MIDDLE:
+        lower = maximise(fit.likelihood, with_noise(likelihood, fit.point.theta, level), free, 3, tolerance=2.0)
+        if lower.point.objective > fit.point.objective:
+            break
+        fit = lower
+    return fit
+
+
+def _try_shares(likelihood: StagesLikelihood, theta: Array, shares: Iterable[float]) -> list[Point]:
+    """Return the likelihood at each share, the intermediate shaft at its best place in the first gap."""
+    problem = likelihood.problem
+    share_at, twist_at = problem.index(SHARE), problem.index(TWIST)
+    found = []
+    for share in shares:
+        moved = theta.copy()
+        moved[share_at] = share
+        half = likelihood.halves(moved)[0]
+        points = [likelihood.at(moved)]
+        for place in PLACES:
+            other = moved.copy()
+            other[twist_at] = place * half
+            points.append(likelihood.at(other))
+        found.append(min(points, key=_objective))
+    return found
+
+
+def _fit_both(likelihood: StagesLikelihood, start: Array, level: float) -> StagesFit:
+    """Return the fit of a gap in both stages, begun with torque noise of a level."""
+    place = likelihood.problem.index(SHARE)
+    bounds = likelihood.problem.unknowns[place]
+    shares = [share for share in SHARES if bounds.lower <= share <= bounds.upper]
+    theta = with_noise(likelihood, start, level)
+    theta[place] = min(max(theta[place], bounds.lower), bounds.upper)
+    rough = maximise(likelihood, theta, _all_but(likelihood, "torque"), 4, tolerance=1.0)
+    tried = [*_try_shares(rough.likelihood, rough.point.theta, shares), rough.point]
+    return _finish(rough.likelihood, min(tried, key=_objective), _all_but(likelihood))
+
+
+def _fit_at(fit: StagesFit, share: float) -> StagesFit:
+    """Return the fit with this share that starts from another."""
+    likelihood = fit.likelihood
+    start = _try_shares(likelihood, fit.point.theta, [share])[0]
+    return maximise(likelihood, start.theta, _all_but(likelihood, SHARE), 6, tolerance=0.1)
+
+
+def _finish(likelihood: StagesLikelihood, start: Point, free: Sequence[int]) -> StagesFit:
+    """Return the fit of ``free`` and of the torque noise, which falls as the fit gets better."""
+    torque = [likelihood.problem.index(f"log_torque_{body}") for body in BODIES]
+    others = [n for n in free if n not in torque]
+    settled = _settle_noise(likelihood, start, torque)
+    fit = maximise(likelihood, settled.theta, others, 4, tolerance=0.5)
+    settled = _settle_noise(fit.likelihood, fit.point, torque)
+    return maximise(fit.likelihood, settled.theta, free, 12, tolerance=0.1)
+
+
+def _settle_noise(likelihood: StagesLikelihood, point: Point, torque: Sequence[int]) -> Point:
+    """Return the best point reached by steps of one level of torque noise at a time."""
+    unknowns = likelihood.problem.unknowns
+    for _ in range(2):
+        before = point
+        for n in torque:
+            for step in NOISE_STEPS:
+                theta = point.theta.copy()
+                theta[n] = float(np.clip(theta[n] + step, unknowns[n].lower, unknowns[n].upper))
+                moved = likelihood.at(theta)
+                if moved.objective < point.objective:
+                    point = moved
+                    break
+        if point is before:
+            break
+    return point

@@ -1,0 +1,201 @@
+"""What the fits of a train say: in which stage the gap is, and how large it can be in each.
+
+An answer is "1", "2" or "both". It is excluded where its best fit falls behind the free one by more than a decisive
+log-likelihood. Both stages always fit at least as well as one alone; so "both" is judged by the best fit in which each
+stage has a notable share of the gap. What is left is the answer, a set where the record does not tell.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.estimation.description import autocorrelation, block_variance
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.settings import StageSettings
+from orchestrator.estimation.stages.fit import StageFits, StagesFit
+from orchestrator.estimation.stages.problem import SHARE, TOTAL
+from orchestrator.shared.inference.normal import NORMAL_95
+
+FIRST, SECOND, BOTH = "1", "2", "both"
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class StageGap:
+    """A half-gap [rad] with its 95 % interval; NaN where the record tells no more than the interval."""
+
+    alpha: float
+    interval: Interval
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where the gap of a train is.
+
+    Attributes:
+        answers: what the record leaves possible, of "1", "2" and "both"; none where it shows no gap.
+        total: both half-gaps, seen from the load.
+        stages: half-gap of each stage, at its gear's output.
+        behind: by how much log-likelihood the best fit of each answer falls behind the best of all.
+        converged: whether the free fit did.
+        traversals: changes of flank of either stage.
+        autocorrelation: of the one-step errors of motor and load encoder.
+        parameters: value, standard error and nominal of each fitted unknown.
+        curves: arrays for the plots, by name.
+    """
+
+    answers: tuple[str, ...]
+    total: StageGap
+    stages: tuple[StageGap, StageGap]
+    behind: dict[str, float]
+    converged: bool
+    traversals: int
+    autocorrelation: tuple[float, float]
+    parameters: dict[str, dict[str, float]]
+    curves: dict[str, Array] = field(repr=False)
+
+    @property
+    def answer(self) -> str:
+        """The answers in words: "stage 1", "both stages", "stage 1 or both stages", "nowhere seen"."""
+        words = [BOTH + " stages" if answer == BOTH else f"stage {answer}" for answer in self.answers]
+        return ", ".join([*words[:-2], " or ".join(words[-2:])]) if words else "nowhere seen"
+
+
+def locate(fits: StageFits, settings: StageSettings) -> Location:
+    """Return what the fits of a record say."""
+    behind = {
+        name: 0.5 * (fit.point.objective - fits.free.point.objective)
+        for name, fit in ((FIRST, fits.first), (SECOND, fits.second), (BOTH, fits.both))
+    }
+    answers = [name for name in (FIRST, SECOND, BOTH) if behind[name] <= settings.decisive]
+    share = float(fits.free.point.theta[fits.free.likelihood.problem.index(SHARE)])
+    if {FIRST, SECOND} <= set(answers):  # what lies between two that are possible is no less so
+        answers = [FIRST, SECOND, BOTH]
+    if not {FIRST, SECOND} & set(answers):
+        # A share that nobody would mend is none: a contact that differs from the model's makes one of a thousandth.
+        nearest, other = (FIRST, share) if share < 0.5 else (SECOND, 1.0 - share)
+        if other < settings.negligible:
+            answers.insert(0, nearest)
+        elif BOTH not in answers:
+            answers.append(BOTH)
+    wider = _widening(fits.free, settings)
+    ways = {FIRST: fits.first, SECOND: fits.second, BOTH: fits.both}
+    within = settings.shared <= share <= 1.0 - settings.shared
+    if BOTH in answers and (within or behind[BOTH] > settings.decisive):
+        ways[BOTH] = fits.free
+    sizes = [_sizes(ways[answer], wider) for answer in answers]
+    best = min((ways[answer] for answer in answers), key=lambda fit: fit.point.objective)
+    total = _total(best, wider)
+    stages = [_join([each[n] for each in sizes]) for n in range(2)]
+    if len(answers) == 1 and answers[0] != BOTH:
+        absent = 1 if answers[0] == FIRST else 0
+        stages[absent] = StageGap(0.0, (0.0, _most(fits.free, absent, wider)))
+    kept = best.likelihood.run(best.point.theta, keep=True)
+    traversals = _changes(kept.contacts // 3) + _changes(kept.contacts % 3)
+    if not total.interval[0] > 0.0 or traversals == 0:
+        answers = []
+    white = kept.errors / np.sqrt(kept.variances)
+    return Location(
+        tuple(answers),
+        total,
+        (stages[0], stages[1]),
+        behind,
+        fits.free.converged,
+        traversals,
+        (autocorrelation(white[:, 0]), autocorrelation(white[:, 1])),
+        _parameters(best),
+        _curves(best, kept.states, kept.contacts, kept.errors),
+    )
+
+
+def _changes(flanks: NDArray[np.int64]) -> int:
+    touched = flanks[flanks != 1]
+    return int(np.count_nonzero(np.diff(touched)))
+
+
+def _widening(fit: StagesFit, settings: StageSettings) -> float:
+    """Return by what the variance of sizes exceeds that of white errors."""
+    column = list(fit.free).index(fit.likelihood.problem.index(TOTAL))
+    return max(settings.misfit_widening**2, block_variance(fit, column, fit.likelihood.settings.verdict.blocks))
+
+
+def _gradients(fit: StagesFit) -> tuple[Array, Array]:
+    """Return both half-gaps (2,) [rad] and their derivatives by the free unknowns (2, k)."""
+    likelihood, theta = fit.likelihood, fit.point.theta
+    problem = likelihood.problem
+    total, share = theta[problem.index(TOTAL)], theta[problem.index(SHARE)]
+    ratio = likelihood.value(theta, "i_2")
+    by = {
+        TOTAL: ((1.0 - share) * ratio, share),
+        SHARE: (-total * ratio, total),
+        "i_2": (total * (1.0 - share), 0.0),
+    }
+    names = [problem.names[n] for n in fit.free]
+    slopes = np.array([by.get(name, (0.0, 0.0)) for name in names]).T
+    return np.array(likelihood.halves(theta)), slopes
+
+
+def _sizes(fit: StagesFit, wider: float) -> tuple[StageGap, StageGap]:
+    """Return the half-gap of each stage by one fit."""
+    values, slopes = _gradients(fit)
+    reach = NORMAL_95 * np.sqrt(wider * np.einsum("ij,jk,ik->i", slopes, fit.covariance, slopes))
+    most = _total(fit, wider).interval[1] * np.array([fit.likelihood.value(fit.point.theta, "i_2"), 1.0])
+    first, second = (
+        StageGap(float(value), (max(float(value - half), 0.0), min(float(value + half), float(end))))
+        for value, half, end in zip(values, reach, most, strict=True)
+    )
+    return first, second
+
+
+def _total(fit: StagesFit, wider: float) -> StageGap:
+    place = fit.likelihood.problem.index(TOTAL)
+    column = list(fit.free).index(place)
+    value = float(fit.point.theta[place])
+    half = NORMAL_95 * math.sqrt(wider * fit.covariance[column, column])
+    return StageGap(value, (max(value - half, 0.0), value + half))
+
+
+def _most(free: StagesFit, stage: int, wider: float) -> float:
+    """Return the upper end [rad] of what the free fit leaves for a stage that has no gap."""
+    return _sizes(free, wider)[stage].interval[1]
+
+
+def _join(gaps: list[StageGap]) -> StageGap:
+    """Return a half-gap that is one of several."""
+    if len(gaps) == 1:
+        return gaps[0]
+    return StageGap(math.nan, (min(gap.interval[0] for gap in gaps), max(gap.interval[1] for gap in gaps)))
+
+
+def _parameters(fit: StagesFit) -> dict[str, dict[str, float]]:
+    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    unknowns = [fit.likelihood.problem.unknowns[n] for n in fit.free]
+    return {
+        unknown.name: {"value": float(fit.point.theta[n]), "standard_error": float(error), "nominal": unknown.mean}
+        for n, unknown, error in zip(fit.free, unknowns, errors, strict=True)
+    }
+
+
+def _curves(fit: StagesFit, states: Array, contacts: NDArray[np.int64], errors: Array) -> dict[str, Array]:
+    """Return twists [rad] and flanks (-1, 0, 1) of both stages, and one-step errors [rad], each (n,)."""
+    p = fit.likelihood.parameters(fit.point.theta)
+    record = fit.likelihood.problem.record
+    offset = fit.likelihood.value(fit.point.theta, "zero_of_load")
+    curves: dict[str, Any] = {
+        "time": record.time,
+        "u": record.u,
+        "theta_m": record.theta_m,
+        "theta_l": fit.likelihood.problem.outputs[:, 1],
+        "theta_m_fitted": states[:, 0],
+        "theta_l_fitted": states[:, 4] + offset,
+        "twist_1": states[:, 0] / p["i_1"] - states[:, 2],
+        "twist_2": states[:, 2] / p["i_2"] - states[:, 4],
+        "contact_1": contacts // 3 - 1.0,
+        "contact_2": contacts % 3 - 1.0,
+        "one_step_error_m": errors[:, 0],
+        "one_step_error_l": errors[:, 1],
+    }
+    return curves
