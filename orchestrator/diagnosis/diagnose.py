@@ -133,7 +133,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
         verdict=verdict, effects=effects, nuisances=_nuisances(result, graded, parameters, model, settings),
         parameters=parameters, left=dict(zip(workings.balances[0].channels, map(float, left), strict=True)),
         remaining=remaining, law=_law(verdict, remaining, settings), test=test, record=record, trust=trust,
-        notes=_notes(result, record, test), settings=settings, searched=bool(searched.steps),
+        notes=_notes(result, record, test, settings), settings=settings, searched=bool(searched.steps),
         model=model, workings=workings,
     )  # fmt: skip
 
@@ -192,7 +192,9 @@ def _law(verdict: str, remaining: Sequence[Dependence], settings: DiagnosisSetti
     return best if strong and best.code else None
 
 
-def _notes(result: SearchResult, record: RecordEvidence, test: Sequence[TestMisfit]) -> tuple[str, ...]:
+def _notes(
+    result: SearchResult, record: RecordEvidence, test: Sequence[TestMisfit], settings: DiagnosisSettings
+) -> tuple[str, ...]:  # fmt: skip
     notes = [
         f"nothing moves in the last {one.rows} rows of {one.source}, which are its test part: the test says nothing"
         for one in test
@@ -200,6 +202,6 @@ def _notes(result: SearchResult, record: RecordEvidence, test: Sequence[TestMisf
     ]
     if not result.complete:
         notes.append("the time limit ended the search: effects that were not tried may be missing")
-    if record.inertia_error > record.inertia:
+    if not record.shows_inertia and not record.inertia_is_off(settings.selection.prior_deviations):
         notes.append("the record does not show its inertia: it needs accelerations, or a torque in its true unit")
     return tuple(notes)

@@ -29,3 +29,9 @@ def list_effects(labels: Sequence[str]) -> str:
 def list_words(words: Sequence[str]) -> str:
     """Return words as a list in a sentence."""
     return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+
+
+def number_words(value: float, digits: int = 3) -> str:
+    """Return a number with so many digits, below a million without an exponent."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e6 else text

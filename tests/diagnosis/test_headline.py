@@ -5,7 +5,12 @@ from typing import Any
 
 import pytest
 
-from orchestrator.diagnosis.report.summary import headline
+from orchestrator.diagnosis.report.judgement import judge_trust
+from orchestrator.diagnosis.report.summary import headline, words_on_test_data
+from orchestrator.diagnosis.selection.outcome import Dependence, RecordEvidence
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.effects.words import number_words
+from orchestrator.reporting.pages.diagnosis_answer import in_words, next_steps
 
 
 @pytest.mark.parametrize("verdict", ["none", "parameters"])
@@ -29,3 +34,53 @@ def test_a_hint_stands_beside_no_claim_that_nothing_is_missing(verdict: str) -> 
     assert "hint" in said
     assert "torque ripple at the motor" in said
     assert "Nothing is missing" not in said
+
+
+def test_what_is_left_and_constant_follows_no_signal() -> None:
+    def words(formula: str) -> str:
+        comparison: Any = None
+        return Dependence("twist", "shaft", "rad", "N.m", (), (), (), comparison, 0.26, formula).words
+
+    assert words("0.04428") == "26 % of it is a constant, 0.04428 N.m"
+    assert words("0.0443 s") == "26 % of it follows the twist, like 0.0443 s with s in rad"
+    assert words("") == "26 % of it follows the twist"
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (2041.3, 3, "2040"),
+        (149.6, 2, "150"),
+        (999.7, 3, "1000"),
+        (0.0123, 2, "0.012"),
+        (57.14, 3, "57.1"),
+        (3.9e7, 3, "3.9e+07"),
+    ],
+)
+def test_numbers_of_sentences_have_no_exponents(value: float, digits: int, text: str) -> None:
+    assert number_words(value, digits) == text
+
+
+def test_an_inertia_that_is_not_shown_is_no_number_to_ask_for() -> None:
+    def reason(inertia: float, error: float) -> str:
+        record = RecordEvidence(0.0, inertia, error, 0.6)
+        (only,) = judge_trust("effects", (), True, record, (), {}, (), DiagnosisSettings()).reasons
+        return only
+
+    assert "asks for at most 0.28 times" in reason(0.04, 0.12)
+    assert "asks for 0.15 times" in reason(0.15, 0.02)
+
+
+def test_what_test_data_say_of_a_torque_is_said_with_its_uncertainty() -> None:
+    torque = SimpleNamespace(gain=0.24, t=1.4)
+    effect: Any = SimpleNamespace(evidence=SimpleNamespace(motion_share=-0.03, test_torque=torque))
+    said = words_on_test_data(effect)
+    assert said.endswith("takes 24 % of the torque that is left without it, 1.4 times its uncertainty")
+
+
+def test_every_next_step_is_on_the_page_at_once() -> None:
+    said = ["Verdict: effects.", "What is left is noise.", "Next: record A.", "Next, to settle friction: record B."]
+    (steps,) = next_steps(said)
+    assert steps.paragraphs == ("Record A.", "To settle friction: record B.")
+    (rest,) = in_words(said)
+    assert rest.paragraphs == ("What is left is noise.",)

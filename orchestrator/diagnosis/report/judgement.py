@@ -8,7 +8,7 @@ from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, SignalMisfit, TestMisfit
 from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
-from orchestrator.effects.words import list_effects
+from orchestrator.effects.words import list_effects, number_words
 from orchestrator.records.model_file import ModelParameter
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
@@ -55,8 +55,9 @@ def judge_trust(
         why = "no effect of the library is likely" if searched else "no search was made"
         red.append(f"something is missing in the model, and {why}")
     if record.inertia_is_off(settings.selection.prior_deviations):
+        asked = f"{record.inertia:.2g}" if record.shows_inertia else f"at most {record.highest_inertia:.2g}"
         red.append(
-            f"the record alone asks for {record.inertia:.2g} times the inertia of the model file: check the inertias, "
+            f"the record alone asks for {asked} times the inertia of the model file: check the inertias, "
             "the units and the scale of the torque"
         )
     for one in test:
@@ -65,8 +66,8 @@ def judge_trust(
         for signal in one.signals:
             if signal.is_missed:
                 amber.append(
-                    f"free runs on the test part of {one.source} miss {signal.signal} by {signal.miss:.3g} times its "
-                    f"noise{_of_motion(signal)}"
+                    f"free runs on the test part of {one.source} miss {signal.signal} by "
+                    f"{number_words(signal.miss)} times its noise{_of_motion(signal)}"
                 )
     if likely := [effect.label for effect in effects if effect.grade is Grade.LIKELY]:
         amber.append(f"likely, not certain: {list_effects(likely)}")
@@ -83,7 +84,7 @@ def judge_trust(
 def _of_motion(signal: SignalMisfit) -> str:
     """Return a misfit as a share of the motion, in words; nothing where that is not known."""
     share = 1.0 - signal.r_squared
-    return f", {100.0 * np.sqrt(max(share, 0.0)):.2g} % of its motion (rms)" if np.isfinite(share) else ""
+    return f", {number_words(100.0 * np.sqrt(max(share, 0.0)), 2)} % of its motion (rms)" if np.isfinite(share) else ""
 
 
 def _is_far(estimate: ParameterEstimate, uncertainty: float) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, Nuisance, ValueEstimate
 from orchestrator.diagnosis.selection.grading import GRADE_RULES
 from orchestrator.diagnosis.selection.outcome import Grade
-from orchestrator.effects.words import effect_words, list_effects, list_words
+from orchestrator.effects.words import SITES, effect_words, list_effects, list_words, number_words
 from orchestrator.plants.description import Plant
 from orchestrator.shared.play import Play
 
@@ -61,7 +61,7 @@ def summarise_fmu(diagnosis: DiagnosisOutcome) -> Iterator[str]:
     yield f"What is left (rms, where the model was fitted): {left}; {follows}."
     for test in diagnosis.test:
         parts = [
-            f"{one.signal} {one.nominal / one.noise:.3g} -> {one.final / one.noise:.3g} times its noise"
+            f"{one.signal} {number_words(one.nominal / one.noise)} -> {number_words(one.miss)} times its noise"
             for one in test.signals
         ]
         rows = f"{test.rows} rows that nothing was fitted to"
@@ -78,8 +78,8 @@ def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
             found = "No effect of the library is likely, yet" if diagnosis.searched else "No effect was looked for, and"
             outside = " outside the library" if diagnosis.searched else ""
             said = (
-                f"{found} the {compared} misses the test data by {diagnosis.largest_miss:.3g} times the noise: "
-                f"a disturbance, or an effect{outside}"
+                f"{found} the {compared} misses the test data by {number_words(diagnosis.largest_miss)} times the "
+                f"noise: a disturbance, or an effect{outside}"
             )
         elif near:
             said = f"The {compared} explains the record{refitted}"
@@ -148,14 +148,15 @@ def words_on_test_data(effect: GradedEffect) -> str:
     foretold = torque is not None and torque.gain > share and torque.gain > 0.0
     if foretold:
         assert torque is not None
-        return f"; on test data it takes {percent(torque.gain)} of the torque that is left without it"
+        times = f", {number_words(torque.t)} times its uncertainty" if math.isfinite(torque.t) else ""
+        return f"; on test data it takes {percent(torque.gain)} of the torque that is left without it{times}"
     if share < 0.0:
         return "; without it the test data are predicted better"
     if share < SLIGHT:
         return "; the test data are predicted as well without it"
     if share == 1.0:
         return "; without it no run follows the test data"
-    return f"; without it the misfit on test data is {1.0 / math.sqrt(1.0 - share):.3g} times as large"
+    return f"; without it the misfit on test data is {number_words(1.0 / math.sqrt(1.0 - share))} times as large"
 
 
 def percent(share: float) -> str:
@@ -168,12 +169,12 @@ def percent(share: float) -> str:
 def sureness(effect: GradedEffect) -> str:
     """Return the grade of an effect, the evidence for it, and the rule that speaks most against it, in words."""
     evidence = effect.evidence
-    text = f"{effect.grade.word.capitalize()}: its size is {evidence.size_t:.3g} times its error"
+    text = f"{effect.grade.word.capitalize()}: its size is {number_words(evidence.size_t)} times its error"
     if math.isfinite(evidence.gain):
         text = (
             f"{effect.grade.word.capitalize()}: it removes {percent(evidence.gain)} of the error on blocks left out, "
         )
-        text += f"{evidence.t:.3g} times its uncertainty"
+        text += f"{number_words(evidence.t)} times its uncertainty"
     reasons = [rule.reason for rule in GRADE_RULES if rule.name in effect.lowered_by and rule.highest == effect.grade]
     if reasons:
         text += f"; not surer, for {reasons[0]}"
@@ -211,8 +212,10 @@ def _values(diagnosis: Diagnosis) -> Iterator[str]:
         if e.nominal and abs(e.value / e.nominal - 1.0) >= NOTABLE_CHANGE:
             stated = diagnosis.model.parameters[name].uncertainty
             unit = "" if e.unit == "1" else f" {e.unit}"
-            outside = f", stated within {100.0 * stated / abs(e.nominal):.3g} %" if stated else ""
-            changed.append(f"{name} {e.value:.4g}{unit} ({100.0 * (e.value / e.nominal - 1.0):+.3g} %{outside})")
+            outside = f", stated within {number_words(100.0 * stated / abs(e.nominal))} %" if stated else ""
+            change = 100.0 * (e.value / e.nominal - 1.0)
+            sign = "+" if change > 0.0 else ""
+            changed.append(f"{name} {e.value:.4g}{unit} ({sign}{number_words(change)} %{outside})")
     if changed:
         yield f"Values of the model that were re-fitted: {', '.join(changed)}."
 
@@ -225,13 +228,13 @@ def _remainder_text(diagnosis: Diagnosis) -> str:
         for name, share in diagnosis.left.items()
     ]
     text = f"What is left (rms, where the model was fitted): {' and '.join(parts)}"
-    strongest = [f"at {BODIES.get(one.site, one.site)} {one.words}" for one in diagnosis.remaining[:2]]
+    strongest = [f"{SITES.get(one.site, f'at {one.site}')} {one.words}" for one in diagnosis.remaining[:2]]
     return f"{text}; {'; '.join(strongest)}." if strongest else f"{text}; it follows no signal."
 
 
 def remainder_percent(power: float) -> str:
     """Return what is left of a signal in words."""
-    return f"{100.0 * math.sqrt(power):.2g} %"
+    return f"{number_words(100.0 * math.sqrt(power), 2)} %"
 
 
 def _motion(diagnosis: Diagnosis) -> Iterator[str]:

@@ -93,6 +93,16 @@ class RecordEvidence:
     inertia_spread: float
     inertia_torque: float = np.inf
 
+    @property
+    def shows_inertia(self) -> bool:
+        """Whether the inertia is more than its error."""
+        return self.inertia_error <= self.inertia
+
+    @property
+    def highest_inertia(self) -> float:
+        """The inertia and twice its error, in units of the nominal one."""
+        return self.inertia + 2.0 * self.inertia_error
+
     def inertia_is_off(self, deviations: float) -> bool:
         """Tell whether the record asks for an inertia that the model file does not allow, twice its error considered.
 
@@ -103,8 +113,8 @@ class RecordEvidence:
             True where it does: the record is of no such machine.
         """
         width = deviations * np.log1p(self.inertia_spread)
-        highest, lowest = self.inertia + 2.0 * self.inertia_error, self.inertia - 2.0 * self.inertia_error
-        return bool(np.log(max(highest, 1e-6)) < -width or np.log(max(lowest, 1e-6)) > width)
+        lowest = self.inertia - 2.0 * self.inertia_error
+        return bool(np.log(max(self.highest_inertia, 1e-6)) < -width or np.log(max(lowest, 1e-6)) > width)
 
 
 @dataclass(frozen=True)
@@ -172,5 +182,8 @@ class Dependence:
     @property
     def words(self) -> str:
         """Return the dependence as part of a sentence."""
-        text = f"{100.0 * self.share:.0f} % of it follows the {self.argument}"
+        share = f"{100.0 * self.share:.0f} % of it"
+        if self.formula and "s" not in self.formula:
+            return f"{share} is a constant, {self.formula} {self.unit}"
+        text = f"{share} follows the {self.argument}"
         return text + (f", like {self.formula} with s in {self.argument_unit}" if self.formula else "")

@@ -9,7 +9,7 @@ from orchestrator.shared.results.diagnose import EffectFound, NuisanceFound, Sig
 
 SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
 SIZES = {"alpha": "half-gap"}
-NEXT = "Next: "
+NEXT = "Next"
 AS_GIVEN, CORRECTED = "model as given", "corrected model"
 
 
@@ -62,7 +62,7 @@ WORTH = "What the corrected model is worth on test data"
 
 def next_steps(summary: Sequence[str], more: str = "") -> list[Section]:
     """Return what to do next, as the summary says it."""
-    steps = [line.strip().removeprefix(NEXT) for line in summary if line.strip().startswith(NEXT)]
+    steps = [line.strip().removeprefix(NEXT).lstrip(":, ") for line in summary if line.strip().startswith(NEXT)]
     lines = tuple(f"{step[:1].upper()}{step[1:]}" for step in steps) + ((more,) if more else ())
     return [Text("What to do next", lines)] if lines else []
 
