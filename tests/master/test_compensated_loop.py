@@ -1,12 +1,16 @@
 """The compensated loop of docs/examples beside the same loop with the plain LQR, on native FMUs."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from orchestrator.building.starts import default_starts
 from orchestrator.scenarios.scenario import load_scenario, simulate
+from pyfmu_sources.backlash_compensator_slave import BacklashCompensator
 from tests.support.c_fmu import have_compiler
+from tests.support.played_slave import play
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "soft_landing.toml"
 NAMES = ["Drivetrain", "BacklashEstimator", "BacklashCompensator", "LqrController"]
@@ -49,3 +53,21 @@ def test_it_lands_softer_and_follows_closer_than_the_plain_lqr(tmp_path, native)
     assert impacts(soft).size > 2
     assert impacts(soft).max() < 0.6 * impacts(plain).max()
     assert errors[0] < 0.7 * errors[1]
+
+
+def test_the_crossings_have_the_bits_of_python(tmp_path, native):
+    inputs = [v.name for v in BacklashCompensator.table if v.causality == "input"]
+    outputs = ("u", "flank", "crossing")
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for name in NAMES:
+        text = text.replace(f'fmu = "{name}"', f'fmu = "{native[name]}"')
+    (tmp_path / "loop.toml").write_text(text, encoding="utf-8")
+    loop = load_scenario(tmp_path / "loop.toml")
+    result = simulate(replace(loop, record=tuple(f"compensator.{name}" for name in (*inputs, *outputs))))
+    start = next(i.start for i in loop.system.instances if i.name == "compensator")
+    start = default_starts("BacklashCompensator") | dict(start)
+    given, expected = (np.array([result[f"compensator.{n}"] for n in names]).T for names in (inputs, outputs))
+    assert np.sum(np.diff(expected[:, 2]) > 0.0) > 2
+    assert np.array_equal(play(BacklashCompensator(), start, inputs, given, outputs, 1e-3), expected)
+    other = start | {"K[2]": np.nextafter(start["K[2]"], 0.0)}  # the last bit of a parameter is seen
+    assert not np.array_equal(play(BacklashCompensator(), other, inputs, given, outputs, 1e-3), expected)
