@@ -6,14 +6,14 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
-from . import train_steps
+from . import train_steps, train_transition
 from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .plant_slave import KNOWN_STEPS, T_L, PlantSlave, input_variables, parameter_variable, start_variable
 from .slave_base import TOO_STIFF, StepRefusedError
 from .train_equations import PARAMETERS, Mode, State, TrainParameters, contact_outputs, initial_mode
 from .train_modes import Indicators, Outputs, after_events, indicators, output_rates, rates_and_outputs, state_rates
-from .train_steps import Table
+from .train_transition import Table
 
 FIRST_OUTPUT = T_L + 1
 CONTACT_1, CONTACT_2 = FIRST_OUTPUT + 11, FIRST_OUTPUT + 12
@@ -37,7 +37,7 @@ _STARTS = (
 _TWIST_1 = ("theta_m_start", "theta_s_start", "i_1")
 _TWIST_2 = ("theta_s_start", "theta_l_start", "i_2")
 
-_prepare = lru_cache(maxsize=256)(train_steps.prepare)
+_prepare = lru_cache(maxsize=256)(train_transition.prepare)
 
 
 def _output(name: str, unit: str, description: str, nominal: float, *starts_from: str) -> FmuVariable:

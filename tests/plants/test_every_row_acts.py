@@ -4,11 +4,12 @@ import math
 
 import pytest
 
-from pyfmu_sources import axis_equations, drivetrain, equations
+from pyfmu_sources import axis_equations, drivetrain, equations, train_equations
 from pyfmu_sources.drivetrain_slave import Drivetrain
 from pyfmu_sources.equations import NAMES, parameters
 from pyfmu_sources.parameter_rows import BIG, Parameter, with_values
 from pyfmu_sources.servo_axis_slave import ServoAxis
+from pyfmu_sources.two_stage_train_slave import TwoStageTrain
 
 # What a row is set to, by its unit; a half of what is usual where that is not zero.
 SIZES = {
@@ -74,8 +75,12 @@ def run_of(slave: type, values: dict[str, float]) -> list[tuple[float, ...]]:
 
 @pytest.mark.parametrize(
     ("slave", "rows"),
-    [(Drivetrain, equations.PARAMETERS), (ServoAxis, axis_equations.PARAMETERS)],
-    ids=["drivetrain", "axis"],
+    [
+        (Drivetrain, equations.PARAMETERS),
+        (ServoAxis, axis_equations.PARAMETERS),
+        (TwoStageTrain, train_equations.PARAMETERS),
+    ],
+    ids=["drivetrain", "axis", "two stages"],
 )
 def test_every_row_changes_a_run(slave: type, rows: tuple[Parameter, ...]) -> None:
     idle = []

@@ -8,6 +8,7 @@ from pyfmu_sources import smooth_mode
 from pyfmu_sources.drivetrain_slave import MODEL, Drivetrain
 from pyfmu_sources.servo_axis_slave import ServoAxis
 from pyfmu_sources.slave_base import TOO_STIFF
+from pyfmu_sources.two_stage_train_slave import TwoStageTrain
 
 STEP, STEPS = 1e-3, 10
 EXTREMES = (
@@ -27,6 +28,21 @@ AXIS = (
     {"b": 1e12},
     {"J": 1e-9, "effects.coulomb_friction.motor.torque": 1e12},
     {"effects.gravity_load.amplitude": 1e12},
+)
+TRAIN = (
+    {"J_s": 1e-9},
+    {"J_m": 1e-9, "J_s": 1e-9, "J_l": 1e-9},
+    {"c_1": 1e12},
+    {"J_s": 1e-9, "c_2": 1e12},
+    {"k_1": 0.0, "c_1": 0.0, "k_2": 0.0, "c_2": 0.0},
+    {"k_1": 1e12, "k_2": 1e-9},
+    {"i_1": 1e-9},
+    {"i_1": 1e12, "i_2": 1e12},
+    {"tau": 1e-6},
+    {"b_s": 1e12},
+    {"alpha_1": 1e12, "alpha_2": 1e-12},
+    {"J_s": 1e-9, "effects.coulomb_friction.shaft.torque": 1e12},
+    {"effects.coulomb_friction.load.torque": 1e-12},
 )
 REASONS = ("must be one that can be resolved", "must stay finite", "must stay within 1e13 rad")
 
@@ -82,13 +98,20 @@ def test_so_does_an_axis(values, torque):
     assert all(any(reason in text for reason in REASONS) for text in said), said
 
 
+@pytest.mark.parametrize("torque", [1.0, 1e12])
+@pytest.mark.parametrize("values", TRAIN, ids="-".join)
+def test_so_do_two_stages(values, torque):
+    said = stepped(TwoStageTrain(instance_name="a"), values, {"u": torque, "T_l": 0.5 * torque})
+    assert all(any(reason in text for reason in REASONS) for text in said), said
+
+
 def test_a_stiff_shaft_without_effects_is_exact_and_not_refused(work):
     assert not stepped(Drivetrain(instance_name="a"), {"J_m": 1e-9, "c": 1e12}, {"u": 1.0, "T_l": 0.0}, 1)
     assert work[0] == 0
     assert "too many internal steps" in TOO_STIFF
 
 
-@pytest.mark.parametrize("kind", [Drivetrain, ServoAxis])
+@pytest.mark.parametrize("kind", [Drivetrain, ServoAxis, TwoStageTrain])
 @pytest.mark.parametrize("name", ["u", "T_l"])
 def test_a_torque_without_meaning_is_refused_by_name(kind, name):
     torques = {"u": 0.0, "T_l": 0.0}

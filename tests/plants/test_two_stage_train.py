@@ -21,7 +21,10 @@ from pyfmu_sources.train_equations import (
     twists,
 )
 from pyfmu_sources.train_modes import after_events
-from pyfmu_sources.train_steps import advance, advance_to_event, fastest_rate, prepare
+from pyfmu_sources.train_steps import advance, advance_to_event
+from pyfmu_sources.train_transition import prepare
+from tests.support.two_stage_record import COUNTS, MISMATCHED, NOISE, make_two_stage_record
+from tests.support.two_stage_record import FRICTION as FRICTION_OF_RECORDS
 from tests.support.two_stage_solution import solve_two_stages, start_values
 
 STEP = 1e-3
@@ -40,6 +43,7 @@ CASES: dict[str, dict[str, float]] = {
     "heavy shaft": {"J_s": 0.5, "b_s": 0.5},
     "slow drive": {"tau": 1.0},
     "quick drive": {"tau": 2e-4},
+    "very quick drive": {"tau": 2e-5},
     "friction": FRICTION,
     "friction, gap of stage 2": FRICTION | {"alpha_1": 0.0},
     "one friction": {"effects.coulomb_friction.shaft.torque": 2.0},
@@ -197,13 +201,17 @@ def test_a_stiff_stage_makes_one_body_of_two(gap: int) -> None:
 
 @pytest.mark.parametrize("case", ["both gaps", "light shaft", "friction", "in motion"])
 def test_steps_of_any_size_lead_to_the_same_motion(case: str) -> None:
-    """Products with a matrix (short steps) and power series (long ones) are one solution."""
+    """Short steps, long ones of several parts, and power series alone are one solution."""
     p, x = plant(all_values(CASES[case]))
     u, T_l = np.repeat(torques(60)[0], 10), np.zeros(600)
     fine, _ = run(p, x, u, T_l, STEP, splits=3)
     coarse, _ = run(p, x, u[::10], T_l[::10], 10 * STEP)
-    assert 10 * STEP * fastest_rate((1, 1, 1, 1, 1), p) > 2.0
+    table, mode, y = prepare(p, 10 * STEP), initial_mode(x, p, 0.0), x
+    assert table[4] > 1
+    for n in range(60):
+        y, mode = advance(y, mode, p, float(u[10 * n]), 0.0, 10 * STEP, (*table[:4], 0))
     assert np.abs(fine[::10] - coarse).max() < 1e-8
+    assert np.abs(fine[-1] - y).max() < 1e-8
 
 
 def test_a_short_contact_is_never_stepped_over() -> None:
@@ -219,11 +227,11 @@ def test_a_short_contact_is_never_stepped_over() -> None:
         mode = other = initial_mode(x, p, 0.0)
         y = x
         table = prepare(p, STEP)
-        assert table[4]
+        assert table[4] == 1
         for n in range(150):
             u = float(30.0 * math.sin(2.0 * math.pi * 25.0 * n * STEP) + 4.0)
             x, mode = advance(x, mode, p, u, 0.0, STEP, table)
-            y, other = advance(y, other, p, u, 0.0, STEP, (*table[:4], False))
+            y, other = advance(y, other, p, u, 0.0, STEP, (*table[:4], 0))
             assert mode == other
         assert np.abs(np.subtract(x, y)).max() < 1e-7
 
@@ -258,3 +266,33 @@ def test_friction_holds_a_body_until_the_torque_breaks_it_loose() -> None:
     second = [stage_torques(tuple(row), 1.0, mode, p)[1] for row, mode in zip(states, modes, strict=True)]
     assert max(map(abs, second[:first])) <= 6.0 + 1e-9
     assert states[-1, 4] > 0.01
+
+
+@pytest.mark.parametrize("late", [0.0, 0.002])
+def test_made_up_records_are_of_the_same_machine(late: float) -> None:
+    """The simulator of records, small steps without located events, moves as the FMU does."""
+    effects = {"alpha_1": 0.015, "alpha_2": 0.01, "T0": 2.0}
+    columns, truth = make_two_stage_record(
+        effects, 5, 0.05, 0.5, noise_factor=0.0, torque_noise=0.0, counts=None, late=late, substeps=200
+    )
+    assert columns["theta_m"].tobytes() == truth["states"][:, 0].tobytes()
+    p, x = plant(all_values({**truth["linear"], "alpha_1": 0.015, "alpha_2": 0.01, "effects.load_torque.torque": 2.0}))
+    shift = round(late * 1000.0)
+    u = np.concatenate([np.zeros(shift), columns["u"]])[: len(columns["u"])]
+    states, _ = run(p, x, u, np.zeros(len(u)), STEP)
+    assert np.abs(states[:-1] - truth["states"])[:, [0, 2, 4]].max() < 1e-5
+    assert np.ptp(states[:, 4]) > 0.05
+
+
+def test_records_have_the_noise_and_the_mismatch_that_is_asked_for() -> None:
+    quiet, truth = make_two_stage_record({"alpha_1": 0.02} | FRICTION_OF_RECORDS, 6, 0.02, mismatch=0.05)
+    loud, _ = make_two_stage_record({"alpha_1": 0.02} | FRICTION_OF_RECORDS, 6, 0.02, mismatch=0.05, noise_factor=5.0)
+    angles = truth["states"][:, [0, 4]]
+    for columns, factor in ((quiet, 1.0), (loud, 5.0)):
+        errors = np.column_stack([columns["theta_m"], columns["theta_l"]]) - angles
+        rounding = 2.0 * np.pi / np.array(COUNTS) / np.sqrt(12.0)
+        expected = np.hypot(factor * np.array(NOISE), rounding)
+        np.testing.assert_allclose(errors.std(axis=0), expected, rtol=0.1)
+    shares = [truth["linear"][name] / truth["nominal"][name] - 1.0 for name in MISMATCHED]
+    assert 0.02 < max(map(abs, shares)) <= 0.05
+    assert truth["nominal"]["J_s"] == pytest.approx(0.02 * truth["nominal"]["J_m"])
