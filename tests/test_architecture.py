@@ -73,9 +73,14 @@ def words_of(path):
     return path.relative_to(ROOT / "orchestrator").with_suffix("").parts
 
 
+@cache
+def tree_of(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imports(path):
     """Full names of the project's modules that a file imports, function bodies included."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
@@ -117,7 +122,7 @@ def test_imports_point_one_way():
 def sources_of(path, known):
     """The files that a file imports, by module name, imports within the package of the FMUs' sources included."""
     package = path.relative_to(ROOT).with_suffix("").parts[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = ".".join((*package[: len(package) - node.level + 1], *([node.module] if node.module else [])))
             yield from (name for name in (base, *(f"{base}.{alias.name}" for alias in node.names)) if name in known)
@@ -151,7 +156,7 @@ def test_only_commands_print():
     for path in SOURCES:
         if "commands" in path.parts:
             continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree_of(path)):
             called = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
             assert not called, f"{path} prints"
 
@@ -173,7 +178,7 @@ def test_flags_are_named_in_commands_alone():
         if {"commands", "workbench"} & {*path.parts} or path.name in ("cli.py", "__main__.py"):
             continue
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-            if named.search(line):
+            if "--" in line and named.search(line):
                 wrong.append(f"{path.relative_to(ROOT)}:{number}: {line.strip()}")
     assert not wrong
 
@@ -203,7 +208,7 @@ def test_sizes_leave_docstrings_of_functions_out():
 
 def undocumented(path):
     """Public names of a module that have no docstring."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     public = [n for n in tree.body if isinstance(n, (ast.FunctionDef, ast.ClassDef)) and not n.name.startswith("_")]
     return [getattr(n, "name", "") for n in [tree, *public] if not ast.get_docstring(n) and path.name != "__main__.py"]
 
@@ -215,7 +220,7 @@ def test_public_names_are_documented():
 def test_no_class_name_means_two_things():
     places = {}
     for path in SOURCES:
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree_of(path).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
     assert not {name: found for name, found in places.items() if len(found) > 1}
