@@ -52,6 +52,12 @@ class Safety:
     memory: int = DEFAULT_MEMORY_LIMIT
     allow_nonfinite: bool = False
 
+    @property
+    def limits(self) -> Limits:
+        """What a child process may use."""
+        time = DEFAULT_TIME_LIMIT if self.time is None else self.time
+        return Limits(time, self.memory, _LARGEST_FILE, time, _MOST_FILES)
+
 
 def foreign_fmus(system: System) -> list[Path]:
     """Return the FMUs of a system that are not ours, each once."""
@@ -129,8 +135,6 @@ def _needs_processes(system: System) -> bool:
 
 def _in_processes(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Recording:
     """Run a scenario with a process for each of its instances."""
-    time = DEFAULT_TIME_LIMIT if safety.time is None else safety.time
-    limits = Limits(time, safety.memory, _LARGEST_FILE, time, _MOST_FILES)
     with unpack_system(scenario.system) as (system, _, origins):
         instances = []
         for instance in system.instances:
@@ -138,18 +142,18 @@ def _in_processes(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Re
             assert isinstance(factory, FmuFactory)
             walls = Path(origins[str(factory.path)]) in foreign
             description = without_feed(factory.description)
-            made = RemoteFactory(factory.path, description, limits, walls)
+            made = RemoteFactory(factory.path, description, safety.limits, walls)
             instances.append(replace(instance, model=description.model, create=made))
         with replace(scenario, system=replace(system, instances=tuple(instances))).session() as session:
             return session.run(allow_early_end=True)
 
 
 def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Recording:
-    time = DEFAULT_TIME_LIMIT if safety.time is None else safety.time
-    limits = Limits(time, safety.memory, _LARGEST_FILE, 2.0 * time + 600.0, _MOST_FILES)
     steps = step_count(scenario.start, scenario.stop, scenario.algorithm.step)
     shape = (len(scenario.record), steps + 1)
-    limits = replace(limits, memory=limits.memory + 24 * shape[0] * shape[1])
+    limits = safety.limits
+    memory = limits.memory + 24 * shape[0] * shape[1]
+    limits = replace(limits, memory=memory, total=2.0 * limits.time + 600.0)
     with unpack_system(scenario.system) as (system, scratch, _):
         job = UnpackedRun(system, scenario.record, scenario.algorithm, scenario.stop, scenario.start)
         names = ", ".join(map(str, foreign)) or "the scenario"
@@ -158,7 +162,7 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
             with Jail(
                 "orchestrator.scenarios.inside:open_runs", job, read=[scratch.path], limits=limits, walls=bool(foreign)
             ) as jail:
-                jail.start(time)
+                jail.start(limits.time)
                 claimed = jail.call(None, Recording, most=8 * (shape[0] + 1) * shape[1] + _SLACK)
         except ChildError as error:
             raise SimulationError(f"{names}: {error.explain('the run')}", "time_limit") from None

@@ -9,20 +9,27 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import ChildError, RecordError
 from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, Head, RecordSource
-from orchestrator.shared.isolation.jail import Jail
+from orchestrator.shared.isolation.jail import Answer, Jail
 from orchestrator.shared.isolation.limits import Limits
 
 NAMES = {"mat": "MAT", "hdf5": "HDF5", "parquet": "Parquet", "mdf": "MDF"}
 # Arrays, their copies on the way, and what a library makes of a file: some times what may be unpacked.
 _LIMITS = Limits(time=300.0, memory=8 * MAXIMUM_BYTES, output=2 * MAXIMUM_BYTES, total=3600.0, disk=2 * MAXIMUM_BYTES)
-_Opened = tuple[list[tuple[str, str, str, int, str]], str, float | None]
+
+
+class _Opened(NamedTuple):
+    """What an opened file holds; see ``RecordSource``."""
+
+    heads: list[Head]
+    dialect: str
+    rate: float | None
 
 
 def reader(argument: tuple[str, str]) -> Callable[[list[int] | None], Any]:
@@ -32,7 +39,7 @@ def reader(argument: tuple[str, str]) -> Callable[[list[int] | None], Any]:
 
     def answer(places: list[int] | None) -> Any:
         if places is None:
-            return [[[h.name, h.unit, h.kind, h.raster, h.full] for h in source.heads], source.dialect, source.rate]
+            return _Opened(list(source.heads), source.dialect, source.rate)
         return [_send(values) for values in source.load(places)]
 
     return answer
@@ -51,10 +58,9 @@ class _Apart(RecordSource):
 
     def __init__(self, jail: Jail, kind: str, file: Path, shown: Path) -> None:
         self._jail, self._kind, self._file, self._shown = jail, kind, file, shown
-        heads, self.dialect, self.rate = self._ask(None, _Opened)
-        if len(heads) > MAXIMUM_CHANNELS:
-            raise self._failure(f"it has {len(heads)} channels")
-        self.heads: Sequence[Head] = [Head(*head) for head in heads]
+        self.heads, self.dialect, self.rate = self._ask(None, _Opened)
+        if len(self.heads) > MAXIMUM_CHANNELS:
+            raise self._failure(f"it has {len(self.heads)} channels")
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """Return the values of some channels."""
@@ -63,7 +69,7 @@ class _Apart(RecordSource):
             raise self._failure("another number of channels came back")
         return [self._receive(kind, values) for kind, values in found]
 
-    def _ask(self, places: list[int] | None, kind: Any) -> Any:
+    def _ask(self, places: list[int] | None, kind: type[Answer]) -> Answer:
         try:
             return self._jail.call(places, kind, most=2 * MAXIMUM_BYTES)
         except RecordError as error:
