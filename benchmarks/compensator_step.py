@@ -10,8 +10,10 @@ import statistics
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +34,7 @@ INPUTS = tuple(v.name for v in BacklashCompensator.table if v.causality == "inpu
 OUTPUTS = ("u", "flank", "crossing")
 
 
-def alone(fmu: Path, run: Recording, start: dict[str, object], times: int, inputs: tuple[str, ...]) -> Scenario:
+def alone(fmu: Path, run: Recording, start: Mapping[str, Any], times: int, inputs: tuple[str, ...]) -> Scenario:
     """Return a scenario that plays the inputs of a recorded loop to one FMU."""
     h = TASK.sample_time
     sources = tuple(
@@ -42,7 +44,7 @@ def alone(fmu: Path, run: Recording, start: dict[str, object], times: int, input
     return Scenario(system, ("controller.u",), GaussSeidel(h), h * (times * len(run.time) - 1))
 
 
-def microseconds(fmu: Path, run: Recording, start: dict[str, object], inputs: tuple[str, ...], repeats: int) -> float:
+def microseconds(fmu: Path, run: Recording, start: Mapping[str, Any], inputs: tuple[str, ...], repeats: int) -> float:
     """Return the processor time of a step [us]."""
     steps = (TIMES - 1) * len(run.time)
     found = []
