@@ -1,7 +1,5 @@
 """The page of ``regulator``: gains, what the loop does at rest, and its response at the request."""
 
-import math
-
 from orchestrator.reporting.model import Facts, Plot, Report, ReportTable, Series, TableColumn
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
@@ -13,7 +11,6 @@ def build(source: ResultDocument) -> Report:
     results = read(source.results, RegulatorFound)
     f = results.forecast
     rest = f"cycles at {f.frequency:.3g} Hz, its load by {f.load:.3g} half-gaps" if f.cycles else "comes to rest"
-    phases = tuple(math.degrees(phase) for phase in results.phases)
     return Report(
         title="Regulator of a drivetrain with a gap",
         summary=f"Without friction, load and limit of the torque the loop {rest}, by its gains alone.",
@@ -31,8 +28,8 @@ def build(source: ResultDocument) -> Report:
             Plot(
                 "Its phase",
                 "frequency [Hz]",
-                "phase [deg]",
-                (Series("phase", results.frequencies, phases),),
+                "phase [rad]",
+                (Series("phase", results.frequencies, results.phases),),
                 log_x=True,
             ),
         ),
