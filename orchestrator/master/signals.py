@@ -31,6 +31,7 @@ class Signal(Protocol):
 
     def breaks(self, start: float, stop: float) -> list[float]:
         """Return the instants strictly between ``start`` and ``stop`` [s] at which the signal is not smooth."""
+        return []
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +42,6 @@ class Constant(Signal):
 
     def sample(self, times: Array) -> Array:
         return np.full(times.shape, self.value)
-
-    def breaks(self, start: float, stop: float) -> list[float]:
-        return []
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +85,6 @@ class Sine(Signal):
 
     def sample(self, times: Array) -> Array:
         return self.offset + self.amplitude * np.sin(2.0 * math.pi * self.frequency * times + self.phase)
-
-    def breaks(self, start: float, stop: float) -> list[float]:
-        return []
 
 
 @dataclass(frozen=True, slots=True)

@@ -141,9 +141,6 @@ class _AtPoints(Signal):
         assert len(times) == len(self.values)
         return self.values
 
-    def breaks(self, start: float, stop: float) -> list[float]:
-        return []
-
 
 class LoopSession:
     """One loop of three FMUs, instantiated once and run for any number of sizes. Use as a context manager.

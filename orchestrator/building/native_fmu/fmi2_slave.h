@@ -200,41 +200,8 @@ EXPORT Status FMI(fmi2SetString)(Component c, const Reference r[], size_t n, con
 
 /* --- Saved states ------------------------------------------------------------------------------------------------------ */
 
-EXPORT Status FMI(fmi2GetFMUstate)(Component c, FmuState *x)
-{
-    ENTER(fmi2GetFMUstate, x != NULL)
-    return save_state(s, x);
-}
-
-EXPORT Status FMI(fmi2SetFMUstate)(Component c, FmuState x)
-{
-    ENTER(fmi2SetFMUstate, x != NULL)
-    return restore_state(s, x);
-}
-
-EXPORT Status FMI(fmi2FreeFMUstate)(Component c, FmuState *x)
-{
-    ENTER(fmi2FreeFMUstate, 1)
-    return free_state(x);
-}
-
-EXPORT Status FMI(fmi2SerializedFMUstateSize)(Component c, FmuState x, size_t *n)
-{
-    ENTER(fmi2SerializedFMUstateSize, x != NULL && n != NULL)
-    return serialised_size(x, n);
-}
-
-EXPORT Status FMI(fmi2SerializeFMUstate)(Component c, FmuState x, char bytes[], size_t n)
-{
-    ENTER(fmi2SerializeFMUstate, x != NULL && bytes != NULL)
-    return serialise_state(s, x, bytes, n);
-}
-
-EXPORT Status FMI(fmi2DeSerializeFMUstate)(Component c, const char bytes[], size_t n, FmuState *x)
-{
-    ENTER(fmi2DeSerializeFMUstate, bytes != NULL && x != NULL)
-    return deserialise_state(s, bytes, n, x);
-}
+SAVED_STATE_CALLS(fmi2GetFMUstate, fmi2SetFMUstate, fmi2FreeFMUstate, fmi2SerializedFMUstateSize, fmi2SerializeFMUstate,
+                  fmi2DeSerializeFMUstate, char)
 
 #ifdef DIRECTIONAL
 EXPORT Status FMI(fmi2GetDirectionalDerivative)(Component c, const Reference unknown[], size_t n, const Reference known[],

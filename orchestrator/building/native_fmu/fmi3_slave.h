@@ -228,41 +228,8 @@ WHOLE_CALLS(Int64, int64_t, CHOICE_VALUE)
 
 /* --- Saved states ------------------------------------------------------------------------------------------------------ */
 
-EXPORT Status FMI(fmi3GetFMUState)(Component c, FmuState *x)
-{
-    ENTER(fmi3GetFMUState, x != NULL)
-    return save_state(s, x);
-}
-
-EXPORT Status FMI(fmi3SetFMUState)(Component c, FmuState x)
-{
-    ENTER(fmi3SetFMUState, x != NULL)
-    return restore_state(s, x);
-}
-
-EXPORT Status FMI(fmi3FreeFMUState)(Component c, FmuState *x)
-{
-    ENTER(fmi3FreeFMUState, 1)
-    return free_state(x);
-}
-
-EXPORT Status FMI(fmi3SerializedFMUStateSize)(Component c, FmuState x, size_t *n)
-{
-    ENTER(fmi3SerializedFMUStateSize, x != NULL && n != NULL)
-    return serialised_size(x, n);
-}
-
-EXPORT Status FMI(fmi3SerializeFMUState)(Component c, FmuState x, Byte bytes[], size_t n)
-{
-    ENTER(fmi3SerializeFMUState, x != NULL && bytes != NULL)
-    return serialise_state(s, x, (char *)bytes, n);
-}
-
-EXPORT Status FMI(fmi3DeserializeFMUState)(Component c, const Byte bytes[], size_t n, FmuState *x)
-{
-    ENTER(fmi3DeserializeFMUState, bytes != NULL && x != NULL)
-    return deserialise_state(s, (const char *)bytes, n, x);
-}
+SAVED_STATE_CALLS(fmi3GetFMUState, fmi3SetFMUState, fmi3FreeFMUState, fmi3SerializedFMUStateSize, fmi3SerializeFMUState,
+                  fmi3DeserializeFMUState, Byte)
 
 #ifdef DIRECTIONAL
 EXPORT Status FMI(fmi3GetDirectionalDerivative)(Component c, const Reference unknown[], size_t n, const Reference known[],

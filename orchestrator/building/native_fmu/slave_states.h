@@ -227,3 +227,18 @@ static Status directional_derivative(Instance *s, const Reference unknown[], siz
     return s->worst;
 }
 #endif
+
+/* The calls of a version of FMI for saved states, by their names there, whose bytes are of its type. */
+#define SAVED_STATE_CALL(name, parameters, condition, result) \
+    EXPORT Status FMI(name) parameters \
+    { \
+        ENTER(name, condition) \
+        return result; \
+    }
+#define SAVED_STATE_CALLS(get, set, release, size, serialise, restore, Bytes) \
+    SAVED_STATE_CALL(get, (Component c, FmuState *x), x != NULL, save_state(s, x)) \
+    SAVED_STATE_CALL(set, (Component c, FmuState x), x != NULL, restore_state(s, x)) \
+    SAVED_STATE_CALL(release, (Component c, FmuState *x), 1, free_state(x)) \
+    SAVED_STATE_CALL(size, (Component c, FmuState x, size_t *n), x != NULL && n != NULL, serialised_size(x, n)) \
+    SAVED_STATE_CALL(serialise, (Component c, FmuState x, Bytes bytes[], size_t n), x != NULL && bytes != NULL, serialise_state(s, x, (char *)bytes, n)) \
+    SAVED_STATE_CALL(restore, (Component c, const Bytes bytes[], size_t n, FmuState *x), bytes != NULL && x != NULL, deserialise_state(s, (const char *)bytes, n, x))

@@ -1,11 +1,6 @@
 """The page of a diagnosis of any FMU: what is missing around it, how far the misfit shrinks, what is left."""
 
-from collections.abc import Mapping, Sequence
-
-import msgspec
-
-from orchestrator.effects.words import place_words
-from orchestrator.reporting.model import Badge, Cell, Facts, Fold, Plot, Report, Section, Series, Span, Text
+from orchestrator.reporting.model import Cell, Facts, Fold, Plot, Report, Section, Series, Span, Text
 from orchestrator.reporting.pages.diagnosis_answer import (
     answer_table,
     headline,
@@ -13,19 +8,20 @@ from orchestrator.reporting.pages.diagnosis_answer import (
     next_steps,
     worth_on_test_data,
 )
+from orchestrator.reporting.pages.diagnosis_tables import (
+    VERDICTS,
+    candidate_table,
+    evidence_table,
+    leave_out_empty,
+    misfit_table,
+    parameter_table,
+)
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import Array, ResultDocument, table_of
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
-from orchestrator.shared.results.diagnose import EffectFound
 
-VERDICTS: Mapping[str, tuple[Badge, str]] = {
-    "none": ("good", "nothing is missing"),
-    "parameters": ("good", "some values are off"),
-    "effects": ("neutral", "effects are missing"),
-    "unknown": ("bad", "unexplained"),
-}
 STAGES = {"nominal": "model as given", "refitted": "with re-fitted parameters", "corrected": "with the effects"}
 KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
 
@@ -33,7 +29,7 @@ KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
 def build(source: ResultDocument) -> Report:
     """Return the page."""
     found = read(source.results, FmuDiagnosisFound)
-    badge, label = VERDICTS.get(found.verdict, ("neutral", found.verdict))
+    badge, label, _ = VERDICTS.get(found.verdict, ("neutral", found.verdict, ""))
     table = source.signals("diagnose.csv")
     made = (("walls", found.walls), ("runs of the FMU", found.runs), ("time taken [s]", found.seconds))
     reasons = () if found.trust is None else found.trust.reasons
@@ -41,11 +37,12 @@ def build(source: ResultDocument) -> Report:
     folds: dict[str, list[Section]] = {
         "Take note": [Text("Notes", notes)] if notes else [],
         "In words": in_words([text for text in found.summary if text not in reasons]),
-        "Evidence for each effect": _evidence(found.effects),
-        "Test data": [*_misfit(found), *_output_plots(found, table)],
+        "Evidence for each effect": [leave_out_empty(one) for one in evidence_table(found.effects, "outputs' misfit")],
+        "Test data": [*_misfits(found), *_output_plots(found, table)],
         "What is left": _residual_sections(found.remaining),
         "Values and search": [
-            *_search_sections(found),
+            *([parameter_table(found.parameters)] if found.parameters else []),
+            *candidate_table(found.candidates),
             *sections_of("More", {k: v for k, v in source.results.items() if k not in KNOWN}),
         ],
     }
@@ -74,29 +71,12 @@ def _test_part(results: FmuDiagnosisFound, table: dict[str, Array]) -> dict[str,
     return {name: values[rows] for name, values in table.items()}
 
 
-def _evidence(effects: Sequence[EffectFound]) -> list[Section]:
-    rows = [
-        {
-            "effect": place_words(effect.name, effect.site),
-            "grade": effect.grade,
-            "error on blocks left out that it removes [%]": None if effect.gain is None else 100.0 * effect.gain,
-            "over its uncertainty": effect.t,
-            "not told from": ", ".join(effect.family),
-            "rules that lower the grade": ", ".join(effect.lowered_by),
-        }
-        for effect in effects
-    ]
-    return [table_of("How sure", rows)] if rows else []
-
-
-def _misfit(results: FmuDiagnosisFound) -> list[Section]:
-    """Return the misfit as a table."""
-    rows = [
-        {"record": test.source, "output": name, **msgspec.structs.asdict(values)}
-        for test in (*results.test, *([results.validation] if results.validation else []))
-        for name, values in test.misfit.items()
-    ]
-    return [table_of("Misfit of runs on data that nothing was fitted to", rows)] if rows else []
+def _misfits(results: FmuDiagnosisFound) -> list[Section]:
+    """Return the misfit on test data, and on another record."""
+    made: list[Section] = [leave_out_empty(misfit_table(f"Misfit on test data of {t.source}", t)) for t in results.test]
+    if (other := results.validation) is not None:
+        made.append(leave_out_empty(misfit_table(f"Misfit on the other record, {other.source}", other)))
+    return made
 
 
 def _output_plots(results: FmuDiagnosisFound, table: dict[str, Array]) -> list[Section]:
@@ -112,27 +92,6 @@ def _output_plots(results: FmuDiagnosisFound, table: dict[str, Array]) -> list[S
         made.append(Plot(f"{name}: simulated minus measured", "time [s]", f"difference [{unit}]", left, test))
         made.append(Plot(name, "time [s]", f"{name} [{unit}]", both, test))
     return made
-
-
-def _search_sections(results: FmuDiagnosisFound) -> list[Section]:
-    """Return parameters and candidates."""
-    sections: list[Section] = []
-    parameters = [{"parameter": name, **msgspec.structs.asdict(p)} for name, p in results.parameters.items()]
-    if parameters:
-        sections.append(table_of("Parameters", parameters))
-    tried = [
-        {
-            "on top of": ", ".join(step.on_top_of) or "parameters",
-            "effect": c.effect,
-            "gain": c.gain,
-            "over its error": c.t,
-        }
-        for step in results.candidates
-        for c in step.tried[:5]
-    ]
-    if tried:
-        sections.append(table_of("Candidates", tried))
-    return sections
 
 
 def _residual_sections(remaining: FmuRemainingFound) -> list[Section]:

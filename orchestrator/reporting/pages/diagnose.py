@@ -3,17 +3,15 @@ left.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from orchestrator.effects.words import place_words
 from orchestrator.reporting.model import (
-    Badge,
     Bar,
     Bars,
-    Cell,
     Facts,
     Fold,
     Plot,
@@ -34,6 +32,16 @@ from orchestrator.reporting.pages.diagnosis_answer import (
     next_steps,
     worth_on_test_data,
 )
+from orchestrator.reporting.pages.diagnosis_tables import (
+    MODELS,
+    TAKES,
+    VERDICTS,
+    candidate_table,
+    evidence_table,
+    misfit_table,
+    parameter_table,
+    percent,
+)
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.record import signal_plots
 from orchestrator.reporting.source import ResultDocument, words
@@ -44,25 +52,14 @@ from orchestrator.shared.results.diagnose import (
     DiagnoseFound,
     EffectFound,
     LearnedFound,
-    ParameterFound,
     RemainingFound,
-    StepFound,
     TestFound,
 )
 
 KNOWN = frozenset(DiagnoseFound.__struct_fields__)
-MODELS = {"nominal": "model as given", "parameters": "with re-fitted parameters", "final": "with the effects"}
-VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
-    "none": ("good", "nothing is missing", "The model explains the record."),
-    "parameters": ("good", "some values are off", "The model explains the record once its parameters are re-fitted."),
-    "effects": ("neutral", "effects are missing", ""),
-    "unknown": ("bad", "unexplained", "Something is missing in the model, and no effect of the library is likely."),
-}
 MISSING = "The torque that the model misses without the effect, and how much of that its law accounts for."
 BLOCKS = "The size as every block of the record by itself says it. Where blocks agree, a size is sure."
 UNSIZED = frozenset({"phase", "cycles_per_rev"})  # parameters that are no sizes
-TAKES = "error on blocks left out that it removes [%]"
-TEST = "Root mean square of free runs minus measured, on data that nothing was fitted to and nothing was chosen by."
 
 
 def build(source: ResultDocument) -> Report:
@@ -85,15 +82,15 @@ def build(source: ResultDocument) -> Report:
         "Take note": [Text("Notes", notes)] if notes else [],
         "In words": in_words(results.summary),
         "Evidence for each effect": [
-            *_reasons(results.effects),
+            *evidence_table(results.effects),
             *_missing_plots(results.effects),
             *_block_plots(results.effects),
         ],
         "Test data": [*_tests(results), *signal_plots(table, restarts, metric)],
         "What is left": [*_residual_sections(results.remaining), *_law_sections(results.learned_law)],
         "Values, search and analysis": [
-            _parameter_table(results.parameters),
-            *_candidate_table(results.candidates),
+            parameter_table(results.parameters),
+            *candidate_table(results.candidates),
             *_analysis(results),
             *sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"}),
         ],
@@ -125,9 +122,9 @@ def _tests(results: DiagnoseFound) -> list[Section]:
     """Return how the models do on test data and on another record."""
     made: list[Section] = []
     for test in results.test:
-        made += [*_misfit_sections(test), _test_table(f"Misfit on test data of {test.source}", test)]
+        made += [*_misfit_sections(test), misfit_table(f"Misfit on test data of {test.source}", test)]
     if results.validation is not None:
-        made.append(_test_table(f"Misfit on the other record, {results.validation.source}", results.validation))
+        made.append(misfit_table(f"Misfit on the other record, {results.validation.source}", results.validation))
     return made + _torque_left([*results.test, *([results.validation] if results.validation else [])])
 
 
@@ -139,31 +136,6 @@ def _effect_names(effects: Sequence[EffectFound]) -> str:
     named = [f"{place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
     listed = " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]]))
     return f"The model lacks {listed}." if named else ""
-
-
-def _reasons(effects: Sequence[EffectFound]) -> list[Section]:
-    """Return how sure each effect is, and why; none without effects."""
-    if not effects:
-        return []
-    reasons = tuple(
-        (
-            place_words(e.name, e.site), e.grade, _percent(e.gain), e.t, _percent(e.explains.torque),
-            _percent(e.explains.motion), "yes" if e.in_model else "no",
-            ", ".join(_label_words(label) for label in e.family) or None, ", ".join(e.lowered_by) or None,
-        )
-        for e in effects
-    )  # fmt: skip
-    titles = (
-        "effect", "grade", TAKES, "over its uncertainty", "explains of the missing torque [%]",
-        "of the misfit on test data [%]", "in the corrected model", "not told from", "rules that lower the grade",
-    )  # fmt: skip
-    note = "The corrected model has the effects that are likely before the test data are opened."
-    return [ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons, note)]
-
-
-def _label_words(label: str) -> str:
-    name, _, site = label.partition("@")
-    return place_words(name, site)
 
 
 def _misfit_sections(test: TestFound) -> list[Section]:
@@ -179,18 +151,8 @@ def _misfit_sections(test: TestFound) -> list[Section]:
     return made
 
 
-def _test_table(title: str, test: TestFound) -> Section:
-    columns = tuple(TableColumn(n) for n in ("signal", *MODELS.values(), "noise", "unit", "R² of the free runs"))
-    rows = tuple(
-        (SIGNALS.get(s, s), g.nominal, g.parameters, g.final, g.noise, g.unit, test.r_squared.get(s))
-        for s, g in test.misfit.items()
-    )
-    worse = " The final model does worse than re-fitted parameters." if test.worse else ""
-    return ReportTable(title, columns, rows, f"{TEST} {test.rows} rows.{worse}")
-
-
 def _torque_left(tests: Sequence[TestFound]) -> list[Section]:
-    rows = tuple((t.source, *(_percent(t.torque_left.get(name)) for name in MODELS)) for t in tests if t.torque_left)
+    rows = tuple((t.source, *(percent(t.torque_left.get(name)) for name in MODELS)) for t in tests if t.torque_left)
     columns = tuple(TableColumn(n) for n in ("on", *(f"{title} [%]" for title in MODELS.values())))
     note = "Rms of the torque that the measured motion needs and the model does not explain, over that of the drive."
     return [ReportTable("Torque that is left", columns, rows, note)] if rows else []
@@ -246,7 +208,7 @@ def _residual_sections(remaining: RemainingFound) -> list[Section]:
     if remaining.follows:
         columns = ("at", "follows", "share [%]", TAKES, "over its uncertainty", "like")
         rows = tuple(
-            (d.site, d.argument, _percent(d.share), _percent(d.gain), d.t, d.formula or None) for d in remaining.follows
+            (d.site, d.argument, percent(d.share), percent(d.gain), d.t, d.formula or None) for d in remaining.follows
         )
         note = "Curves over one signal. They are no effects and no part of the corrected model."
         made.append(ReportTable("What the rest follows", tuple(TableColumn(c, "", 3) for c in columns), rows, note))
@@ -279,37 +241,6 @@ def _in_the_fmu(law: LearnedFound) -> tuple[str, ...]:
     return (f"The corrected FMU has it, off until its parameter {fmu.parameter} is 1; then it misses {missed}.",)
 
 
-def _parameter_table(parameters: Mapping[str, ParameterFound]) -> ReportTable:
-    """Return the model's own parameters beside their nominal values."""
-    columns = ("parameter", "nominal", "value", "standard error", "lower", "upper", "change [%]", "unit")
-    rows = tuple(
-        (name, p.nominal, p.value, p.standard_error, *(p.interval or (None, None)), _change(p), p.unit)
-        for name, p in parameters.items()
-    )
-    note = "Lower and upper: ends of the 95 % interval."
-    shown = tuple(TableColumn(c, "", 3 if c in ("standard error", "change [%]") else 6) for c in columns)
-    return ReportTable("Parameters", shown, rows, note)
-
-
-def _change(p: ParameterFound) -> float | None:
-    return 100.0 * (p.value - p.nominal) / p.nominal if p.nominal and p.value is not None else None
-
-
-def _candidate_table(steps: Sequence[StepFound]) -> list[Section]:
-    """Return what was tried in each step of the search."""
-    rows: list[tuple[Cell, ...]] = []
-    for number, step in enumerate(steps, start=1):
-        base = ", ".join(_label_words(label) for label in step.on_top_of) or "re-fitted parameters"
-        rows += [
-            (number, base, _label_words(t.effect), _percent(t.gain), t.t, "taken" if t.effect == step.taken else None)
-            for t in step.tried
-        ]
-    if not rows:
-        return []
-    columns = ("step", "on top of", "tried", TAKES, "over its uncertainty", "in the model")
-    return [ReportTable("What was tried", tuple(TableColumn(c, "", 3) for c in columns), tuple(rows), limit=200)]
-
-
 def _analysis(results: DiagnoseFound) -> list[Section]:
     rows = tuple((a.source, a.rate, a.rows, a.rows_of_the_file, _band(a)) for a in results.analysis)
     columns = tuple(map(TableColumn, ("record", "rate [Hz]", "rows", "rows of the file for each", "band [Hz]")))
@@ -323,7 +254,3 @@ def _analysis(results: DiagnoseFound) -> list[Section]:
 
 def _band(analysis: AnalysisFound) -> str:
     return ", ".join(f"{body} {cutoff:.3g}" for body, cutoff in analysis.band.items())
-
-
-def _percent(share: float | None) -> float | None:
-    return None if share is None else 100.0 * share
