@@ -85,19 +85,7 @@ def rates(x: Point, signs: tuple[float, float], values: Values, u: float) -> Poi
 
 
 def run(begin: Reals, p: Reals, early: Reals, late: Reals, first: float, h: float, out: Pairs) -> None:
-    """Fill ``out`` (n, 2), the angles, by the event-located simulation of the FMU.
-
-    In each sample of ``h`` [s] the torque ``early`` (n,) acts for ``first`` [s], then ``late`` (n,).
-
-    Args:
-        begin: (9,) the states of the analysis, and the request behind a second lag and a limited rate [N.m].
-        p: parameters of the FMU.
-        early: (n,) [N.m].
-        late: (n,) [N.m].
-        first: [s].
-        h: [s].
-        out: (n, 2) filled [rad].
-    """
+    """Fill ``out`` (n, 2), the angles, as ``run`` of the drivetrain's kernels does, from ``begin`` (9,)."""
     plant = AxisParameters._make(p[n] for n in range(COUNT))
     x = start(begin[0], begin[1], begin[4], plant)
     x = (x[0], x[1], x[2], x[3], begin[8])
