@@ -111,13 +111,22 @@ class StageSettings(Settings, frozen=True):
     negligible: Annotated[
         float, share("share of the gap below which a stage has none: contacts differ from the model's", le=0.5)
     ] = 0.03
+    unexplained: Annotated[
+        float, setting("torque noise over the drive's torque [s^0.5] from which the fits say nothing", gt=0)
+    ] = 8e-3
+    hopeless: Annotated[
+        float, setting("log-likelihood behind that of one gap, from which a fit of both is not begun anew", gt=0)
+    ] = 40.0
     starts: Annotated[int, setting("further starts of a fit of both that is no optimum", ge=0)] = 4
     restless: Annotated[
         float, setting("variance of the share among blocks over that of noise, from which a fit is no optimum", ge=1)
     ] = 4.0
     misfit_widening: Annotated[
-        float, setting("factor on the intervals of sizes: what the model lacks is not white", ge=1)
-    ] = 1.3
+        float, setting("factor on the intervals of a gap in one stage: what the model lacks is not white", ge=1)
+    ] = 1.2
+    widening_of_both: Annotated[
+        float, setting("factor on those of gaps in both: beside the best share there are others about as good", ge=1)
+    ] = 1.8
 
 
 class TrustSettings(Settings, frozen=True):

@@ -41,6 +41,8 @@ def trust_of_location(location: Location, record: Record, model: Model, settings
     def reasons() -> Iterator[Reason]:
         if not location.converged:
             yield Reason(Level.AMBER, "the fit stopped before it converged")
+        if not location.explained:
+            yield Reason(Level.AMBER, "the model does not explain the record: its torque noise is too large")
         if location.answers and location.traversals < settings.trust.least_traversals:
             yield Reason(Level.AMBER, f"the gap is traversed only {location.traversals} times")
         if record.u_sampled is not None:

@@ -51,14 +51,15 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
     floating = _bound_share(likelihood, settings.shared)
     start = min(_try_shares(coarse.likelihood, coarse.point.theta, SHARES), key=_objective).theta
     both = _fit_both(floating, start, FINE)
-    both = _better(both, _fit_both(floating, _renew(both), FINE))
     singles = []
     for share, done in ((0.0, 0.5), (1.0, 0.7)):
         report(f"fitting a gap in stage {1 + round(share)} alone", done)
         starts = [coarse.point.theta, with_noise(likelihood, both.point.theta, MIDDLE[-1])]
         tried = [p for theta in starts for p in _try_shares(coarse.likelihood, theta, [share])]
         singles.append(_finish(coarse.likelihood, min(tried, key=_objective), _all_but(likelihood, SHARE)))
-    report("fitting the share of each stage", 0.85)
+    report("fitting the share of each stage", 0.8)
+    if 0.5 * (both.point.objective - _better(*singles).point.objective) < settings.hopeless:
+        both = _better(both, _fit_both(floating, _renew(both), FINE))
     free = _free(likelihood, both, *singles)
     for n in range(settings.starts):
         if not settings.shared < _share(free) < 1.0 - settings.shared or _scatter(free) < settings.restless:
@@ -70,6 +71,8 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
             singles[n] = _better(singles[n], _fit_at(free, share))
     if min(fit.point.objective for fit in (both, *singles)) < free.point.objective:
         free = _free(likelihood, both, *singles)
+    if settings.shared <= _share(free) <= 1.0 - settings.shared:
+        both = _better(both, free)
     return StageFits(singles[0], singles[1], both, free)
 
 
@@ -144,9 +147,9 @@ def _fit_size(likelihood: StagesLikelihood) -> StagesFit:
     if not math.isfinite(best.objective):
         raise ConvergenceError("the likelihood must be finite somewhere, but no start led to one; check the units")
     free = _all_but(likelihood, "torque", SHARE)
-    fit = maximise(likelihood, best.theta, free, 4, tolerance=2.0)
+    fit = maximise(likelihood, best.theta, free, 10, tolerance=2.0)
     for level in MIDDLE:
-        lower = maximise(fit.likelihood, with_noise(likelihood, fit.point.theta, level), free, 3, tolerance=2.0)
+        lower = maximise(fit.likelihood, with_noise(likelihood, fit.point.theta, level), free, 6, tolerance=2.0)
         if lower.point.objective > fit.point.objective:
             break
         fit = lower
@@ -197,7 +200,7 @@ def _finish(likelihood: StagesLikelihood, start: Point, free: Sequence[int]) -> 
     settled = _settle_noise(likelihood, start, torque)
     fit = maximise(likelihood, settled.theta, others, 4, tolerance=0.5)
     settled = _settle_noise(fit.likelihood, fit.point, torque)
-    return maximise(fit.likelihood, settled.theta, free, 12, tolerance=0.1)
+    return maximise(fit.likelihood, settled.theta, free, 16, tolerance=0.1)
 
 
 def _settle_noise(likelihood: StagesLikelihood, point: Point, torque: Sequence[int]) -> Point:

@@ -16,7 +16,7 @@ from orchestrator.estimation.description import autocorrelation, block_variance
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.settings import StageSettings
 from orchestrator.estimation.stages.fit import StageFits, StagesFit
-from orchestrator.estimation.stages.problem import SHARE, TOTAL
+from orchestrator.estimation.stages.problem import BODIES, SHARE, TOTAL
 from orchestrator.shared.inference.normal import NORMAL_95
 
 FIRST, SECOND, BOTH = "1", "2", "both"
@@ -41,6 +41,7 @@ class Location:
         stages: half-gap of each stage, at its gear's output.
         behind: by how much log-likelihood the best fit of each answer falls behind the best of all.
         converged: whether the free fit did.
+        explained: whether the torque noise of the free fit is as little as that of a right model.
         traversals: changes of flank of either stage.
         autocorrelation: of the one-step errors of motor and load encoder.
         parameters: value, standard error and nominal of each fitted unknown.
@@ -52,6 +53,7 @@ class Location:
     stages: tuple[StageGap, StageGap]
     behind: dict[str, float]
     converged: bool
+    explained: bool
     traversals: int
     autocorrelation: tuple[float, float]
     parameters: dict[str, dict[str, float]]
@@ -70,29 +72,25 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         name: 0.5 * (fit.point.objective - fits.free.point.objective)
         for name, fit in ((FIRST, fits.first), (SECOND, fits.second), (BOTH, fits.both))
     }
-    answers = [name for name in (FIRST, SECOND, BOTH) if behind[name] <= settings.decisive]
     share = float(fits.free.point.theta[fits.free.likelihood.problem.index(SHARE)])
-    if {FIRST, SECOND} <= set(answers):  # what lies between two that are possible is no less so
+    noise = _torque_noise(fits.free)
+    answers = _possible_answers(behind, share, settings)
+    if noise > settings.unexplained:  # how far such fits are apart says nothing
         answers = [FIRST, SECOND, BOTH]
-    if not {FIRST, SECOND} & set(answers):
-        # A share that nobody would mend is none: a contact that differs from the model's makes one of a thousandth.
-        nearest, other = (FIRST, share) if share < 0.5 else (SECOND, 1.0 - share)
-        if other < settings.negligible:
-            answers.insert(0, nearest)
-        elif BOTH not in answers:
-            answers.append(BOTH)
-    wider = _widening(fits.free, settings)
+    scatter = _scatter(fits.free)
+    factors = {FIRST: settings.misfit_widening, SECOND: settings.misfit_widening, BOTH: settings.widening_of_both}
+    wider = {name: max(factor**2, scatter) for name, factor in factors.items()}
     ways = {FIRST: fits.first, SECOND: fits.second, BOTH: fits.both}
     within = settings.shared <= share <= 1.0 - settings.shared
     if BOTH in answers and (within or behind[BOTH] > settings.decisive):
         ways[BOTH] = fits.free
-    sizes = [_sizes(ways[answer], wider) for answer in answers]
-    best = min((ways[answer] for answer in answers), key=lambda fit: fit.point.objective)
-    total = _total(best, wider)
+    sizes = [_sizes(ways[answer], wider[answer]) for answer in answers]
+    nearest = min(answers, key=lambda answer: ways[answer].point.objective)
+    best, total = ways[nearest], _total(ways[nearest], wider[nearest])
     stages = [_join([each[n] for each in sizes]) for n in range(2)]
     if len(answers) == 1 and answers[0] != BOTH:
         absent = 1 if answers[0] == FIRST else 0
-        stages[absent] = StageGap(0.0, (0.0, _most(fits.free, absent, wider)))
+        stages[absent] = StageGap(0.0, (0.0, _most(fits.free, absent, wider[answers[0]])))
     kept = best.likelihood.run(best.point.theta, keep=True)
     traversals = _changes(kept.contacts // 3) + _changes(kept.contacts % 3)
     if not total.interval[0] > 0.0 or traversals == 0:
@@ -104,6 +102,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         (stages[0], stages[1]),
         behind,
         fits.free.converged,
+        noise <= settings.unexplained,
         traversals,
         (autocorrelation(white[:, 0]), autocorrelation(white[:, 1])),
         _parameters(best),
@@ -111,15 +110,39 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
     )
 
 
+def _possible_answers(behind: dict[str, float], share: float, settings: StageSettings) -> list[str]:
+    """Return the answers that are left, by how far each falls behind and by the share of stage 2 in the free fit."""
+    answers = [name for name in (FIRST, SECOND, BOTH) if behind[name] <= settings.decisive]
+    if {FIRST, SECOND} <= set(answers):  # what lies between two that are possible is no less so
+        return [FIRST, SECOND, BOTH]
+    if {FIRST, SECOND} & set(answers):
+        return answers
+    # A share that nobody would mend is none: a contact that differs from the model's makes one of a thousandth.
+    nearest, other = (FIRST, share) if share < 0.5 else (SECOND, 1.0 - share)
+    if other < settings.negligible:
+        return [nearest, *answers]
+    return [BOTH]
+
+
 def _changes(flanks: NDArray[np.int64]) -> int:
     touched = flanks[flanks != 1]
     return int(np.count_nonzero(np.diff(touched)))
 
 
-def _widening(fit: StagesFit, settings: StageSettings) -> float:
-    """Return by what the variance of sizes exceeds that of white errors."""
+def _torque_noise(fit: StagesFit) -> float:
+    """Return the torque noise of motor or load, whichever is more, over the drive's torque there [s^0.5]."""
+    problem = fit.likelihood.problem
+    return max(
+        math.exp(fit.likelihood.value(fit.point.theta, f"log_torque_{body}")) / unit
+        for body, unit in zip(BODIES, problem.units, strict=True)
+        if body != "middle"
+    )
+
+
+def _scatter(fit: StagesFit) -> float:
+    """Return by what the variance of the size among blocks of the record exceeds that of white errors."""
     column = list(fit.free).index(fit.likelihood.problem.index(TOTAL))
-    return max(settings.misfit_widening**2, block_variance(fit, column, fit.likelihood.settings.verdict.blocks))
+    return block_variance(fit, column, fit.likelihood.settings.verdict.blocks)
 
 
 def _gradients(fit: StagesFit) -> tuple[Array, Array]:

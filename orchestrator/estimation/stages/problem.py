@@ -24,6 +24,9 @@ BODIES = ("motor", "middle", "load")
 ENCODERS = ("theta_m", "theta_l")
 # White torque noise at the motor [N.m.s^0.5], its least and largest.
 LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-5, 30.0
+# At the intermediate shaft, over the drive's torque [s^0.5]: nothing but the friction of its bearings is unknown there.
+# With more, a fit far from any optimum takes its whole motion for noise.
+LARGEST_AT_SHAFT = 1.5e-3
 LATE_DEVIATION = 3e-3  # s, of the torque, before anything is known
 TWIST_DEVIATION = 0.03  # rad, of stage 1 at the first row
 SPEED_DEVIATIONS = (3.0, 1.0)  # rad/s of motor and load at the first row
@@ -97,6 +100,7 @@ def make_problem(record: Record, model: Model) -> StagesProblem:
         unknowns.append(Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, least, math.log(level) + 6.0))
     for body, unit in zip(BODIES, units, strict=True):
         low, high = (math.log(unit / rms * level) for level in (LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE))
+        high = math.log(unit * LARGEST_AT_SHAFT) if body == "middle" else high
         unknowns.append(Unknown(f"log_torque_{body}", -7.0, math.inf, 0.5, low, high))
     speeds = [_first_line(record.time, angles) for angles in (record.theta_m, record.theta_l)]
     first = (speeds[0][1], speeds[0][0], speeds[1][1], speeds[1][0])
