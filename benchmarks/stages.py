@@ -7,9 +7,9 @@
     python -m benchmarks.stages 8 --cost          # processor time beside that of `maximum_likelihood`
 
 Every machine has dry friction that its model file does not state, 1 % of torque noise, encoders with 10,000 and 20,000
-counts whose zeros differ, and parameters up to 5 % off. The gap is in stage 1, in stage 2 and in both in turn; the noise
-is one and five times the usual one, the torque on time and 2 ms late. Seeds below 1000 were looked at while the method
-was made; ``--first 100000`` starts at seeds that were not.
+counts whose zeros differ, and parameters up to 5 % off. The gap is in stage 1, in stage 2 and in both in turn. Noise is
+one and five times the usual one, the torque on time and 2 ms late. Seeds below 1000 were looked at while the method was
+made; ``--first 100000`` starts at seeds that were not.
 """
 
 import argparse
