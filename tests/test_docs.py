@@ -1,10 +1,13 @@
 """The pages that people read: short sentences, short pages, links that lead somewhere."""
 
+import ast
 import contextlib
 import functools
 import importlib
 import re
 from pathlib import Path
+
+import yaml
 
 from tests.support.prose import count_words, sentences
 from tools import messages_page
@@ -162,3 +165,25 @@ def test_messages_are_collected_from_errors_and_notes(tmp_path, monkeypatch):
         messages_page.NOTES: ["only … rows move", "the record has … rows", "…: record it again"],
     }  # fmt: skip
     assert {room for rows in found.values() for _, room in rows} == {"records"}
+
+
+def groups_of_the_site():
+    """The groups of the site, each with its pages as files of the repository; the page of messages is no file."""
+    hooks = ast.parse(text_of("tools/site_hooks.py"))
+    pages = next(
+        ast.literal_eval(n.value) for n in hooks.body if isinstance(n, ast.Assign) and n.targets[0].id == "PAGES"
+    )
+    files = {place: file for file, place in pages.items()}
+    for group in yaml.safe_load(text_of(".mkdocs.yml"))["nav"]:
+        ((title, inside),) = group.items()
+        if isinstance(inside, list):
+            places = [place for page in inside for place in page.values() if place != "messages.md"]
+            yield title, [files.get(place, f"docs/{place}") for place in places]
+
+
+def test_the_readme_has_every_page_in_its_group():
+    rows = dict(re.findall(r"^\| (\w[\w ]*) \| (\[.*\)) \|$", text_of("README.md"), re.MULTILINE))
+    groups = dict(groups_of_the_site())
+    assert {title: re.findall(r"\]\((.+?)\)", rows.get(title, "")) for title in groups} == groups
+    listed = {page for pages in groups.values() for page in pages}
+    assert {page for page in PAGES if page.startswith("docs/")} <= listed
