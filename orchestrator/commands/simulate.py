@@ -5,7 +5,6 @@ from pathlib import Path
 
 from orchestrator.api.pair import PairResult, run_pair
 from orchestrator.api.shown import Result
-from orchestrator.api.simulate import simulate
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
 from orchestrator.commands._safety import add_safety_arguments, safety_of
@@ -38,6 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(arguments: argparse.Namespace) -> Result:
     if arguments.scenario is not None:
+        from orchestrator.api.simulate import simulate  # what reads scenarios, which a pair does without
+
         return simulate(arguments.scenario, safety=safety_of(arguments), tell=note)
     return run_pair(
         arguments.alpha,

@@ -1,25 +1,14 @@
 """From a result directory to its page."""
 
-from collections.abc import Callable
+import importlib
 from pathlib import Path
+from typing import Any
 
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
-from orchestrator.reporting.pages import (
-    calibrate,
-    check,
-    compensate,
-    diagnose,
-    estimate,
-    generic,
-    inspect,
-    regulator,
-    simulate,
-    sweep,
-    thesis,
-)
-from orchestrator.reporting.source import ResultDocument, load
+from orchestrator.reporting.pages import generic
+from orchestrator.reporting.source import load
 from orchestrator.shared.output import write_whole
 from orchestrator.shared.source_tree import import_masters
 
@@ -30,30 +19,15 @@ COMMANDS = (
 )  # fmt: skip
 
 
-def _bench_page(source: ResultDocument) -> Report:
-    """Return the benchmark's own page in a clone, the generic one where the package alone is installed."""
-    try:
-        page = import_masters("page")
-    except ScenarioError:
-        page = generic
-    report: Report = page.build(source)
-    return report
-
-
-_BUILDERS: dict[str, Callable[[ResultDocument], Report]] = {
-    "bench": _bench_page,
-    "calibrate": calibrate.build,
-    "check": check.build,
-    "compensate": compensate.build,
-    "diagnose": diagnose.build,
-    "estimate": estimate.build,
-    "inspect": inspect.build,
-    "regulator": regulator.build,
-    "simulate": simulate.build,
-    "ssp": simulate.build,
-    "sweep": sweep.build,
-    "thesis": thesis.build,
-}
+def _page_of(command: str) -> Any:
+    """Return the module of a command's page; ``bench`` has one of its own in a clone, where the masters lie."""
+    if command == "bench":
+        try:
+            return import_masters("page")
+        except ScenarioError:
+            return generic
+    name = {"ssp": "simulate", "build": "generic"}.get(command, command)
+    return importlib.import_module(f"orchestrator.reporting.pages.{name}")
 
 
 def report_from_directory(directory: Path, command: str | None = None) -> Report:
@@ -68,7 +42,8 @@ def report_from_directory(directory: Path, command: str | None = None) -> Report
         raise ScenarioError(f"{directory} must hold the results of one command, but {what}", "command")
     source = load(directory, command or found[0])
     try:
-        return _BUILDERS.get(source.command, generic.build)(source)
+        report: Report = _page_of(source.command).build(source)
+        return report
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         reason = f"{type(error).__name__}: {error}"
         raise ScenarioError(f"{directory / source.command}.json must hold results of this version ({reason})") from None

@@ -53,8 +53,17 @@ def read_imports(path: Path) -> tuple[Path, ...]:
     return tuple(_imports(path))
 
 
+def _statements(block: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """Yield the statements of a block and of the blocks within, without a look at expressions."""
+    for node in block:
+        yield node
+        for inner in (node, *getattr(node, "handlers", ()), *getattr(node, "cases", ())):
+            for name in ("body", "orelse", "finalbody"):
+                yield from _statements(getattr(inner, name, []))
+
+
 def _imports(path: Path) -> Iterator[Path]:
-    for node in ast.walk(parse_python(path.read_bytes())):
+    for node in _statements(parse_python(path.read_bytes()).body):
         if isinstance(node, ast.Import) and any(_is_ours(alias.name) for alias in node.names):
             raise FmuError(f"{path}:{node.lineno}: {_MESSAGE}, but is `{ast.unparse(node)}`")
         if not isinstance(node, ast.ImportFrom):

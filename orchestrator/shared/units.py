@@ -128,7 +128,9 @@ _SPELLED = (
     ("milliliter", "ml mL"),
 )  # fmt: skip
 _ATOMS = {spelling: name for name, spellings in _SPELLED for spelling in spellings.split()}
-_FOLDED = {word.lower(): tuple((s, name) for s, name in _ATOMS.items() if s.lower() == word.lower()) for word in _ATOMS}
+_FOLDED: dict[str, tuple[tuple[str, str], ...]] = {}
+for _spelling, _name in _ATOMS.items():
+    _FOLDED[_spelling.lower()] = (*_FOLDED.get(_spelling.lower(), ()), (_spelling, _name))
 _PHRASES = {
     "a rms": "ampere", "a(rms)": "ampere", "per unit": "dimensionless", "per mille": "0.1*percent",
     "r/min": _ROTATION, "r/s": "revolution/second", "u/min": _ROTATION,

@@ -106,3 +106,24 @@ def test_an_import_that_an_fmu_could_not_follow_is_refused(
     found = [path.relative_to(tmp_path / "pyfmu_sources").as_posix() for path in equation_files.closure("odd")]
     assert found == ["event_numbers.py", "odd.py", "shapes/__init__.py", "shapes/decay.py", "shapes/filters.py"]
     equation_files.closure.cache_clear()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def f():\n    {}",
+        "class A:\n    def f(self):\n        if True:\n            pass\n        elif False:\n            {}",
+        "try:\n    {}\nexcept OSError:\n    pass",
+        "try:\n    pass\nexcept OSError:\n    {}",
+        "try:\n    pass\nfinally:\n    {}",
+        "for n in ():\n    pass\nelse:\n    {}",
+        "with open(0) as f:\n    {}",
+        "match 1:\n    case 2:\n        pass\n    case _:\n        {}",
+        "async def f():\n    while True:\n        {}",
+    ],
+)
+def test_an_import_counts_wherever_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setattr(equation_files, "SOURCES", tmp_path)
+    for name in ("there", "here"):
+        (tmp_path / f"{name}.py").write_text(text.format("from . import there") if name == "here" else "")
+    assert [path.name for path in equation_files.read_imports(tmp_path / "here.py")] == ["there.py"]
