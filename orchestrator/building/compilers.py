@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import platform
 import struct
 import subprocess
@@ -16,8 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from orchestrator.errors import FmuError
-from orchestrator.shared.cache import cache_directory
-from orchestrator.shared.machine_code import local_compiler
+from orchestrator.shared.machine_code import compiler_environment, local_compiler
 
 # No contraction of a product and a sum: it would round once where Python rounds twice.
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall", "-Wextra", "-Wpedantic")
@@ -137,8 +135,7 @@ def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder
 
 def _run(compiler: Compiler, command: Sequence[str], folder: Path, what: str) -> None:
     """Run the compiler."""
-    cache = str(cache_directory("zig"))
-    environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
+    environment = compiler_environment()
     try:
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env=environment)
     except OSError as error:

@@ -1,6 +1,7 @@
 """From a result directory to its page."""
 
 import importlib
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,14 @@ COMMANDS = (
 
 
 def _page_of(command: str) -> Any:
-    """Return the module of a command's page; ``bench`` has one of its own in a clone, where the masters lie."""
+    """Return the module of a command's page, or the generic one; that of ``bench`` lies in a clone alone."""
     if command == "bench":
         try:
             return import_masters("page")
         except ScenarioError:
             return generic
-    name = {"ssp": "simulate", "build": "generic"}.get(command, command)
-    return importlib.import_module(f"orchestrator.reporting.pages.{name}")
+    name = f"orchestrator.reporting.pages.{'simulate' if command == 'ssp' else command}"
+    return generic if find_spec(name) is None else importlib.import_module(name)
 
 
 def report_from_directory(directory: Path, command: str | None = None) -> Report:

@@ -1,5 +1,7 @@
 """C files of this package, compiled by the local C compiler when they are first needed and kept in the user's cache.
 
+Kernels are also compiled for other platforms, by zig, when a wheel for one is made.
+
 A child behind walls can neither compile nor see the user's cache: its parent compiles, and ``VARIABLE`` names the
 folder. Beside each library lies its hash: what was damaged is not loaded, which could end the process, but made anew.
 """
@@ -13,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -23,7 +26,19 @@ INSTALLED = Path(__file__).parents[1] / "machine_code"
 VARIABLE = "BACKLASH_COSIM_MACHINE_CODE"
 # No contraction of a product and a sum: it would round once where Python rounds twice.
 # Roots do not set errno, and nobody asks whether a division trapped: neither changes a value.
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fPIC", "-shared", "-w")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-shared", "-w")
+
+
+@dataclass(frozen=True)
+class Platform:
+    """What a library is made for: system and machine as Python calls them, and zig's name of it where it is another."""
+
+    system: str = sys.platform
+    machine: str = platform.machine()
+    zig: str = ""
+
+
+HERE = Platform()
 
 
 def local_compiler() -> str | None:
@@ -32,11 +47,19 @@ def local_compiler() -> str | None:
     return next((path for name in names if name and (path := shutil.which(name))), None)
 
 
-def _command() -> tuple[str, ...] | None:
-    path = local_compiler()
+def _command(target: Platform = HERE) -> tuple[str, ...] | None:
+    path = None if target.zig else local_compiler()
     if path is not None:
         return (path,)
-    return (sys.executable, "-m", "ziglang", "cc") if importlib.util.find_spec("ziglang") is not None else None
+    if importlib.util.find_spec("ziglang") is None:
+        return None
+    return (sys.executable, "-m", "ziglang", "cc", *(("-target", target.zig) if target.zig else ()))
+
+
+def compiler_environment() -> dict[str, str]:
+    """Return the environment of a compiler: what zig keeps lies in the user's cache."""
+    place = str(cache_directory("zig"))
+    return {**os.environ, "ZIG_GLOBAL_CACHE_DIR": place, "ZIG_LOCAL_CACHE_DIR": place}
 
 
 def machine_code_folder() -> Path:
@@ -46,7 +69,12 @@ def machine_code_folder() -> Path:
 
 @cache
 def compile_library(source: Path) -> Path | None:
-    """Return the shared library made from one C file that needs no other, or ``None`` where it cannot be made."""
+    """Return the shared library made from one C file that needs no other, or ``None`` where it cannot be made.
+
+    On Windows none is made: what calls FMUs from machine code has never run there.
+    """
+    if not sys.platform.startswith(("linux", "darwin")):
+        return None
     digest = hashlib.sha256(source.read_bytes()).hexdigest()[:20]
     return compile_text(f"{source.stem}-{digest}", lambda: source.read_text(encoding="utf-8"))
 
@@ -73,23 +101,28 @@ def compile_text(
     return folder / name if _is_intact(folder / name) else None
 
 
-def library_file(stem: str) -> str:
+def library_file(stem: str, target: Platform = HERE) -> str:
     """Return the name of a library's file: of its text, and of platform and flags."""
-    digest = hashlib.sha256(" ".join((sys.platform, platform.machine(), *FLAGS)).encode()).hexdigest()[:8]
-    return f"{stem}-{digest}.so"
+    digest = hashlib.sha256(" ".join((target.system, target.machine, *FLAGS)).encode()).hexdigest()[:8]
+    return f"{stem}-{digest}{'.dll' if target.system == 'win32' else '.so'}"
 
 
-def make_library(target: Path, text: str, headers: Sequence[Path] = ()) -> None:
+def make_library(target: Path, text: str, headers: Sequence[Path] = (), made_for: Platform = HERE) -> None:
     """Compile a C text and put the library, with its hash beside it, in its place; without a compiler do nothing."""
-    compiler = _command()
-    if compiler is None or not sys.platform.startswith(("linux", "darwin")):
+    compiler = _command(made_for)
+    if compiler is None:
         return
+    # What does not run is left out, and with it the names of temporary folders.
+    apple = ("-fPIC", "-g0", "-Wl,-x", f"-Wl,-install_name,@rpath/{target.name}")
+    before = {"linux": ("-fPIC", "-s"), "darwin": apple, "win32": ("-s",)}.get(made_for.system, ())
+    behind = () if made_for.system == "win32" else ("-lm",)
     with tempfile.TemporaryDirectory(dir=target.parent) as place:
         source, made = Path(place) / "kernel.c", Path(place) / target.name
         source.write_text(text, encoding="utf-8")
         for header in headers:
             shutil.copyfile(header, Path(place) / header.name)
-        run = subprocess.run([*compiler, *FLAGS, "-o", str(made), str(source), "-lm"], capture_output=True, check=False)
+        command = [*compiler, *FLAGS, *before, "-o", str(made), str(source), *behind]
+        run = subprocess.run(command, capture_output=True, check=False, env=compiler_environment())
         if run.returncode == 0:
             noted = made.with_suffix(".sha256")
             noted.write_text(hashlib.sha256(made.read_bytes()).hexdigest(), encoding="ascii")
