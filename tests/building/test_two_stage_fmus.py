@@ -13,6 +13,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.validation import validate_fmu
 
+import orchestrator as oc
 from orchestrator.building.build import ensure_built
 from orchestrator.building.compilers import find_compiler
 from orchestrator.checking.check import CheckOptions, check_fmu
@@ -133,6 +134,13 @@ def test_directional_derivatives_are_those_of_differences(train: Path, name: str
     compare_directional_derivatives(fmu, references, [*states, "u", "T_l"], unknown, nominal, sorted(CASES).index(name))
     fmu.terminate()
     fmu.freeInstance()
+
+
+def test_the_example_runs_through_both_gaps() -> None:
+    path = Path(__file__).resolve().parents[2] / "docs" / "examples" / "two_stages.toml"
+    result = oc.simulate(path, stop=1.0)
+    for stage in (1, 2):
+        assert set(result[f"train.contact_{stage}"].tolist()) == {-1.0, 0.0, 1.0}
 
 
 def test_a_dead_time_is_refused_in_model_exchange(train: Path) -> None:

@@ -100,6 +100,32 @@ def test_the_motion_is_that_of_an_independent_solution(case: str) -> None:
     assert len(instants) > 3 or values["alpha_1"] + values["alpha_2"] == 0.0
 
 
+def draw_values(rng: np.random.Generator) -> dict[str, float]:
+    """A machine of any proportions, with or without each gap, friction and motion at the start."""
+    sizes = {
+        "J_m": (0.02, 2.0), "J_s": (0.005, 2.0), "J_l": (0.1, 20.0), "i_1": (0.4, 15.0), "i_2": (0.4, 15.0),
+        "k_1": (200.0, 2e4), "k_2": (200.0, 2e4), "c_1": (0.01, 5.0), "c_2": (0.01, 5.0), "b_m": (0.01, 1.0),
+        "b_s": (0.001, 0.5), "b_l": (0.01, 5.0), "tau": (1e-3, 1.0), "alpha_1": (1e-3, 0.05), "alpha_2": (1e-3, 0.05),
+        **dict.fromkeys(FRICTION, (0.1, 3.0)),
+    }  # fmt: skip
+    drawn = {name: float(np.exp(rng.uniform(*np.log(bounds)))) for name, bounds in sizes.items()}
+    for name in ("alpha_1", "alpha_2", *FRICTION):
+        drawn[name] *= float(rng.integers(2))
+    starts = ("theta_m_start", "omega_m_start", "omega_s_start", "omega_l_start", "T_m_start")
+    moves = float(rng.integers(2))
+    return drawn | {n: moves * size * float(rng.normal()) for n, size in zip(starts, (0.02, 3, 2, 0.5, 5), strict=True)}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_so_is_that_of_machines_of_any_proportions(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    values, step = all_values(draw_values(rng)), float(rng.choice([5e-4, 1e-3, 4e-3]))
+    u, T_l = torques(150, seed)
+    wanted, _, _ = solve_two_stages(values, u, T_l, step)
+    found, _ = run(*plant(values), u, T_l, step)
+    assert np.abs(found - wanted).max(axis=0)[[0, 2, 4]].max() < 1e-8
+
+
 def energy(x: State, mode: Mode, p: Parameters) -> float:
     """Kinetic energy and that of both shafts [J]."""
     first, second = twists(x, p)

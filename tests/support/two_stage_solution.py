@@ -17,7 +17,14 @@ Events = list[tuple[Any, Callable[..., Any]]]
 
 BODIES = ("motor", "shaft", "load")
 TOLERANCE, SMALLEST = 1e-12, 1e-14
-LONGEST = 1e-3  # s, so that no brief contact hides within a step of the integrator
+LONGEST = 0.1  # of the shortest oscillation's radian, so that no brief contact hides within a step of the integrator
+
+
+def longest_step(p: P) -> float:
+    """Return how long a step of the integrator may be [s]."""
+    first = p["k_1"] * (1.0 / (p["J_m"] * p["i_1"] ** 2) + 1.0 / p["J_s"])
+    second = p["k_2"] * (1.0 / (p["J_s"] * p["i_2"] ** 2) + 1.0 / p["J_l"])
+    return float(LONGEST / np.sqrt(first + second))
 
 
 def start_values(p: P) -> Array:
@@ -134,7 +141,7 @@ def solve_two_stages(p: P, u: Array, T_l: Array, step: float) -> tuple[Array, Ar
             kinds = events_of(flanks, slides, p, T_l[n])
             answer = solve_ivp(
                 lambda t, y, n=n, f=flanks, s=slides: rates_of(y, f, s, p, u[n], T_l[n]),
-                (now, end), x, method="DOP853", rtol=TOLERANCE, atol=SMALLEST, max_step=LONGEST,
+                (now, end), x, method="DOP853", rtol=TOLERANCE, atol=SMALLEST, max_step=longest_step(p),
                 events=[event for _, event in kinds],
             )  # fmt: skip
             now, x = float(answer.t[-1]), answer.y[:, -1].copy()
