@@ -274,6 +274,11 @@ def test_other_workflows_point_to_the_one_for_trains(place):
         oc.diagnose(place / "record.csv", model)
 
 
+def test_an_inspection_foretells_nothing_of_a_train(place):
+    said = oc.inspect(place / "record.csv", oc.read_model(place / "train.toml")).verdict()[0]
+    assert said.startswith("What a record of a TwoStageTrain shows of gaps is not foretold")
+
+
 def test_exchanged_columns_and_degrees_are_refused(place, tmp_path):
     table = np.genfromtxt(place / "record.csv", delimiter=",", names=True)
     columns = {name: table[name] for name in table.dtype.names}

@@ -11,6 +11,7 @@ from orchestrator.estimation.design import Excitation, MachineLimits, error_boun
 from orchestrator.estimation.innovations import affine_model, simulate
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
+from orchestrator.plants.known.two_stage_train import TRAIN
 from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible, smooth
 from orchestrator.records.record import Record
@@ -35,7 +36,7 @@ class Sufficiency:
         better: excitations of the same length and limits, the best first; with their bounds for ``design_size``.
         own: the bound of the record itself for ``design_size`` [rad].
         design_size: half-gap [rad].
-        why: why no size can be seen, whatever the bounds; empty where one may be.
+        why: sentence on why no size can be seen, whatever the bounds; empty where one may be.
     """
 
     bounds: Sequence[tuple[float, float]]
@@ -95,7 +96,17 @@ def sufficiency(record: Record, model: Model) -> Sufficiency:
 
 
 def _why_none(record: Record, model: Model) -> str:
-    """Return why no gap of any size can be seen, or nothing."""
+    """Return the sentence that says why no gap of any size can be seen, or nothing."""
+    if model.fmu == TRAIN:
+        return (
+            f"What a record of a {TRAIN} shows of gaps is not foretold: `estimate` with this model says in which stage "
+            "the gap is, or what the record leaves open."
+        )
+    reason = _reason_for_none(record, model)
+    return f"The record shows no gap of any size: {reason}." if reason else ""
+
+
+def _reason_for_none(record: Record, model: Model) -> str:
     if model.fmu != "Drivetrain":
         return f"the model is {model.fmu}, an axis without teeth, which has no gap"
     if not record.has_torque:

@@ -40,7 +40,7 @@ def _of_angles(estimate: Estimate) -> str:
 
 def _of_sizes(results: Sufficiency) -> str:
     if results.why:
-        return f"The record shows no gap of any size: {results.why}."
+        return results.why
     runs = results.ranges()
     if not runs:
         return "The record shows no gap of any size that was tried: its torque does not move the teeth through one."
