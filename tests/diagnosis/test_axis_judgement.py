@@ -45,13 +45,13 @@ def graded(grade: Grade, gain: float, t: float) -> Any:
     return SimpleNamespace(label="torque_ripple@motor", grade=grade, evidence=evidence)
 
 
-def verdict_of(*effects: Any) -> str:
+def verdict_of(*effects: Any, left: float = 1e-5) -> str:
     fitted: Any = SimpleNamespace(point=ModelPoint((1.0,)), cost=0.0)
     problem = SimpleNamespace(
         shared=("slope",), start=ModelPoint((1.0,)), whiten_residuals=lambda points: [np.full(9, 10.0)]
     )
     search: Any = SimpleNamespace(problem=problem, final=fitted, complete=True)
-    return form_verdict(search, effects, (), CLEAN, SETTINGS)
+    return form_verdict(search, effects, (), replace(CLEAN, left=left), SETTINGS)
 
 
 def test_a_hint_is_no_verdict() -> None:
@@ -62,6 +62,22 @@ def test_a_hint_is_no_verdict() -> None:
 def test_a_possible_effect_that_surely_takes_much_of_what_is_left_says_that_something_is_missing() -> None:
     assert verdict_of(graded(Grade.POSSIBLE, 0.6, 8.0)) == "unknown"
     assert verdict_of(graded(Grade.LIKELY, 0.06, 3.4)) == "effects"
+
+
+def test_a_model_that_leaves_much_does_not_explain_a_record() -> None:
+    assert [verdict_of(left=left) for left in (0.02, 0.12, 0.3)] == ["parameters", "unknown", "unknown"]
+
+
+def test_what_is_left_follows_the_drive_by_no_model_that_goes_to_nothing(tmp_path) -> None:
+    path = tmp_path / "rough.toml"
+    path.write_text(MODEL.replace("= 0.1", "= 0.9"))
+    model = read_model(path)
+    record = axis_record(values(model), 3, "noisy torque")
+    noisy = replace(record, u=record.u * (1.0 + 0.03 * np.random.default_rng(3).standard_normal(record.size)))
+    found = diagnose(noisy, model)
+    assert [one.argument for one in found.remaining if one.share > 0.5] == []
+    assert found.verdict == "parameters"
+    assert found.trust.level.word == "green" or found.misses_test_data
 
 
 def test_trust_names_what_is_only_likely() -> None:

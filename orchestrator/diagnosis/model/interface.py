@@ -225,6 +225,8 @@ class LawArgument:
         values: (n,) of each record.
         respond: of each record: torque (n,) against the motion -> change (channels, n) of the residuals.
         code: number of the argument in a learned law of an FMU; 0: none has it.
+        drives: it is the torque that drives. Beside a curve of that, free parameters go with it to nothing, where
+            nothing is left either.
     """
 
     name: str
@@ -234,6 +236,7 @@ class LawArgument:
     values: tuple[Array, ...]
     respond: tuple[Callable[[Array], Array], ...]
     code: int = 0
+    drives: bool = False
 
 
 class ResidualModel(Protocol):

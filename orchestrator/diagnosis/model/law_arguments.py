@@ -32,6 +32,7 @@ def law_arguments(models: Sequence[TorqueBalance], points: Sequence[ModelPoint],
             LawArgument(
                 argument.signal, argument.site, unit, "N" if metric else "N.m",
                 tuple(value for value in values if value is not None), responses, argument.code,
+                argument.code == DRIVE,
             )
         )  # fmt: skip
     return found

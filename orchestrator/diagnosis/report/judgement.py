@@ -12,6 +12,8 @@ from orchestrator.effects.words import list_effects, number_words
 from orchestrator.records.model_file import ModelParameter
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
+UNEXPLAINED = 0.1  # of the torque's power, a third of it in rms: a model that leaves more does not explain a record
+
 
 def form_verdict(
     search: SearchResult, effects: Sequence[GradedEffect], dependences: Sequence[Dependence], record: RecordEvidence,
@@ -29,7 +31,7 @@ def form_verdict(
     takes = [(one.t, one.gain) for one in (effect.evidence for effect in effects)]
     takes += [(one.t, one.gain) for one in (curve.comparison for curve in dependences)]
     strong = any(t >= settings.grades.likely_t and gain >= settings.grades.likely_gain for t, gain in takes)
-    if strong or not search.complete or record.left > settings.grades.timing_left:
+    if strong or not search.complete or record.left > UNEXPLAINED:
         return "unknown"
     return "none" if _nominal_explains(search) else "parameters"
 
@@ -71,7 +73,7 @@ def judge_trust(
                 )
     if likely := [effect.label for effect in effects if effect.grade is Grade.LIKELY]:
         amber.append(f"likely, not certain: {list_effects(likely)}")
-    if record.left > 0.1:
+    if record.left > UNEXPLAINED:
         amber.append(f"{100.0 * record.left:.0f} % of the torque's power is left unexplained")
     for known in uncertain:
         if known.name in parameters and _is_far(parameters[known.name], known.uncertainty):

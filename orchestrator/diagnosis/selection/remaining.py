@@ -75,7 +75,7 @@ def _fit_curve(result: SearchResult, argument: LawArgument) -> Dependence | None
     if knots is None:
         return None
     columns = _whiten_hats(problem, argument, knots)
-    own = [n for n, one in enumerate(final.coordinates) if isinstance(one, int)]
+    own = [n for n, one in enumerate(final.coordinates) if isinstance(one, int) and not argument.drives]
     whole = np.column_stack([final.jacobian[:, own], columns])
     prior, slopes = (part[own] for part in problem.prior(final.point, final.coordinates))
     normal = whole.T @ whole
