@@ -2,14 +2,16 @@
 
     python -m benchmarks.first_answer --other ../before --commands diagnose,estimate
 
-Each command runs twice in either checkout, at first with an empty home and cache. Printed are user processor time of
-the command and its children, and the largest resident memory of any of them, with the ratios of this checkout to the
-other.
+Each command runs twice in a copy of either checkout, at first with an empty home: nothing that a run leaves is there,
+such as FMUs, bytecode or caches beside the sources, but kernels that were compiled at installation. Printed are user
+processor time of the command and its children, and the largest resident memory of any of them, with the ratios of this
+checkout to the other.
 """
 
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -43,7 +45,7 @@ class Cost:
 
 def run(root: Path, command: list[str], home: Path) -> Cost:
     """Run a command of a checkout with a home of its own."""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("XDG_")}
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("XDG_", "PYTHON"))}
     environment |= {"PYTHONPATH": str(root), "HOME": str(home)}
     words = [sys.executable, "-m", "orchestrator", *command, "--out", str(home / "out")]
     done = subprocess.run(
@@ -68,13 +70,11 @@ def main() -> None:
     for name in arguments.commands.split(","):
         with tempfile.TemporaryDirectory() as folder:
             homes = [Path(folder) / "this", Path(folder) / "other"]
-            for home in homes:
-                home.mkdir()
+            copies = [home / "checkout" for home in homes]
+            for root, copy in zip((ROOT, arguments.other.resolve()), copies, strict=True):
+                shutil.copytree(root, copy, ignore=shutil.ignore_patterns(".*", "__pycache__", "*.fmu"))
             for state in ("cold", "warm"):
-                this, other = (
-                    run(root, COMMANDS[name], home)
-                    for root, home in zip((ROOT, arguments.other.resolve()), homes, strict=True)
-                )
+                this, other = (run(root, COMMANDS[name], home) for root, home in zip(copies, homes, strict=True))
                 print(
                     f"{name:10}{state:6}{this.seconds:8.1f}{other.seconds:9.1f}{this.seconds / other.seconds:7.2f}"
                     f"{this.memory:10.0f}{other.memory:11.0f}{this.memory / other.memory:7.2f}", flush=True,

@@ -1,10 +1,11 @@
-"""Makes the artefacts of a release in ``dist/``: source archive, wheel, software bill of materials, SHA-256 sums.
+"""Makes the artefacts of a release in ``dist/``: source archive, wheels, software bill of materials, SHA-256 sums.
 
-    python -m tools.release           # needs cyclonedx-bom, and setuptools of requirements.lock
+    python -m tools.release           # needs cyclonedx-bom, and setuptools and ziglang of requirements.lock
 
 They are made of the last commit alone, in a folder of their own, and are the same to the byte for the same commit and
-the same setuptools: times are those of the commit, owners and rights are fixed, members are sorted. The wheel is built
-from the source archive. ``sha256sum -c SHA256SUMS`` in ``dist/`` checks all files.
+the same setuptools and zig: times are those of the commit, owners and rights are fixed, members are sorted. The
+wheels are built from the source archive: one with kernels in machine code for each platform, and one without, for all
+others. ``sha256sum -c SHA256SUMS`` in ``dist/`` checks all files.
 """
 
 import gzip
@@ -15,11 +16,17 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
+
+from orchestrator.building.installing import PLATFORMS
 
 ROOT = Path(__file__).resolve().parents[1]
 DIST = ROOT / "dist"
 _BACKEND = "import setuptools.build_meta as b, sys; print(getattr(b, sys.argv[1])(sys.argv[2]))"
+_FOR_PLATFORM = (
+    "import orchestrator.building.installing as b, sys; print(b.build_wheel(sys.argv[2], {'platform': sys.argv[3]}))"
+)
 
 
 def commit_time(root: Path) -> int:
@@ -37,16 +44,17 @@ def committed(root: Path, folder: Path) -> Path:
     return folder
 
 
-def build(source: Path, out: Path, time: int) -> list[Path]:
-    """Make source archive and wheel of a folder of sources.
+def build(source: Path, out: Path, time: int, platforms: Iterable[str] = ()) -> list[Path]:
+    """Make source archive and wheels of a folder of sources.
 
     Args:
         source: what is packed; the build leaves its own files there.
         out: where the two go.
         time: of all that is in them, in seconds since 1970.
+        platforms: that get a wheel with machine code.
 
     Returns:
-        The source archive and the wheel.
+        The source archive and the wheels, that for all platforms first.
     """
     out.mkdir(parents=True, exist_ok=True)
     archive = _hook("build_sdist", source, out, time)
@@ -55,17 +63,15 @@ def build(source: Path, out: Path, time: int) -> list[Path]:
         with tarfile.open(archive) as found:
             found.extractall(folder, filter=_plain)
         (unpacked,) = Path(folder).iterdir()
-        wheel = _hook("build_wheel", unpacked, out, time)
-    return [archive, wheel]
+        wheels = [_hook("build_wheel", unpacked, out, time, *name) for name in ([], *([name] for name in platforms))]
+    return [archive, *wheels]
 
 
-def _hook(name: str, source: Path, out: Path, time: int) -> Path:
+def _hook(name: str, source: Path, out: Path, time: int, *platform: str) -> Path:
     """Call a function of the build backend, in a process whose files are readable by all."""
-    environment = os.environ | {"SOURCE_DATE_EPOCH": str(time)}
-    done = subprocess.run(
-        [sys.executable, "-c", _BACKEND, name, str(out)], cwd=source, env=environment, check=True, capture_output=True,
-        text=True, umask=0o022,
-    )  # fmt: skip
+    environment = os.environ | {"SOURCE_DATE_EPOCH": str(time), "PYTHONPATH": ""}
+    words = [sys.executable, "-c", _FOR_PLATFORM if platform else _BACKEND, name, str(out), *platform]
+    done = subprocess.run(words, cwd=source, env=environment, check=True, capture_output=True, text=True, umask=0o022)
     return out / done.stdout.split()[-1]
 
 
@@ -109,7 +115,7 @@ def main() -> int:
         print(f"error: {DIST} must be empty, but is not", file=sys.stderr)
         return 2
     with tempfile.TemporaryDirectory() as folder:
-        build(committed(ROOT, Path(folder) / "source"), DIST, commit_time(ROOT))
+        build(committed(ROOT, Path(folder) / "source"), DIST, commit_time(ROOT), PLATFORMS)
     bill_of_materials()
     sums()
     return 0

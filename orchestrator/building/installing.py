@@ -101,7 +101,7 @@ def compile_all(folder: Path, made_for: Platform = HERE) -> int:
 
     Args:
         folder: of the libraries, made anew.
-        made_for: the platform.
+        made_for: where the libraries will run (default: here).
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
