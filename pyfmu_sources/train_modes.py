@@ -8,7 +8,6 @@ In all functions: ``which``: number of a guard; ``constant``: 1: with inputs and
 ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
-from .dry_friction import slip_after_stop
 from .event_numbers import NO_EVENT
 from .laws.drive import saturated
 from .linear_mode import EPSILON, GUARD_ROUNDINGS
@@ -86,19 +85,16 @@ def with_item(mode: Mode, place: int, item: int) -> Mode:
     )
 
 
-def switch_mode(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> tuple[State, Mode]:
-    """Return state and mode after the guard ``which`` has ended ``mode``."""
+def switch_mode(x: State, mode: Mode, which: int) -> tuple[State, Mode]:
+    """Return state and mode after the guard ``which`` has ended ``mode``; a body that stops sticks, for now."""
     pair = which // 2
-    side = 1 if which % 2 == 0 else -1
-    if which < FRICTION:
-        return (x, with_item(mode, pair, side if mode[pair] == 0 else 0))
     if mode[pair] == 0:
-        return (x, with_item(mode, pair, side))
-    x = (
-        x[0], 0.0 if pair == 2 else x[1], x[2], 0.0 if pair == 3 else x[3], x[4], 0.0 if pair == 4 else x[5], x[6],
-    )  # fmt: skip
-    push = pushes(x, 1.0, mode, p, T_l)[pair - 2]
-    return (x, with_item(mode, pair, slip_after_stop(push, friction_levels(p)[pair - 2])))
+        return (x, with_item(mode, pair, 1 if which % 2 == 0 else -1))
+    if which >= FRICTION:
+        x = (
+            x[0], 0.0 if pair == 2 else x[1], x[2], 0.0 if pair == 3 else x[3], x[4], 0.0 if pair == 4 else x[5], x[6],
+        )  # fmt: skip
+    return (x, with_item(mode, pair, 0))
 
 
 def settle_mode(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State, Mode]:
@@ -106,14 +102,14 @@ def settle_mode(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State,
     for _ in range(2):
         for which in range(GUARDS):
             if is_violated(x, mode, which, p, T_l):
-                x, mode = switch_mode(x, mode, which, p, T_l)
+                x, mode = switch_mode(x, mode, which)
     return (x, mode)
 
 
 def after_events(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> tuple[State, Mode]:
     """Return state and mode after an event (``NO_EVENT``: none is known), settled at the inputs of the moment."""
     if which != NO_EVENT:
-        x, mode = switch_mode(x, mode, which, p, T_l)
+        x, mode = switch_mode(x, mode, which)
     return settle_mode(x, mode, p, T_l)
 
 

@@ -121,7 +121,7 @@ def advance_series(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h:
             return (no_state(), mode)
         if which == NO_EVENT:
             return (x, mode)
-        x, mode = switch_mode(x, mode, which, p, T_l)
+        x, mode = switch_mode(x, mode, which)
         x, mode = settle_mode(x, mode, p, T_l)
         events += 1
     return (x, mode)
