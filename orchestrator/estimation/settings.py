@@ -124,6 +124,10 @@ class StageSettings(Settings, frozen=True):
     misfit_widening: Annotated[
         float, setting("factor on the intervals of a gap in one stage: what the model lacks is not white", ge=1)
     ] = 1.2
+    most_scatter: Annotated[
+        float,
+        setting("variance among blocks over that of noise that widens at most: more is a contact that comes"),
+    ] = 25.0
     widening_of_both: Annotated[
         float, setting("factor on those of gaps in both: beside the best share there are others about as good", ge=1)
     ] = 1.8

@@ -73,6 +73,11 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
         free = _free(likelihood, both, *singles)
     if settings.shared <= _share(free) <= 1.0 - settings.shared:
         both = _better(both, free)
+        for n, share in enumerate((0.0, 1.0)):  # an excluded single gap must have had the same chances
+            if 0.5 * (singles[n].point.objective - free.point.objective) < settings.hopeless:
+                theta = with_noise(likelihood, free.point.theta, FINE)
+                start = _try_shares(free.likelihood, theta, [share])[0]
+                singles[n] = _better(singles[n], _finish(free.likelihood, start, _all_but(likelihood, SHARE)))
     return StageFits(singles[0], singles[1], both, free)
 
 
@@ -146,7 +151,7 @@ def _fit_size(likelihood: StagesLikelihood) -> StagesFit:
     best = min(points, key=_objective)
     if not math.isfinite(best.objective):
         raise ConvergenceError("the likelihood must be finite somewhere, but no start led to one; check the units")
-    free = _all_but(likelihood, "torque", SHARE)
+    free = _all_but(likelihood, "torque", SHARE, "J_s")  # which much noise drives to its bound, where it would stay
     fit = maximise(likelihood, best.theta, free, 10, tolerance=2.0)
     for level in MIDDLE:
         lower = maximise(fit.likelihood, with_noise(likelihood, fit.point.theta, level), free, 6, tolerance=2.0)

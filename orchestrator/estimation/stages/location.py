@@ -77,7 +77,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
     answers = _possible_answers(behind, share, settings)
     if noise > settings.unexplained:  # how far such fits are apart says nothing
         answers = [FIRST, SECOND, BOTH]
-    scatter = _scatter(fits.free)
+    scatter = min(_scatter(fits.free), settings.most_scatter)
     factors = {FIRST: settings.misfit_widening, SECOND: settings.misfit_widening, BOTH: settings.widening_of_both}
     wider = {name: max(factor**2, scatter) for name, factor in factors.items()}
     ways = {FIRST: fits.first, SECOND: fits.second, BOTH: fits.both}
@@ -93,7 +93,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         stages[absent] = StageGap(0.0, (0.0, _most(fits.free, absent, wider[answers[0]])))
     kept = best.likelihood.run(best.point.theta, keep=True)
     traversals = _changes(kept.contacts // 3) + _changes(kept.contacts % 3)
-    if not total.interval[0] > 0.0 or traversals == 0:
+    if not _total(best, settings.misfit_widening**2).interval[0] > 0.0 or traversals == 0:
         answers = []
     white = kept.errors / np.sqrt(kept.variances)
     return Location(
