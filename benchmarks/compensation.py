@@ -208,6 +208,10 @@ def print_crossings(path: Path, plants: int, seed: int) -> None:
             )
 
 
+def rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
 def print_moves(path: Path, plants: int, seed: int, weights: str) -> None:
     """Print impact and tracking error of a smooth move, and the motion at rest, beside the plain LQR's."""
     print(f"weights of the LQR: {weights}")
@@ -232,7 +236,7 @@ def print_moves(path: Path, plants: int, seed: int, weights: str) -> None:
                 ]
                 moves = slice(500 * SUBSTEPS, 4000 * SUBSTEPS)
                 largest = [Run(run.states[moves], run.ratio).impacts().max() for run in both]
-                errors = [np.std(run.states[::SUBSTEPS, 2][500:4000] - reference[0][500:4000]) for run in both]
+                errors = [rms(run.states[::SUBSTEPS, 2][500:4000] - reference[0][500:4000]) for run in both]
                 ratios.append((largest[0] / max(largest[1], 1e-9), errors[0] / errors[1]))
                 rests.append([np.ptp(run.states[-2000 * SUBSTEPS :, 2]) / COUNT for run in both])
             impact, error = np.median(ratios, axis=0)

@@ -1,20 +1,26 @@
 """The compensator: it crosses the gap in little time, lands softly, and holds on the flank that the load needs.
 
-What the load needs is the torque of the LQR for a motor that follows the load rigidly; its sign is the wanted
-flank. While the teeth touch there, the LQR works on the motor's angle less the half-gap (a switched linear
-controller: Nordin and Gutman, Automatica 38(10), 2002). When the wanted flank changes, a traversal is planned
-(:mod:`gap_traversal`) and followed by a feedback of way, speed and torque. It ends where the smallest half-gap
-that the estimate allows would end; behind that the way goes on at the speed of impact until the teeth touch, so
-that a wider gap is crossed too.
+**Which flank.** In the gap the load moves by itself. So the wanted flank follows from where the load, left alone for
+as long as a crossing takes and half as long again, would be beside the reference: ahead of it, it must be braked;
+behind, driven. The load torque that acts anyway is part of that motion: it needs no crossing, and an elastic
+reference trajectory brakes with it as far as it can. The sign of the LQR's torque is a worse guide: it brakes
+long before the end of a move, against friction that would have stopped the load, and so crosses to and fro at rest.
+Within ``DEAD_BAND`` of a reference that stands nothing is changed.
 
-A crossing takes time, in which the load moves by itself. So the flank changes only if the LQR will still want
-it at the landing. And while it holds, the compensator never pulls: where the teeth part and the LQR asks for a
-torque away from the flank, the flank is approached anew. Both keep the loop from crossing to and fro at rest.
+**The crossing** is planned (:mod:`gap_traversal`) and followed by a feedback of way, speed and torque. It ends where
+the smallest half-gap that the estimate allows would end; behind that the way goes on at the speed of impact until
+the teeth touch, so that a wider gap is crossed too. While it still speeds up it may turn back.
+
+**On the flank** the LQR works on the motor's angle less the half-gap (a switched linear controller: Nordin and
+Gutman, Automatica 38(10), 2002), about the motion that the reference asks for: with the twist that accelerates the
+load, and the torque for it and for the motor, ahead of the drive's lag (inversion of a flat system: Fliess, Levine,
+Martin and Rouchon, International Journal of Control 61(6), 1995). It never pulls: where the teeth part and it asks
+for a torque away from the flank, the flank is approached anew.
 
 Without a half-gap that is known, the request is that of the plain LQR.
 """
 
-from math import fabs
+from math import exp, fabs, log, sqrt
 from typing import NamedTuple
 
 from .gap_traversal import Traversal, plan, point_at, request_at
@@ -24,22 +30,25 @@ HOLD, CROSS = 0, 1
 ANY_TORQUE = 1e300  # limit of a request that is not to be limited [N.m]
 DEVIATIONS = 2.0  # of the half-gap, by which its interval reaches down and up
 LEAST_SHARE = 0.5  # of the half-gap, that the lower end of its interval must reach for a plan
-SMOOTHING = 0.02  # time constant [s] of the part of the wanted torque that has the noise of estimated speeds
+SMOOTHING = 0.02  # time constant [s] of the lead, which has the noise of the estimated speed
+AIM = 0.95  # share of the impact speed for which a plan is made: landings scatter by a tenth
 SOFTEST = 0.2  # share of the impact speed with which a flank is met at rest: the impact itself moves the load
-PER_CROSSING = 5.0  # poles of the feedback times the duration of a plan
-PER_SAMPLE = 0.07  # largest poles of the feedback times the sample time
+HORIZON = 1.5  # of a crossing, over which the load is foreseen: it is to be braked behind the landing, too
+DEAD_BAND = 2.0  # margins, within which the load is where it should be
+REFERENCE_LAG = 0.25  # of a crossing: time constant of the reference's acceleration; steps of its speed last so long
+PER_CROSSING = 5.0  # poles of the feedback times the duration of a crossing
+PER_SAMPLE = 0.085  # largest poles of the feedback times the sample time
+TURNING = 2  # samples before the end of a plan's first part, from which it is too late to turn back
 
 
 class Tuning(NamedTuple):
     """What the compensator is told: impact speed [rad/s], share of the torque limit for plans, torque limit [N.m],
-    wanted torque [N.m] against the flank from which it may change, way [rad] before the flank at which a plan ends
-    (noise of the encoders), sample time [s].
+    way [rad] before the flank at which a plan ends (noise of the encoders), sample time [s].
     """
 
     impact_speed: float
     torque_share: float
     u_max: float
-    flank_torque: float
     margin: float
     sample_time: float
 
@@ -63,55 +72,83 @@ class Gap(NamedTuple):
     deviation: float
 
 
+class WantedMotion(NamedTuple):
+    """What the load shall do: angle [rad], speed, acceleration and jerk."""
+
+    angle: float
+    speed: float
+    acceleration: float
+    jerk: float
+
+
 class CrossingState(NamedTuple):
-    """Phase, wanted flank, samples since the plan began, smoothed part of the wanted torque [N.m], plan."""
+    """Phase, wanted flank, samples since the plan began, smoothed lead of the load over the reference [rad], speed of
+    the reference behind one lag and behind two [rad/s], plan.
+    """
 
     phase: int
     flank: int
     samples: int
-    smoothed: float
+    lead: float
+    speed_once: float
+    speed_twice: float
     traversal: Traversal
 
 
-def start_state(x: Estimate, i: float) -> CrossingState:
+def start_state(x: Estimate, reference_speed: float, i: float) -> CrossingState:
     """Return the state at the first sample: hold on the side on which the twist is."""
     flank = 1 if x[0] / i >= x[2] else -1
-    return CrossingState(HOLD, flank, 0, 0.0, Traversal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    none = Traversal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return CrossingState(HOLD, flank, 0, 0.0, reference_speed, reference_speed, none)
 
 
-def rigid_torque(reference: float, reference_speed: float, x: Estimate, gains: Gains, d: Train) -> tuple[float, float]:
-    """Return the torque [N.m] that the LQR asks of a motor that follows the load rigidly, and the part of the angles.
+def derive_reference(angle: float, speed: float, once: float, twice: float, lag: float) -> WantedMotion:
+    """Return the reference with acceleration and jerk from its speed behind one ``lag`` [s] and behind two.
 
-    The other part, of speed and load torque, has their noise.
+    Both are late by two lags; for the acceleration the jerk makes up for that.
     """
-    theta_l, omega_l, T_l = x[2], x[3], x[4]
-    rigid = (d.i * (theta_l + T_l * d.compliance), d.i * omega_l, theta_l, omega_l, T_l, T_l / d.i)
-    whole = control(reference, reference_speed, rigid, gains, d.i, d.compliance, ANY_TORQUE)
-    return (whole, (gains[0] * d.i + gains[2]) * (reference - theta_l))
+    jerk = (speed - 2.0 * once + twice) / (lag * lag)
+    return WantedMotion(angle, speed, (once - twice) / lag + 2.0 * lag * jerk, jerk)
 
 
-def after_crossing(x: Estimate, duration: float, d: Train) -> Estimate:
-    """Return the estimate with the load as it is after ``duration`` [s] on its own."""
+def lead_after(time: float, r: WantedMotion, x: Estimate, d: Train) -> float:
+    """Return how far [rad] the load, left alone, is ahead of the reference after ``time`` [s]."""
     slowing = (d.b_l * x[3] + x[4]) / d.J_l
-    theta_l = x[2] + duration * x[3] - 0.5 * duration * duration * slowing
-    return (x[0], x[1], theta_l, x[3] - duration * slowing, x[4], x[5])
+    alone = x[2] + time * (x[3] - 0.5 * time * slowing)
+    return alone - r.angle - time * (r.speed + time * (0.5 * r.acceleration + time * r.jerk / 6.0))
 
 
-def crossing_time(alpha: float, end: float, speed: float, d: Train, s: Tuning) -> float:
-    """Return how long [s] a crossing from rest to the way ``end`` [rad] and on to the flank takes; 0 without plans."""
-    if s.torque_share == 0.0:
-        return 0.0
-    ahead = plan((-alpha, 0.0, 0.0), end, speed, s.torque_share * s.u_max, d.tau, d.J_m * d.i)
-    return ahead.first + ahead.second + ahead.third + (alpha - end) / speed
+def crossing_time(alpha: float, d: Train, s: Tuning) -> float:
+    """Return about how long [s] a crossing from rest takes, without the creep behind its plan.
+
+    A quick drive takes ``2 sqrt(2 alpha M/U)``, one whose lag is all takes ``(64 alpha tau M/U)^(1/3)``; the cube of
+    the time is taken to be the sum of both cubes.
+    """
+    level = s.u_max * s.torque_share if s.torque_share > 0.0 else s.u_max
+    square = 8.0 * alpha * d.J_m * d.i / level
+    return exp(log(square * (8.0 * d.tau + sqrt(square))) / 3.0)
+
+
+def hold(r: WantedMotion, x: Estimate, gains: Gains, d: Train, s: Tuning) -> float:
+    """Return the request [N.m] of the LQR about the motion that the reference asks for.
+
+    What the load needs to move so stands beside its load torque; what the motor needs is taken off its torque.
+    """
+    load = x[4] + d.J_l * r.acceleration + d.b_l * r.speed
+    motor = d.i * (d.J_m * r.acceleration + d.b_m * r.speed)
+    change = d.i * (d.J_m * r.jerk + d.b_m * r.acceleration) + (d.J_l * r.jerk + d.b_l * r.acceleration) / d.i
+    about = (x[0], x[1], x[2], x[3], load, x[5] - motor)
+    u = control(r.angle, r.speed, about, gains, d.i, d.compliance, ANY_TORQUE) + motor + d.tau * change
+    return max(-s.u_max, min(s.u_max, u))
 
 
 def impact_speed(reference: float, reference_speed: float, x: Estimate, alpha: float, s: Tuning) -> float:
     """Return the speed [rad/s] at which to land: less where little is to move, as the impact moves the load."""
     need = abs(x[2] - reference) / alpha + abs(reference_speed) / s.impact_speed
-    return s.impact_speed * max(SOFTEST, min(1.0, need))
+    return AIM * s.impact_speed * max(SOFTEST, min(1.0, need))
 
 
-def follow(state: CrossingState, x: Estimate, d: Train, s: Tuning) -> float:
+def follow(state: CrossingState, duration: float, x: Estimate, d: Train, s: Tuning) -> float:
     """Return the request [N.m] along the plan of a crossing.
 
     With ``e`` the error of the way the gains make ``e''' + 2.4 p e'' + 2.4 p^2 e' + p^3 e = 0`` of the chain of way,
@@ -123,10 +160,7 @@ def follow(state: CrossingState, x: Estimate, d: Train, s: Tuning) -> float:
     extra = side * (M * (d.b_l * x[3] + x[4]) / d.J_l - d.b_m * x[1])
     time = state.samples * s.sample_time
     aim = point_at(t, time, d.tau, M)
-    duration = t.first + t.second + t.third
-    p = PER_SAMPLE / s.sample_time
-    if duration * p > PER_CROSSING:
-        p = PER_CROSSING / duration
+    p = min(PER_SAMPLE / s.sample_time, PER_CROSSING / duration)
     u = request_at(t, time, time + s.sample_time) - extra
     u += d.tau * M * p * p * (p * (aim[0] - side * (x[0] / d.i - x[2])) + 2.4 * (aim[1] - side * (x[1] / d.i - x[3])))
     u += (2.4 * p * d.tau - 1.0) * (aim[2] - side * x[5] - extra)
@@ -159,34 +193,37 @@ def act(
         reference_speed: [rad/s].
         x: estimate ``(theta_m, omega_m, theta_l, omega_l, T_l, T_m)``, whose twist is zero in mid-gap.
     """
-    phase, flank, samples, smoothed, traversal = state
-    whole, of_angles = rigid_torque(reference, reference_speed, x, gains, d)
-    smoothed += (whole - of_angles - smoothed) * s.sample_time / (s.sample_time + SMOOTHING)
-    wanted = of_angles + smoothed
-    lowest = gap.alpha - DEVIATIONS * gap.deviation
-    if lowest <= LEAST_SHARE * gap.alpha:
+    phase, flank, samples, lead, once, twice, traversal = state
+    lowest = gap.alpha - DEVIATIONS * max(gap.deviation, 0.0)
+    if gap.alpha <= 0.0 or lowest <= LEAST_SHARE * gap.alpha:
         plain = control(reference, reference_speed, x, gains, d.i, d.compliance, s.u_max)
-        return (CrossingState(HOLD, flank, 0, smoothed, traversal), plain)
+        return (CrossingState(HOLD, flank, 0, 0.0, reference_speed, reference_speed, traversal), plain)
+    crossing = crossing_time(gap.alpha, d, s)
+    lag = REFERENCE_LAG * crossing
+    share = s.sample_time / (s.sample_time + lag)
+    once += share * (reference_speed - once)
+    twice += share * (once - twice)
     end = lowest - s.margin
     speed = impact_speed(reference, reference_speed, x, gap.alpha, s)
-    settled = reference_speed == 0.0 and fabs(x[2] - reference) <= s.margin
-    if phase == HOLD and not settled and wanted * flank < -s.flank_torque:
-        h = crossing_time(gap.alpha, end, speed, d, s)
-        coming, _ = rigid_torque(reference + h * reference_speed, reference_speed, after_crossing(x, h, d), gains, d)
-        if coming * flank < -s.flank_torque:
-            phase, flank, samples = CROSS, -flank, 0
+    duration = crossing + (gap.alpha - end) / s.impact_speed
+    r = derive_reference(reference, reference_speed, once, twice, lag)
+    ahead = lead_after(HORIZON * duration + SMOOTHING, r, x, d)
+    lead += (ahead - lead) * s.sample_time / (s.sample_time + SMOOTHING)
+    band = DEAD_BAND * s.margin
+    there = fabs(reference_speed) * crossing <= s.margin and fabs(x[2] - reference) <= band
+    in_time = phase == HOLD or (samples + TURNING) * s.sample_time <= traversal.first
+    if in_time and not there and lead * flank > band:
+        phase, flank, samples = CROSS, -flank, 0
     shifted = (x[0] - flank * d.i * gap.alpha, x[1], x[2], x[3], x[4], x[5])
-    held = control(reference, reference_speed, shifted, gains, d.i, d.compliance, s.u_max)
+    held = hold(r, shifted, gains, d, s)
     way = flank * (x[0] / d.i - x[2])
-    if way > gap.alpha or s.torque_share == 0.0:
-        return (CrossingState(HOLD, flank, 0, smoothed, traversal), held)
-    if phase == HOLD:
-        if held * flank >= 0.0:
-            return (CrossingState(HOLD, flank, 0, smoothed, traversal), held)
-        samples = 0
-    if samples == 0 or way < -gap.alpha - s.margin:
+    on_flank = way > gap.alpha or s.torque_share == 0.0
+    if on_flank or (phase == HOLD and held * flank >= 0.0):
+        return (CrossingState(HOLD, flank, 0, lead, once, twice, traversal), held)
+    if phase == HOLD or samples == 0 or way < -gap.alpha - s.margin:
         # Still on the other flank: the way begins where that is left.
         samples = 0
         traversal = plan_crossing(flank, x, end, speed, d, s)
-    u = follow(CrossingState(CROSS, flank, samples, smoothed, traversal), x, d, s)
-    return (CrossingState(CROSS, flank, samples + 1, smoothed, traversal), u)
+    state = CrossingState(CROSS, flank, samples, lead, once, twice, traversal)
+    u = follow(state, duration, x, d, s)
+    return (CrossingState(CROSS, flank, samples + 1, lead, once, twice, traversal), u)

@@ -15,7 +15,7 @@ REFERENCE, REFERENCE_SPEED, FIRST_ESTIMATE = range(3)
 ALPHA, DEVIATION, OFFSET, U, FLANK, CROSSING, FIRST_GAIN = range(FIRST_ESTIMATE + 6, FIRST_ESTIMATE + 13)
 FIRST_TRAIN = FIRST_GAIN + 5
 FIRST_TUNING = FIRST_TRAIN + 7
-SAMPLE_TIME = FIRST_TUNING + 5
+SAMPLE_TIME = FIRST_TUNING + 4
 
 _INPUTS = (
     *INPUTS,
@@ -41,7 +41,6 @@ _TUNING = (
     ("impact_speed", "rad/s", 0.1, "Speed of the twist at which to land", 1e-6, 1e6),
     ("torque_share", "1", 0.85, "Share of the torque limit that a plan uses; 0: no plans, a shifted LQR", 0.0, 1.0),
     ("u_max", "N.m", 1e4, "Torque limit", 1e-9, 1e12),
-    ("flank_torque", "N.m", 2.0, "Wanted torque against a flank from which it is left", 0.0, 1e12),
     ("margin", "rad", 3e-4, "Way before the flank at which a plan ends: noise of the encoders", 0.0, 1e6),
 )
 _INPUT_NAMES = tuple(row[0] for row in _INPUTS)
@@ -73,12 +72,16 @@ class BacklashCompensator(SampledSlave):
     _stage: int
     _flank: int
     _age: int
-    _smoothed: float
+    _lead: float
+    _once: float
+    _twice: float
     _plan: Traversal
     _next_stage: int
     _next_flank: int
     _next_age: int
-    _next_smoothed: float
+    _next_lead: float
+    _next_once: float
+    _next_twice: float
     _next_plan: Traversal
 
     def take_parameters(self) -> None:
@@ -89,11 +92,13 @@ class BacklashCompensator(SampledSlave):
 
     def begin(self) -> None:
         """Hold on the side on which the twist is."""
-        state = start_state(self._estimate(), self.real[FIRST_TRAIN + 4])
+        state = start_state(self._estimate(), self.real[REFERENCE_SPEED], self.real[FIRST_TRAIN + 4])
         self._stage = state.phase
         self._flank = state.flank
         self._age = state.samples
-        self._smoothed = state.smoothed
+        self._lead = state.lead
+        self._once = state.speed_once
+        self._twice = state.speed_twice
         self._plan = state.traversal
         self.correct()
 
@@ -102,23 +107,29 @@ class BacklashCompensator(SampledSlave):
         self._stage = self._next_stage
         self._flank = self._next_flank
         self._age = self._next_age
-        self._smoothed = self._next_smoothed
+        self._lead = self._next_lead
+        self._once = self._next_once
+        self._twice = self._next_twice
         self._plan = self._next_plan
 
     def correct(self) -> None:
         """Compute the torque request of this sample."""
         real = self.real
-        state = CrossingState(self._stage, self._flank, self._age, self._smoothed, self._plan)
+        state = CrossingState(
+            self._stage, self._flank, self._age, self._lead, self._once, self._twice, self._plan
+        )  # fmt: skip
         n = FIRST_TRAIN
         train = Train(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6])
         n = FIRST_TUNING
-        tuning = Tuning(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[SAMPLE_TIME])
+        tuning = Tuning(real[n], real[n + 1], real[n + 2], real[n + 3], real[SAMPLE_TIME])
         gap = Gap(real[ALPHA], real[DEVIATION])
         state, u = act(state, real[REFERENCE], real[REFERENCE_SPEED], self._estimate(), gap, self._gains, train, tuning)
         self._next_stage = state.phase
         self._next_flank = state.flank
         self._next_age = state.samples
-        self._next_smoothed = state.smoothed
+        self._next_lead = state.lead
+        self._next_once = state.speed_once
+        self._next_twice = state.speed_twice
         self._next_plan = state.traversal
         real[U] = u
         real[FLANK] = float(state.flank)

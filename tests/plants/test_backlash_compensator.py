@@ -3,14 +3,33 @@
 import numpy as np
 import pytest
 
-from pyfmu_sources.backlash_compensator import CROSS, HOLD, CrossingState, Gap, Train, Tuning, act, start_state
-from pyfmu_sources.gap_traversal import Traversal
+from pyfmu_sources.backlash_compensator import (
+    CROSS,
+    HOLD,
+    CrossingState,
+    Gap,
+    Train,
+    Tuning,
+    WantedMotion,
+    act,
+    crossing_time,
+    derive_reference,
+    hold,
+    lead_after,
+    start_state,
+)
+from pyfmu_sources.gap_traversal import Traversal, plan
 from pyfmu_sources.lqr import control
 
 GAINS = (-124.680427, 127.392214, 725.091101, 3.38145167, 1.72123183)
 TRAIN = Train(0.4, 5.6, 0.1, 1.0, 3.984, 1.0 / 3300.0, 5e-3)
-TUNING = Tuning(0.1, 0.85, 300.0, 2.0, 3e-4, 1e-3)
+TUNING = Tuning(0.1, 0.85, 300.0, 3e-4, 1e-3)
 NO_PLAN = Traversal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def standing(phase, flank, lead, samples=0, traversal=NO_PLAN):
+    """A state under a reference that stands still."""
+    return CrossingState(phase, flank, samples, lead, 0.0, 0.0, traversal)
 
 
 def draw_estimate(rng, way=None):
@@ -20,10 +39,10 @@ def draw_estimate(rng, way=None):
     return (3.984 * (theta_l + twist), rng.normal(), theta_l, 0.2 * rng.normal(), rng.normal(), rng.normal())
 
 
-@pytest.mark.parametrize("gap", [Gap(0.0, 0.0), Gap(0.02, 0.006), Gap(0.02, 1.0)])
+@pytest.mark.parametrize("gap", [Gap(0.0, 0.0), Gap(0.02, 0.006), Gap(0.02, 1.0), Gap(-0.02, -1.0)])
 def test_without_a_known_gap_it_is_the_plain_lqr(gap):
     rng = np.random.default_rng(1)
-    state = CrossingState(HOLD, 1, 0, 0.0, NO_PLAN)
+    state = standing(HOLD, 1, 0.0)
     for _ in range(200):
         x, reference = draw_estimate(rng), rng.uniform(-1.0, 1.0)
         state, u = act(state, reference, 0.0, x, gap, GAINS, TRAIN, TUNING)
@@ -36,7 +55,7 @@ def test_it_holds_with_the_lqr_of_the_motor_less_the_half_gap():
         x = (3.984 * (0.3 + 0.021 * flank), 0.0, 0.3, 0.0, rng.normal(), rng.normal())
         reference = 0.3 + 0.1 * flank
         shifted = (x[0] - flank * 3.984 * 0.02, *x[1:])
-        state, u = act(start_state(x, 3.984), reference, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        state, u = act(start_state(x, 0.0, 3.984), reference, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
         assert (state.phase, state.flank) == (HOLD, flank)
         assert u == control(reference, 0.0, shifted, GAINS, 3.984, 1.0 / 3300.0, 300.0)
 
@@ -48,31 +67,74 @@ def test_it_pushes_or_plans_where_the_teeth_have_parted():
     for _ in range(300):
         x, flank = draw_estimate(rng, way=rng.uniform(-0.015, 0.015)), rng.choice([-1, 1])
         gap = Gap(0.02, 1e-4)
-        state, u = act(
-            CrossingState(HOLD, int(flank), 0, 0.0, NO_PLAN), x[2] + 0.1 * flank, 0.0, x, gap, GAINS, TRAIN, TUNING
-        )
+        state, u = act(standing(HOLD, int(flank), 0.0), x[2] + 0.1 * flank, 0.0, x, gap, GAINS, TRAIN, TUNING)
         assert state.phase == CROSS or u * state.flank >= 0.0
         planned += state.phase == CROSS
     assert 20 < planned < 280
 
 
-def test_a_crossing_begins_only_if_the_torque_is_still_wanted_at_its_end():
-    """The load falls back towards the reference by itself: what is wanted now is not wanted after the crossing."""
+def test_a_crossing_begins_only_if_the_load_would_be_ahead_when_left_alone():
     for load_torque, phase in ((0.0, CROSS), (2000.0, HOLD)):
         x = (3.984 * 0.021, 0.0, 0.0, 0.0, load_torque, load_torque / 3.984)
-        state, _ = act(CrossingState(HOLD, 1, 0, -400.0, NO_PLAN), -0.05, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        state, _ = act(standing(HOLD, 1, 0.05), -0.05, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
         assert state.phase == phase
+
+
+def test_a_crossing_turns_back_only_while_it_speeds_up():
+    going = plan((-0.02, 0.0, 0.0), 0.019, 0.1, 255.0, TRAIN.tau, TRAIN.J_m * TRAIN.i)
+    for samples, flank in ((5, -1), (round(going.first / 1e-3) - 1, 1), (25, 1)):
+        x = (3.984 * (0.5 - 0.01), 0.0, 0.5, 0.0, 0.0, 0.0)
+        state = standing(CROSS, 1, 0.5, samples, going)
+        state, _ = act(state, 0.0, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        assert (state.phase, state.flank) == (CROSS, flank)
+
+
+def test_on_the_motion_that_is_asked_for_the_request_is_what_this_motion_needs():
+    """Shaft wound by what the load needs, motor torque for both, and its change through the drive's lag."""
+    r = WantedMotion(0.4, 0.7, 3.0, -20.0)
+    shaft = 5.0 + 5.6 * 3.0 + 1.0 * 0.7
+    torque = 3.984 * (0.4 * 3.0 + 0.1 * 0.7) + shaft / 3.984
+    change = 3.984 * (0.4 * -20.0 + 0.1 * 3.0) + (5.6 * -20.0 + 1.0 * 3.0) / 3.984
+    for tau in (5e-3, 1.0):
+        x = (3.984 * (0.4 + shaft / 3300.0), 3.984 * 0.7, 0.4, 0.7, 5.0, torque)
+        assert hold(r, x, GAINS, TRAIN._replace(tau=tau), TUNING) == pytest.approx(torque + tau * change)
+
+
+def test_acceleration_and_jerk_follow_from_the_speed():
+    once = twice = 0.0
+    lag, step = 0.01, 1e-4
+    for n in range(5000):
+        speed = 2.0 * n * step + 1.5 * (n * step) ** 2
+        once += step / (step + lag) * (speed - once)
+        twice += step / (step + lag) * (once - twice)
+    found = derive_reference(0.0, speed, once, twice, lag)
+    assert found.jerk == pytest.approx(3.0, rel=0.01)
+    assert found.acceleration == pytest.approx(2.0 + 3.0 * n * step, rel=0.01)
+
+
+def test_the_lead_is_that_of_a_load_on_its_own():
+    r = WantedMotion(0.1, 0.2, 0.3, 0.4)
+    x = (0.0, 0.0, 0.15, 0.5, 2.8, 0.0)
+    alone = 0.15 + 0.5 * 0.2 - 0.5 * 0.2**2 * (1.0 * 0.5 + 2.8) / 5.6
+    asked = 0.1 + 0.2 * 0.2 + 0.3 * 0.2**2 / 2.0 + 0.4 * 0.2**3 / 6.0
+    assert lead_after(0.2, r, x, TRAIN) == pytest.approx(alone - asked)
+
+
+@pytest.mark.parametrize("tau", [1e-3, 5e-3, 0.05, 0.3, 1.0])
+@pytest.mark.parametrize("alpha", [2e-3, 0.02, 0.1])
+def test_the_rough_time_of_a_crossing_is_near_that_of_its_plan(alpha, tau):
+    train = TRAIN._replace(tau=tau)
+    t = plan((-alpha, 0.0, 0.0), alpha, 1e-3, 0.85 * 300.0, tau, 0.4 * 3.984)
+    assert crossing_time(alpha, train, TUNING) == pytest.approx(t.first + t.second + t.third, rel=0.12)
 
 
 def test_the_end_of_a_plan_leaves_two_deviations_to_the_flank():
     x = (-3.984 * 0.0205, 0.0, 0.0, 0.0, 0.0, 0.0)
     for deviation in (0.0, 1e-4, 1e-3):
-        state, _ = act(
-            CrossingState(HOLD, -1, 0, 50.0, NO_PLAN), 1.0, 0.0, x, Gap(0.02, deviation), GAINS, TRAIN, TUNING
-        )
+        state, _ = act(standing(HOLD, -1, -1.0), 1.0, 0.0, x, Gap(0.02, deviation), GAINS, TRAIN, TUNING)
         assert (state.phase, state.flank) == (CROSS, 1)
         assert state.traversal.end_way == pytest.approx(0.02 - 2.0 * deviation - 3e-4)
-        assert state.traversal.end_speed == 0.1
+        assert state.traversal.end_speed == pytest.approx(0.095)
 
 
 def test_without_torque_for_plans_it_is_the_shifted_lqr_on_the_wanted_flank():
@@ -81,9 +143,7 @@ def test_without_torque_for_plans_it_is_the_shifted_lqr_on_the_wanted_flank():
     flanks = set()
     for _ in range(200):
         x, reference = draw_estimate(rng), rng.uniform(-1.0, 1.0)
-        state, u = act(
-            CrossingState(HOLD, 1, 0, 0.0, NO_PLAN), reference, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, tuning
-        )
+        state, u = act(standing(HOLD, 1, 0.0), reference, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, tuning)
         shifted = (x[0] - state.flank * 3.984 * 0.02, *x[1:])
         assert u == control(reference, 0.0, shifted, GAINS, 3.984, 1.0 / 3300.0, 300.0)
         flanks.add(state.flank)
@@ -94,6 +154,6 @@ def test_at_the_reference_it_stays_on_its_flank_while_at_rest():
     """A landing shoves the load: what its speed asks for is no reason to cross."""
     for error, speed, phase in ((2e-4, 0.0, HOLD), (2e-3, 0.0, CROSS), (2e-4, 0.1, CROSS)):
         x = (3.984 * 0.0205, 0.0, 0.0, 0.05, 0.0, 0.0)
-        state = CrossingState(HOLD, 1, 0, -30.0, NO_PLAN)
+        state = standing(HOLD, 1, 0.01)
         state, _ = act(state, -error, -speed, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
         assert state.phase == phase
