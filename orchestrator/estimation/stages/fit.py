@@ -73,12 +73,19 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
         free = _free(likelihood, both, *singles)
     if settings.shared <= _share(free) <= 1.0 - settings.shared:
         both = _better(both, free)
-        for n, share in enumerate((0.0, 1.0)):  # an excluded single gap must have had the same chances
-            if 0.5 * (singles[n].point.objective - free.point.objective) < settings.hopeless:
-                theta = with_noise(likelihood, free.point.theta, FINE)
-                start = _try_shares(free.likelihood, theta, [share])[0]
-                singles[n] = _better(singles[n], _finish(free.likelihood, start, _all_but(likelihood, SHARE)))
+        # An excluded single gap must have had the same chances.
+        singles = [
+            _begin_anew(one, free, share, settings.hopeless) for one, share in zip(singles, (0.0, 1.0), strict=True)
+        ]
     return StageFits(singles[0], singles[1], both, free)
+
+
+def _begin_anew(single: StagesFit, free: StagesFit, share: float, hopeless: float) -> StagesFit:
+    """Return the fit of a single gap, begun anew from the free fit unless it is hopelessly far behind that."""
+    if 0.5 * (single.point.objective - free.point.objective) >= hopeless:
+        return single
+    start = _try_shares(free.likelihood, with_noise(free.likelihood, free.point.theta, FINE), [share])[0]
+    return _better(single, _finish(free.likelihood, start, _all_but(free.likelihood, SHARE)))
 
 
 def _better(*fits: StagesFit) -> StagesFit:
