@@ -128,7 +128,7 @@ def design_regulator(
         within(name, value, *RANGES[name])
     model = read_model(None) if model is None else model
     if model.fmu != "Drivetrain":
-        raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain to have a gap, but is {model.fmu}")
+        raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain for a regulator, but is {model.fmu}")
     names = ("J_m", "J_l", "k", "c", "b_m", "b_l", "i", "tau")
     values = DrivetrainValues(**{name: model.parameters[name].value for name in names})
     given: dict[str, Any] = {"torque_weight": torque_weight, "sample_time": sample_time, "delay": delay}

@@ -12,6 +12,7 @@ from orchestrator.commands._lines import fold
 from orchestrator.plain_text import plain_text
 
 LARGEST_WHOLE_NUMBER = 10**18
+_NUMBERS = re.compile(r"-\.?\d")  # begins a value and no option: argparse's own knows neither 1e-3 nor lists
 # What argparse says of an argument, and how that is said here.
 _REWORDED = (
     (
@@ -28,6 +29,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
+        self._negative_number_matcher = _NUMBERS  # argparse has no public way
         readers: tuple[tuple[type, Callable[[str], object]], ...] = ((int, _whole), (float, number), (Path, _path))
         for kind, reader in readers:
             self.register("type", kind, reader)

@@ -186,9 +186,8 @@ def _require_stable(matrices: tuple[Array, Array, Array], parts: int) -> None:
     if largest >= 1.0:
         late = len(sample) - 7
         raise ScenarioError(
-            f"`gains` must make a loop that is stable without a gap, but with a `delay` of {late} it grows "
-            f"{largest:.4g} times in a sample",
-            "gains",
+            f"the loop must be stable without a gap, but with a `delay` of {late} it grows {largest:.4g} times in a "
+            "sample: give a shorter `delay` or other gains",
             "delay",
         )
 

@@ -40,6 +40,7 @@ from orchestrator.shared.numbers import exact_text
 ENCODERS = ("theta_m", "theta_l")
 MAXIMUM_BYTES = 16 * 2**20
 LARGEST_WHOLE_NUMBER = 10**18
+_SHAFTS = ("k", "k_1", "k_2")  # stiffnesses, without which nothing turns the load
 DEFAULT = "Drivetrain"
 
 
@@ -261,6 +262,8 @@ def _merge(parameter: ModelParameter, entry: Entry, key: str, content: _Content)
     if not math.isfinite(value) or not parameter.minimum <= value <= parameter.maximum:
         bounds = f"[{parameter.minimum:g}, {parameter.maximum:g}] {parameter.unit}"
         raise content.wrong(f"{key}.value", f"be in {bounds}, but is {value:g}")
+    if value == 0.0 and parameter.name in _SHAFTS:
+        raise content.wrong(f"{key}.value", "be above 0 for the motor to drive the load, but is 0")
     if "uncertainty" in entry and "relative_uncertainty" in entry:
         raise content.wrong(key, "have `uncertainty` or `relative_uncertainty`, but has both")
     share = parameter.uncertainty / abs(parameter.value) if parameter.value != 0.0 else 0.0

@@ -33,7 +33,7 @@ def check_plausible(record: Record, model: Model) -> None:
     parameters = _of_one_stage({name: entry.value for name, entry in model.parameters.items()})
     _check_rate(record, _frequency(parameters))
     if record.theta_l is not None:
-        _check_slope(record, record.theta_l, parameters["i"])
+        _check_slope(record, record.theta_l, parameters["i"], "i" if "i" in model.parameters else "i_1")
     _check_inertia(record, parameters)
 
 
@@ -65,8 +65,8 @@ def _check_rate(record: Record, frequency: float) -> None:
         )
 
 
-def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> None:
-    """Compare the slope of load over motor angle with 1/i."""
+def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float, name: str = "i") -> None:
+    """Compare the slope of load over motor angle with 1/i, where the parameter ``name`` would mend ``i``."""
     motor = record.theta_m - record.theta_m.mean()
     load = theta_l - theta_l.mean()
     if min(float(np.ptp(motor)) / ratio, float(np.ptp(load))) < LARGE_TRAVEL:
@@ -105,7 +105,7 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> 
     if abs(math.log(relative)) > 0.3:
         raise RecordError(
             f"{record.source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have "
-            f"{ratio / relative:.4g}: mend `[columns.theta_m] unit` or `[parameters.i] value` (`model`)"
+            f"{ratio / relative:.4g}: mend `[columns.theta_m] unit` or `[parameters.{name}] value` (`model`)"
         )
 
 

@@ -25,6 +25,8 @@ from orchestrator.cli import COMMANDS, main
         (["estimate", "--method", "guess"], "`--method` must be one of maximum_likelihood, ekf"),
         (["diagnose"], "`DATA` must be given"),
         (["report", "--command", "x"], "`DIR` must be given"),
+        (["regulator", "--torque-weight", "-1e-3", "--seed"], "unrecognized arguments: --seed"),
+        (["regulator", "--gains", "--delay", "1"], "`--gains` must be followed by a value, but is not"),
         (["swep"], "`COMMAND` must be one of build, check"),
         ([], "`COMMAND` must be given"),
     ],

@@ -1,6 +1,7 @@
 """Records: what is read, and what is refused with row and column named."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.errors import RecordError
-from orchestrator.records.model_file import default_model
+from orchestrator.records.model_file import default_model, read_model
 from orchestrator.records.plausibility import _check_slope, check_plausible
 from orchestrator.records.record import (
     Column,
@@ -185,6 +186,20 @@ def test_a_load_that_swings_a_little_farther_than_its_motor_is_the_load(ratio: f
     _check_slope(record, record.theta_l, ratio)
     with pytest.raises(RecordError, match=r"exchanged|gear ratio"):
         _check_slope(record, record.theta_l, 1.7 * ratio)
+
+
+def test_a_wrong_ratio_of_a_train_is_mended_by_a_parameter_that_it_has(tmp_path: Path) -> None:
+    (tmp_path / "train.toml").write_text("fmu = 'TwoStageTrain'\n[parameters.i_1]\nvalue = 2.0\n")
+    train = read_model(tmp_path / "train.toml")
+    time = np.arange(0.0, 4.0, 0.002)
+    motor = 20.0 * np.sin(2.0 * time)
+    ratio = 1.6 * 2.0 * train.parameters["i_2"].value
+    record = record_from_columns({"time": time, "u": np.cos(time), "theta_m": motor, "theta_l": motor / ratio}, "r")
+    with pytest.raises(RecordError) as refusal:
+        check_plausible(record, train)
+    named = re.search(r"`\[parameters\.(\w+)\] value`", str(refusal.value))
+    assert named is not None
+    assert named[1] in train.parameters
 
 
 @pytest.mark.parametrize("excitation", ["multisine", "levels", "closed_loop"])

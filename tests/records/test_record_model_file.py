@@ -60,6 +60,11 @@ def test_a_model_file_is_read(tmp_path: Path) -> None:
         ("[parameters.J_q]\nvalue = 1", "`parameters.J_q` in {} must be a parameter of Drivetrain, but no such name"),
         ("[parameters.J_m]\nvalue = nan", "`parameters.J_m.value` in {} must be in [1e-09, 1e+12] kg.m2, but is nan"),
         ("[parameters.J_m]\nvalue = -1", "`parameters.J_m.value` in {} must be in"),
+        ("[parameters.k]\nvalue = 0", "`parameters.k.value` in {} must be above 0 for the motor to drive the load"),
+        (
+            "fmu = 'TwoStageTrain'\n[parameters.k_2]\nvalue = 0.0",
+            "`parameters.k_2.value` in {} must be above 0 for the motor",
+        ),
         ("[parameters.J_m]\nvalue = '1'", "`parameters.J_m.value` in {} must be a number, but is text"),
         ("[parameters.J_m]\nvalue = true", "`parameters.J_m.value` in {} must be a number, but is true or false"),
         ("[parameters.J_m]\nvalue = 1979-05-27", "must be a number, but is a date or time"),
