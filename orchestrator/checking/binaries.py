@@ -20,7 +20,7 @@ _SUFFIXES = {"ELF": ".so", "PE": ".dll", "Mach-O": ".dylib"}
 
 
 @dataclass(frozen=True)
-class Platform:
+class BinaryPlatform:
     """What the libraries in a folder of binaries are for; an empty machine is any."""
 
     format: str
@@ -36,13 +36,13 @@ class Platform:
 _SYSTEMS = {"windows": "PE", "linux": "ELF", "darwin": "Mach-O"}
 _MACHINES = {"x86": (32, "x86"), "x86_64": (64, "x86"), "aarch32": (32, "arm"), "aarch64": (64, "arm")}
 _TUPLES = {
-    f"{arch}-{system}": Platform(form, *machine)
+    f"{arch}-{system}": BinaryPlatform(form, *machine)
     for arch, machine in _MACHINES.items()
     for system, form in _SYSTEMS.items()
 }
 _SHORT = {"win": "PE", "linux": "ELF", "darwin": "Mach-O"}
-PLATFORMS: dict[Version, dict[str, Platform]] = {
-    "2.0": {f"{system}{bits}": Platform(form, bits) for system, form in _SHORT.items() for bits in (32, 64)},
+PLATFORMS: dict[Version, dict[str, BinaryPlatform]] = {
+    "2.0": {f"{system}{bits}": BinaryPlatform(form, bits) for system, form in _SHORT.items() for bits in (32, 64)},
     "3.0": _TUPLES,
 }
 # FMI 2.0 has no name for these platforms and lets vendors add some; these are the names of FMI 3.0.
@@ -182,7 +182,7 @@ def _static_only(folder: str, names: set[str]) -> bool:
     )
 
 
-def misfit(library: LibraryHeader, path: str, wanted: Platform, native: bool) -> Finding | None:
+def misfit(library: LibraryHeader, path: str, wanted: BinaryPlatform, native: bool) -> Finding | None:
     """Why a library cannot be loaded on a platform, as far as its header tells; None when it can."""
     if library.format != wanted.format or not library.shared:
         found = f"a {library.format} file" if library.shared else "an executable, not a shared library"
