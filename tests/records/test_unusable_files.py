@@ -63,6 +63,14 @@ def _workbook(path: Path, _: Table) -> None:
         archive.writestr("xl/workbook.xml", "<workbook/>")
 
 
+def _archive_of(entry: str) -> Make:
+    def make(path: Path, _: Table) -> None:
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr(entry, "<root/>")
+
+    return make
+
+
 def _pickle(path: Path, _: Table) -> None:
     buffer = io.BytesIO()
     np.save(buffer, np.array([{"a": 1}], dtype=object), allow_pickle=True)
@@ -119,6 +127,8 @@ UNUSABLE: dict[str, tuple[Make, str, str, str]] = {
     "blank": (_bytes(b"\n\n  \n"), "", "file is empty", "must have a header and rows"),
     "gzip": (_bytes(b"\x1f\x8b\x08" + bytes(20)), "", "compressed (gzip)", "unpack it first"),
     "zip": (_zip, "", "zip archive", "unpack it first"),
+    "FMU": (_archive_of("modelDescription.xml"), "", "is an FMU", "inspect FILE.fmu --columns`"),
+    "SSP": (_archive_of("SystemStructure.ssd"), "", "is an SSP file", "inspect FILE.ssp --columns`"),
     "workbook": (_workbook, "", "Excel workbook", "save the sheet as CSV"),
     "old workbook": (_bytes(b"\xd0\xcf\x11\xe0" + bytes(20)), "", "Excel workbook", "save the sheet as CSV"),
     "tdms": (_bytes(b"TDSm" + bytes(40)), "", "TDMS", "export it as CSV"),

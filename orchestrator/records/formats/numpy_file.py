@@ -19,6 +19,9 @@ from orchestrator.records.formats.source import (
     in_a_line,
 )
 
+# Zip archives that are no records, by a file in them: what they are, and how their names end.
+_MODELS = {"modelDescription.xml": ("an FMU", "fmu"), "SystemStructure.ssd": ("an SSP file", "ssp")}
+
 
 class ArraySource(RecordSource):
     """Arrays in memory, by name."""
@@ -89,6 +92,12 @@ def _npz(path: Path) -> ArraySource:
             raise RecordError(
                 f"{path}: must be CSV, Parquet, MDF4, MAT or NumPy, but is an Excel workbook: save the sheet as CSV"
             )
+        for entry, (kind, ending) in _MODELS.items():
+            if entry in names:
+                raise RecordError(
+                    f"{path}: must be a record, as CSV, Parquet, MDF4, MAT or NumPy, but is {kind}: "
+                    f"`inspect FILE.{ending} --columns` shows its variables"
+                )
         if not names or not all(name.endswith(".npy") for name in names):
             raise RecordError(
                 f"{path}: must be CSV, Parquet, MDF4, MAT or NumPy, but is a zip archive: unpack it first"
