@@ -131,7 +131,12 @@ def design_regulator(
         raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain for a regulator, but is {model.fmu}")
     names = ("J_m", "J_l", "k", "c", "b_m", "b_l", "i", "tau")
     values = DrivetrainValues(**{name: model.parameters[name].value for name in names})
-    given: dict[str, Any] = {"torque_weight": torque_weight, "sample_time": sample_time, "delay": delay}
+    given: dict[str, Any] = {
+        "model": model.source,
+        "torque_weight": torque_weight,
+        "sample_time": sample_time,
+        "delay": delay,
+    }
     if gains is not None:
         if state_weights is not None:
             raise ScenarioError(

@@ -57,6 +57,7 @@ def test_the_model_file_and_the_delay_count(tmp_path, capsys):
         assert main([*words, "--delay", delay]) == 0
         document = json.loads((tmp_path / "out" / "regulator.json").read_text(encoding="utf-8"))
         results.append(document["results"]["forecast"])
+        assert document["arguments"]["model"] == "machine.toml"
     assert "comes to rest" in capsys.readouterr().out
     assert not results[0]["cycles"]
     assert results[0]["delay_margin"] - results[1]["delay_margin"] == pytest.approx(3e-3, rel=1e-2)
