@@ -47,7 +47,8 @@ def local_compiler() -> str | None:
     return next((path for name in names if name and (path := shutil.which(name))), None)
 
 
-def _command(target: Platform = HERE) -> tuple[str, ...] | None:
+def compiler_command(target: Platform = HERE) -> tuple[str, ...] | None:
+    """Return the words that call the C compiler for a platform, or ``None`` where there is none."""
     path = None if target.zig else local_compiler()
     if path is not None:
         return (path,)
@@ -109,7 +110,7 @@ def library_file(stem: str, target: Platform = HERE) -> str:
 
 def make_library(target: Path, text: str, headers: Sequence[Path] = (), made_for: Platform = HERE) -> None:
     """Compile a C text and put the library, with its hash beside it, in its place; without a compiler do nothing."""
-    compiler = _command(made_for)
+    compiler = compiler_command(made_for)
     if compiler is None:
         return
     # What does not run is left out, and with it the names of temporary folders.

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.building.translation import kernels
+from orchestrator.errors import KernelError
 from orchestrator.shared import machine_code
 
 pytestmark = pytest.mark.skipif(machine_code.local_compiler() is None, reason="there is no C compiler")
@@ -33,7 +35,7 @@ def test_a_damaged_library_is_made_anew(tmp_path: Path, monkeypatch: pytest.Monk
     function = ctypes.CDLL(str(path)).half
     function.argtypes, function.restype = [ctypes.c_double], ctypes.c_double
     assert function(3.0) == 1.5
-    monkeypatch.setattr(machine_code, "_command", lambda *target: None)
+    monkeypatch.setattr(machine_code, "compiler_command", lambda *target: None)
     assert made(source) == path  # nothing is compiled when all is well
     path.unlink()  # the loaded file itself must not shrink: the linker touches its pages once more at exit
     path.touch()
@@ -45,3 +47,13 @@ def test_no_room_means_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     source = tmp_path / "half.c"
     source.write_text("double half(double x) { return 0.5 * x; }\n")
     assert machine_code.compile_library.__wrapped__(source) is None
+
+
+def test_what_keeps_a_kernel_from_being_made_is_told_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "compile_text", lambda *words: None)
+    load = kernels.load_library.__wrapped__
+    with pytest.raises(KernelError, match="` makes no library of its C text in "):
+        load("orchestrator.plants.kernels.requests", True)
+    monkeypatch.setattr(kernels, "compiler_command", lambda: None)
+    with pytest.raises(KernelError, match="there is no C compiler: install one"):
+        load("orchestrator.plants.kernels.requests", True)

@@ -18,7 +18,7 @@ import numpy as np
 from orchestrator.building.translation.library import HEADERS, bind_module, library_stem, library_text
 from orchestrator.errors import KernelError
 from orchestrator.shared.cores import cache_once
-from orchestrator.shared.machine_code import INSTALLED, compile_text
+from orchestrator.shared.machine_code import INSTALLED, compile_text, compiler_command, machine_code_folder
 
 SPARE = 1024  # items behind an array of none, which an index that is refused may still read
 
@@ -68,9 +68,10 @@ def load_library(name: str, checked: bool) -> dict[str, Callable[..., Any]]:
     """Return the kernels of a module by name, compiled now if they are nowhere yet."""
     path = compile_text(library_stem(name, checked), lambda: library_text(name, checked), HEADERS, INSTALLED)
     if path is None:
-        raise KernelError(
-            f"{name} must be compiled, but there is no C compiler: install one (gcc or clang), or `pip install ziglang`"
-        )
+        reason = "there is no C compiler: install one (gcc or clang), or `pip install ziglang`"
+        if (words := compiler_command()) is not None:
+            reason = f"`{' '.join(words)}` makes no library of its C text in {machine_code_folder()}"
+        raise KernelError(f"{name} must be compiled, but {reason}")
     library = ctypes.CDLL(str(path))
     text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, "kernels")))
     return {entry[0]: _Kernel(library, *entry).call for entry in json.loads(text)}
