@@ -96,7 +96,8 @@ def _npz(path: Path) -> ArraySource:
             if entry in names:
                 raise RecordError(
                     f"{path}: must be a record, as CSV, Parquet, MDF4, MAT or NumPy, but is {kind}: "
-                    f"the command `inspect FILE.{ending}` with the option `columns` shows its variables"
+                    f"the command `inspect FILE.{ending}` with the option `columns` shows its variables",
+                    "columns",
                 )
         if not names or not all(name.endswith(".npy") for name in names):
             raise RecordError(
