@@ -16,7 +16,7 @@ from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, TORQUE_WEIG
 from orchestrator.control.standstill import loop_response
 from orchestrator.errors import ScenarioError
 from orchestrator.plants import design
-from orchestrator.plants.design import REGULATOR_STATES, DrivetrainValues, five_state_model
+from orchestrator.plants.design import GAIN_UNITS, REGULATOR_STATES, DrivetrainValues, five_state_model
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.shared.output import write_columns, write_whole
 from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound
@@ -25,7 +25,6 @@ RANGES = {"torque_weight": (1e-12, 1e12), "sample_time": (1e-4, 0.05), "delay": 
 LARGEST_WEIGHT = 1e12
 POINTS = 400  # of the response
 LOWEST = 1e-2  # frequency of the response [Hz]
-UNITS = ("N.m/rad", "N.m.s/rad", "N.m/rad", "N.m.s/rad", "1")  # of the gains
 
 
 @dataclass(frozen=True, repr=False)
@@ -59,7 +58,7 @@ class RegulatorResult(PlottedResult):
         """Return the gains, and what the loop does."""
         rows = [
             (f"K[{n}]", state, f"{gain:.9g}", unit)
-            for n, (state, gain, unit) in enumerate(zip(REGULATOR_STATES, self.gains, UNITS, strict=True), start=1)
+            for n, (state, gain, unit) in enumerate(zip(REGULATOR_STATES, self.gains, GAIN_UNITS, strict=True), start=1)
         ]
         found = table("Gains of the regulator", ("gain", "state", "value", "unit"), rows)
         return [found, rest_text(self.forecast, "the loop"), margins_text(self.forecast)]

@@ -44,7 +44,7 @@ def trust_of_location(location: Location, record: Record, model: Model, settings
         if not location.explained:
             yield Reason(Level.AMBER, "the model does not explain the record: its torque noise is too large")
         if location.answers and location.traversals < settings.trust.least_traversals:
-            yield Reason(Level.AMBER, f"the gap is traversed only {location.traversals} times")
+            yield Reason(Level.AMBER, f"the gap is traversed only {_times(location.traversals)}")
         if record.u_sampled is not None:
             yield Reason(Level.AMBER, "the torque has rows of its own and was taken as held between them")
         if record.u_deviation is not None:
@@ -75,7 +75,7 @@ def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Re
     elif fit.visible:
         traversals = int(fit.diagnostics.get("traversals", settings.least_traversals))
         if traversals < settings.least_traversals:
-            yield Reason(Level.AMBER, f"the gap is traversed only {traversals} times")
+            yield Reason(Level.AMBER, f"the gap is traversed only {_times(traversals)}")
         if fit.standard_error > settings.widest * fit.alpha:
             yield Reason(Level.AMBER, "the standard error is more than a fifth of the half-gap")
     yield from _of_values(fit.diagnostics.get("parameters", {}), model, settings)
@@ -112,3 +112,7 @@ def _compare_methods(estimate: Estimate, fit: Estimate | None, fit_trust: Trust 
     if not low <= fit.alpha <= high:
         yield Reason(Level.RED, f"its interval does not hold the half-gap of {FITTED}, {fit.alpha:.5g} rad")
     yield Reason(fit_trust.level, f"{FITTED} beside it is {fit_trust.level.word}")
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

@@ -17,6 +17,7 @@ from orchestrator.errors import DesignError
 Array = NDArray[np.float64]
 
 REGULATOR_STATES = ("theta_m", "omega_m", "theta_l", "omega_l", "T_m")
+GAIN_UNITS = ("N.m/rad", "N.m.s/rad", "N.m/rad", "N.m.s/rad", "1")
 ESTIMATOR_STATES = ("theta_m", "omega_m", "theta_l", "omega_l", "T_l", "T_m")
 RANK_TOLERANCE = 1e-9
 

@@ -43,7 +43,8 @@ def _sizes(location: LocationFound) -> ReportTable:
 def _ways(location: LocationFound) -> ReportTable:
     columns = (TableColumn("answer"), TableColumn("log-likelihood behind the best", "", 4), TableColumn("left"))
     rows = tuple(
-        (ANSWERS[name], behind, "yes" if name in location.answers else "no") for name, behind in location.behind.items()
+        (ANSWERS[name], round(behind, 1), "yes" if name in location.answers else "no")
+        for name, behind in location.behind.items()
     )
     note = "How far the best fit with the gap in that place falls behind the best of all; far behind means excluded."
     return ReportTable("Where the gap can be", columns, rows, note)

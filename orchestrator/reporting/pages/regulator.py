@@ -1,5 +1,6 @@
 """The page of ``regulator``: gains, what the loop does at rest, and its response at the request."""
 
+from orchestrator.plants.design import GAIN_UNITS, REGULATOR_STATES
 from orchestrator.reporting.model import Facts, Plot, Report, ReportTable, Series, TableColumn
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
@@ -15,7 +16,7 @@ def build(source: ResultDocument) -> Report:
         title="Regulator of a drivetrain with a gap",
         summary=f"Without friction, load and limit of the torque the loop {rest}, by its gains alone.",
         sections=(
-            ReportTable("Gains", (TableColumn("gain"), TableColumn("value", digits=9)), tuple(results.gains.items())),
+            _gains(results),
             *rest_facts(f, "The loop"),
             Plot(
                 "The loop without a gap, cut at the request",
@@ -36,6 +37,12 @@ def build(source: ResultDocument) -> Report:
         origin=source.origin(),
         downloads=source.downloads(),
     )
+
+
+def _gains(results: RegulatorFound) -> ReportTable:
+    columns = (TableColumn("gain"), TableColumn("state"), TableColumn("value", digits=9), TableColumn("unit"))
+    rows = zip(results.gains, REGULATOR_STATES, results.gains.values(), GAIN_UNITS, strict=True)
+    return ReportTable("Gains", columns, tuple(rows))
 
 
 def rest_facts(f: ForecastFound | None, loop: str) -> tuple[Facts, ...]:
