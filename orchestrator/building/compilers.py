@@ -15,10 +15,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from orchestrator.errors import FmuError
-from orchestrator.shared.machine_code import compiler_environment, local_compiler
+from orchestrator.shared.machine_code import UNFOLDED, compiler_environment, local_compiler
 
 # No contraction of a product and a sum: it would round once where Python rounds twice.
-FLAGS = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall", "-Wextra", "-Wpedantic")
+FLAGS = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall", "-Wextra", "-Wpedantic", *UNFOLDED)
 
 # zig is clang with checks switched on; its vectors of two numbers stall where structures are read right after.
 ZIG_FLAGS = ("-O2", "-fno-sanitize=undefined", "-fno-slp-vectorize")

@@ -24,9 +24,12 @@ from orchestrator.shared.cache import cache_directory
 INSTALLED = Path(__file__).parents[1] / "machine_code"
 """Folder of the libraries that were compiled when the package was installed."""
 VARIABLE = "BACKLASH_COSIM_MACHINE_CODE"
+_INEXACT = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log pow erf erfc"
+# A compiler rounds the sine of a constant correctly; Python calls the C library, which may be off in the last bit.
+UNFOLDED = tuple(f"-fno-builtin-{name}" for name in _INEXACT.split())
 # No contraction of a product and a sum: it would round once where Python rounds twice.
 # Roots do not set errno, and nobody asks whether a division trapped: neither changes a value.
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-shared", "-w")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-shared", "-w", *UNFOLDED)
 
 
 @dataclass(frozen=True)

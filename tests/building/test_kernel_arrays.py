@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from orchestrator.building.translation.kernel_arrays import plain_array, scratch
@@ -172,6 +172,9 @@ COUNT = iter(range(1000))
 
 @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 @given(programs=st.lists(st.lists(LINES, min_size=1, max_size=6), min_size=4, max_size=4))
+@example(
+    programs=[["a = math.sin(math.sqrt(abs(max(b, 0.20783536533066993))))"]]
+)  # a constant, which compilers would compute
 def test_random_programs_give_the_bits_of_python(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, programs: list[list[str]]
 ) -> None:
