@@ -19,22 +19,29 @@ def run(module: str = "orchestrator.cli") -> None:
     try:
         # Here, for Ctrl-C and a lack of memory or descriptors may come while modules are loaded.
         code = importlib.import_module(module).main()
-        sys.stdout.flush()
+    except SystemExit as ended:  # help, the version, or words that are refused
+        code = ended.code
     except KeyboardInterrupt:
         word, code = stop_in_words()
         sys.stderr.write(f"{word}\n")
     except BrokenPipeError:
         code = 1
     except (OSError, ImportError, MemoryError) as error:
-        text = " ".join(str(error).split())[:300] or "out of memory"
-        sys.stderr.write(f"error: {text}\n")
-        code = 1
+        code = _tell(error)
     end_on_signals()
     try:
         sys.stdout.flush()
-    except OSError:
+    except OSError as error:
+        if not code:  # else a command has told it
+            code = 1 if isinstance(error, BrokenPipeError) else _tell(error)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else the interpreter complains once more when it ends
     sys.exit(code)
+
+
+def _tell(error: BaseException) -> int:
+    """Say what went wrong, in one line, and return the exit code."""
+    sys.stderr.write(f"error: {' '.join(str(error).split())[:300] or 'out of memory'}\n")
+    return 1
 
 
 if __name__ == "__main__":

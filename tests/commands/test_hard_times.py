@@ -31,7 +31,8 @@ def shell(folder: Path, line: str) -> "subprocess.CompletedProcess[str]":
     if "scenario.toml" in line:
         build_c_fmu(folder)
         (folder / "scenario.toml").write_text(SCENARIO)
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(folder / "temporary"), "PY": sys.executable}
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    environment = kept | {"PYTHONPATH": str(ROOT), "TMPDIR": str(folder / "temporary"), "PY": sys.executable}
     return subprocess.run(
         ["bash", "-c", line], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
@@ -44,6 +45,7 @@ def shell(folder: Path, line: str) -> "subprocess.CompletedProcess[str]":
         ("$PY -m orchestrator report no-such-folder 2>&-", {2}),
         ("$PY -m orchestrator --version >&- 2>&-", {0}),
         ("$PY -m orchestrator check --static a.fmu > /dev/full", {1}),
+        ("$PY -m orchestrator --help > /dev/full", {1}),
         ("$PY -m orchestrator --help | true; exit ${PIPESTATUS[0]}", {0, 1}),
         # An FMU of others, since without a cache nothing is compiled before: our own take a minute then.
         ("HOME=/proc XDG_CACHE_HOME= $PY -m orchestrator simulate --scenario scenario.toml --out out", {0}),
