@@ -110,7 +110,11 @@ def block_variance(fit: Fit[Any], column: int, blocks: int) -> float:
     scores = fit.likelihood.scores(fit.point, fit.free)
     sums = np.array([block.sum(axis=0) for block in np.array_split(scores, blocks)])
     sums -= sums.mean(axis=0)
-    weights = fit.covariance[:, column]
+    unknowns = [fit.likelihood.problem.unknowns[n] for n in fit.free]
+    values = fit.point.theta[fit.free]
+    inside = np.array([u.lower < value < u.upper for u, value in zip(unknowns, values, strict=True)])
+    inside[column] = True
+    weights = np.where(inside, fit.covariance[:, column], 0.0)  # what is held at its bound carries no error on
     variance = float(np.sum((sums @ weights) ** 2)) * blocks / (blocks - 1.0)
     ratio = variance / max(float(fit.covariance[column, column]), 1e-300)
     if not ratio > float(chi2.ppf(0.975, blocks - 1)) / (blocks - 1.0):
