@@ -14,14 +14,14 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels, affine_model, innovations
-from orchestrator.estimation.problem import IMPULSE, OFFSET, SAMPLED, SCALE, STATE_NAMES, GapProblem, Unknown
+from orchestrator.estimation.problem import IMPULSE, OFFSET, SAMPLED, SCALE, STATE_NAMES, GapProblem, UnknownProblem
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.shared.inference.inverse import pseudo_inverse
 from pyfmu_sources.equations import NAMES, DrivetrainParameters
@@ -43,29 +43,6 @@ class Point:
     objective: float
     deviance: float
     result: Innovations = field(repr=False)
-
-
-class UnknownProblem(Protocol):
-    """What is unknown: see :class:`orchestrator.estimation.problem.GapProblem`."""
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Return every unknown, in the order of the vector."""
-
-    @property
-    def outputs(self) -> Array:
-        """Return the measured angles (n, outputs) [rad]."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the unknowns, in order."""
-
-    @property
-    def start(self) -> Array:
-        """Return the prior means."""
-
-    def index(self, name: str) -> int:
-        """Return the place of an unknown in the vector, from 0."""
 
 
 P = TypeVar("P", bound=UnknownProblem)

@@ -1,6 +1,7 @@
 """What is unknown about a record under a model: parameters, gap, initial state, noise; and where each is looked for."""
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,24 +42,17 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class GapProblem:
-    """A record and what is unknown about it.
+class UnknownProblem:
+    """A record, and a vector of unknowns.
 
     Attributes:
-        base: parameter tuple of the model.
         unknowns: every unknown, in the order of the vector; free or not is decided per fit.
         outputs: (n, 1 or 2) measured angles [rad].
-        noise: nominal noise levels, for those that are not among the unknowns.
-        torque_units: by what levels of torque noise at motor and load are to be multiplied for a drive as weak, or as
-            strong, as this one.
     """
 
     record: Record
-    base: tuple[float, ...]
     unknowns: tuple[Unknown, ...]
     outputs: Array
-    noise: NoiseLevels
-    torque_units: tuple[float, float] = (1.0, 1.0)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -70,14 +64,30 @@ class GapProblem:
         """Return the prior means."""
         return np.array([unknown.mean for unknown in self.unknowns])
 
+    def index(self, name: str) -> int:
+        """Return the place of an unknown in the vector, from 0."""
+        return self.names.index(name)
+
+
+@dataclass(frozen=True)
+class GapProblem(UnknownProblem):
+    """What is unknown about a record of the drivetrain.
+
+    Attributes:
+        base: parameter tuple of the model.
+        noise: nominal noise levels, for those that are not among the unknowns.
+        torque_units: by what levels of torque noise at motor and load are to be multiplied for a drive as weak, or as
+            strong, as this one.
+    """
+
+    base: tuple[float, ...]
+    noise: NoiseLevels
+    torque_units: tuple[float, float] = (1.0, 1.0)
+
     @property
     def least_where_inexact(self) -> tuple[float, float]:
         """Return the least torque noise at motor and load [N.m.s^0.5] that keeps an inexact model honest."""
         return scale_noise(LEAST_WHERE_INEXACT, self.torque_units)
-
-    def index(self, name: str) -> int:
-        """Return the place of an unknown in the vector, from 0."""
-        return self.names.index(name)
 
 
 def make_problem(record: Record, model: Model) -> GapProblem:
@@ -87,22 +97,14 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     """
     both = record.theta_l is not None
     outputs = record.theta_m[:, None] if record.theta_l is None else np.column_stack([record.theta_m, record.theta_l])
-    unknowns = []
-    for parameter in model.uncertain:
-        if parameter.name == "alpha" or (parameter.name == "i" and not both):
-            continue
-        sd = parameter.standard_deviation
-        lower = max(parameter.minimum, parameter.value - 4.0 * sd) if parameter.value > 0 else parameter.minimum
-        unknowns.append(Unknown(parameter.name, parameter.value, sd, sd, lower, parameter.maximum))
+    unknowns = parameter_unknowns(model, {ALPHA} if both else {ALPHA, "i"})
     ratio = model.parameters["i"].value
     unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
     if both:
         unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
     damping = model.parameters["c"].value
     unknowns.append(Unknown(IMPULSE, 0.0, 0.5 * IMPULSE_DEPTH * damping, 0.5 * IMPULSE_DEPTH * damping))
-    if record.u_scale_uncertainty > 0.0:
-        spread = record.u_scale_uncertainty / math.sqrt(3.0)
-        unknowns.append(Unknown(SCALE, 1.0, spread, spread, 0.1, 10.0))
+    unknowns += scale_unknowns(record)
     if record.u_sampled is not None:
         unknowns.append(Unknown(SAMPLED, 0.0, math.inf, 0.1, 0.0, 1.0))
     units = _torque_units(record, model.parameters["tau"].value, ratio)
@@ -111,11 +113,7 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
         level = measurement_noise(record, model, column)
         levels.append(level)
-        encoder = model.encoder(column)
-        known = encoder.noise is not None and encoder.resolution is not None and record.averaged == 1
-        spread = 0.02 if known else NOISE_SPREAD
-        least = max(math.log(level) - 6.0, math.log(max(rounding_noise(record, model, column), 1e-12)))
-        noises.append(Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, least, math.log(level) + 6.0))
+        noises.append(encoder_unknown(record, model, column, level))
     exact = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE)
     lows = scale_noise(exact if both else LEAST_WHERE_INEXACT, units)
     highs = scale_noise((LARGEST_TORQUE_NOISE, LARGEST_TORQUE_NOISE), units)
@@ -123,9 +121,36 @@ def make_problem(record: Record, model: Model) -> GapProblem:
         noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(high)))
     if not both:
         levels.append(levels[0])
-    return GapProblem(
-        record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0)), units
-    )
+    noise = NoiseLevels((levels[0], levels[1]), (1.0, 1.0))
+    return GapProblem(record, tuple(unknowns + noises), outputs, model.values, noise, units)
+
+
+def parameter_unknowns(model: Model, without: Collection[str]) -> list[Unknown]:
+    """Return the uncertain parameters of a model, apart from some by name."""
+    unknowns = []
+    for parameter in model.uncertain:
+        if parameter.name not in without:
+            sd = parameter.standard_deviation
+            lower = max(parameter.minimum, parameter.value - 4.0 * sd) if parameter.value > 0 else parameter.minimum
+            unknowns.append(Unknown(parameter.name, parameter.value, sd, sd, lower, parameter.maximum))
+    return unknowns
+
+
+def scale_unknowns(record: Record) -> list[Unknown]:
+    """Return the factor of a torque whose scale is not exact, or nothing."""
+    if record.u_scale_uncertainty <= 0.0:
+        return []
+    spread = record.u_scale_uncertainty / math.sqrt(3.0)
+    return [Unknown(SCALE, 1.0, spread, spread, 0.1, 10.0)]
+
+
+def encoder_unknown(record: Record, model: Model, column: str, level: float) -> Unknown:
+    """Return the logarithm of an encoder's noise, about ``level`` [rad] of :func:`measurement_noise`."""
+    encoder = model.encoder(column)
+    known = encoder.noise is not None and encoder.resolution is not None and record.averaged == 1
+    spread = 0.02 if known else NOISE_SPREAD
+    least = max(math.log(level) - 6.0, math.log(max(rounding_noise(record, model, column), 1e-12)))
+    return Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, least, math.log(level) + 6.0)
 
 
 def scale_noise(level: tuple[float, float], units: tuple[float, float]) -> tuple[float, float]:
@@ -147,9 +172,9 @@ def _torque_units(record: Record, lag: float, ratio: float) -> tuple[float, floa
 
 def _initial_state(record: Record, ratio: float, torque_unit: float) -> list[Unknown]:
     """Return unknowns for the initial state, centred on a straight line through the first rows."""
-    speed_m, angle_m = _first_line(record.time, record.theta_m)
+    speed_m, angle_m = first_line(record.time, record.theta_m)
     if record.theta_l is not None:
-        speed_l, angle_l = _first_line(record.time, record.theta_l)
+        speed_l, angle_l = first_line(record.time, record.theta_l)
         spread_l = 0.02
     else:
         speed_l, angle_l, spread_l = speed_m / ratio, angle_m / ratio, 0.1
@@ -159,7 +184,7 @@ def _initial_state(record: Record, ratio: float, torque_unit: float) -> list[Unk
     return [Unknown(*entry) for entry in zip(STATE_NAMES, means, spreads, scales, strict=True)]
 
 
-def _first_line(times: Array, values: Array) -> tuple[float, float]:
+def first_line(times: Array, values: Array) -> tuple[float, float]:
     """Return slope and value at the first row of a straight line through the first rows that are there."""
     rows = np.flatnonzero(np.isfinite(values))[:8]
     slope, start = np.polyfit(times[rows] - times[0], values[rows], 1)

@@ -144,14 +144,24 @@ def _next_event(normal: Vector, alpha: float, flank: int, x: Vector, end: Vector
 
     ``end`` is where the present mode alone leads in ``h``; the cubic through both ends is close enough to find it.
     """
-    hit = -1.0
-    side = 0.0
     if alpha <= 0.0:
-        return hit, side
+        return -1.0, 0.0
     d0 = normal[0] * x[0] + normal[2] * x[2]
     w0 = normal[0] * x[1] + normal[2] * x[3]
     d1 = normal[0] * end[0] + normal[2] * end[2]
     w1 = normal[0] * end[1] + normal[2] * end[3]
+    return first_meeting(alpha, flank, d0, w0, d1, w1, h)
+
+
+def first_meeting(
+    alpha: float, flank: int, d0: float, w0: float, d1: float, w1: float, h: float
+) -> tuple[float, float]:
+    """Return (time, side) of the first meeting of twist and flank; -1.0: none.
+
+    ``d0`` and ``w0`` are the twist and its rate at the start, ``d1`` and ``w1`` after ``h``.
+    """
+    hit = -1.0
+    side = 0.0
     reach = h * (abs(w0) + abs(w1))
     if flank == 1:
         for way in range(2):

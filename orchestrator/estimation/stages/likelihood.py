@@ -9,6 +9,7 @@ from orchestrator.building.translation.kernels import Kernels
 from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.innovations import Array, Innovations
 from orchestrator.estimation.likelihood import FilterLikelihood
+from orchestrator.estimation.problem import SCALE
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.estimation.stages.motion import VALUES
 from orchestrator.estimation.stages.problem import (
@@ -17,7 +18,6 @@ from orchestrator.estimation.stages.problem import (
     ENCODERS,
     LATE,
     OFFSET,
-    SCALE,
     SHARE,
     SPEED_DEVIATIONS,
     TORQUE,

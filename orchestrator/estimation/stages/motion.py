@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from orchestrator.building.translation.kernel_arrays import Reals, scratch
 from orchestrator.building.translation.kinds import REAL, ArrayKind
-from orchestrator.estimation.propagation import first_root
+from orchestrator.estimation.propagation import first_meeting
 
 VALUES = ("J_m", "J_s", "J_l", "i_1", "i_2", "k_1", "c_1", "k_2", "c_2", "b_m", "b_s", "b_l")
 
@@ -171,17 +171,8 @@ def fill_torque(u: Reals, tau: float, start: float, late: float, h: float, torqu
         before = reached
 
 
-def _fill_rate(mats: Matrix, b_u: Inputs, b_1: Vector, x: Vector, motor: float, load: float, out: Vector) -> None:
-    """Fill ``out`` with the time derivative at ``x`` under torques at motor and load [N.m]."""
-    for r in range(6):
-        acc = b_u[0, r] * motor + b_u[1, r] * load + b_1[r]
-        for c in range(6):
-            acc += mats[r, c] * x[c]
-        out[r] = acc
-
-
 def _advance(phi: Matrix, gain_u: Inputs, gain_1: Vector, x: Vector, motor: float, load: float, out: Vector) -> None:
-    """Fill ``out`` with where a transition leads from ``x``."""
+    """Fill ``out`` with where a transition leads from ``x``; of a rate, with the time derivative there."""
     for r in range(6):
         acc = gain_u[0, r] * motor + gain_u[1, r] * load + gain_1[r]
         for c in range(6):
@@ -203,10 +194,8 @@ def flank_of(normals: Inputs, stage: int, half: float, x: Vector) -> int:
 def _next_event(normals: Inputs, stage: int, half: float, flank: int, x: Vector, end: Vector, h: float,
                 ) -> tuple[float, float]:  # fmt: skip
     """Return (time, side) of the first meeting of twist and flank of a stage on the way to ``end``; -1.0: none."""
-    hit = -1.0
-    side = 0.0
     if half <= 0.0:
-        return hit, side
+        return -1.0, 0.0
     a = 2 * stage
     b = a + 2
     one = normals[stage, a]
@@ -215,20 +204,7 @@ def _next_event(normals: Inputs, stage: int, half: float, flank: int, x: Vector,
     w0 = one * x[a + 1] + two * x[b + 1]
     d1 = one * end[a] + two * end[b]
     w1 = one * end[a + 1] + two * end[b + 1]
-    reach = h * (abs(w0) + abs(w1))
-    if flank == 1:
-        for way in range(2):
-            s = 1.0 if way == 0 else -1.0
-            if half - s * d1 > reach and half - s * d0 > reach:
-                continue
-            when = first_root(max(half - s * d0, 0.0), -s * w0, half - s * d1, -s * w1, h)
-            if when >= 0.0 and (hit < 0.0 or when < hit):
-                hit, side = when, s
-        return hit, side
-    side = 1.0 if flank == 2 else -1.0
-    if not (side * d1 - half > reach and side * d0 - half > reach):
-        hit = first_root(max(side * d0 - half, 0.0), side * w0, side * d1 - half, side * w1, h)
-    return hit, side
+    return first_meeting(half, flank, d0, w0, d1, w1, h)
 
 
 def propagate(
@@ -298,13 +274,13 @@ def _cross(
             hit = min(max(hit - gap / rate, 0.0), left)
         _multiply(f, before, total)
         after = (2 if side > 0.0 else 0) if flank == 1 else 1
-        _fill_rate(mats[mode], b_u, b_1[mode], y, motor, load, speed0)
+        _advance(mats[mode], b_u, b_1[mode], y, motor, load, speed0)
         if stage == 0:
             first = after
         else:
             second = after
         mode = 3 * first + second
-        _fill_rate(mats[mode], b_u, b_1[mode], y, motor, load, speed1)
+        _advance(mats[mode], b_u, b_1[mode], y, motor, load, speed1)
         if abs(rate) > 1e-6:
             for c in range(6):
                 aside = (normals[stage, a] * total[a, c] + normals[stage, b] * total[b, c]) / rate
