@@ -110,9 +110,9 @@ def block_variance(fit: Fit[Any], column: int, blocks: int) -> float:
     scores = fit.likelihood.scores(fit.point, fit.free)
     sums = np.array([block.sum(axis=0) for block in np.array_split(scores, blocks)])
     sums -= sums.mean(axis=0)
-    unknowns = [fit.likelihood.problem.unknowns[n] for n in fit.free]
+    lower, upper = fit.likelihood.problem.bounds(fit.free)
     values = fit.point.theta[fit.free]
-    inside = np.array([u.lower < value < u.upper for u, value in zip(unknowns, values, strict=True)])
+    inside = (lower < values) & (values < upper)
     inside[column] = True
     weights = np.where(inside, fit.covariance[:, column], 0.0)  # what is held at its bound carries no error on
     variance = float(np.sum((sums @ weights) ** 2)) * blocks / (blocks - 1.0)

@@ -149,7 +149,7 @@ class FilterLikelihood(ABC, Generic[P]):
         """
         base = point.result
         basis = self._basis(point.theta, free)
-        lower, upper = (np.array([getattr(self.problem.unknowns[n], end) for n in free]) for end in ("lower", "upper"))
+        lower, upper = self.problem.bounds(free)
 
         def look(n: int, step: float) -> tuple[Array, Array]:
             # Beyond a bound a plant may be none: a drive whose lag is negative runs away.
@@ -179,14 +179,22 @@ class FilterLikelihood(ABC, Generic[P]):
         """Return a factor (k, k) of the covariance of the free unknowns; alpha never moves down along a column."""
         # What is hardly known must not be moved far: a tenth of its scale bounds the step.
         information = self.information[np.ix_(free, free)] + np.diag(self._floor[free])
-        diagonal = np.sqrt(np.diag(information))
-        values, vectors = np.linalg.eigh(information / np.outer(diagonal, diagonal))
-        values = np.maximum(values, 1e-13 * values[-1])
-        basis = vectors / np.sqrt(values) / diagonal[:, None]
+        basis = covariance_factor(information)
         alpha = np.flatnonzero(free == self.size)
         if alpha.size:
             basis = basis * np.where(basis[alpha[0]] < 0.0, -1.0, 1.0)
         return np.asarray(basis)
+
+
+def covariance_factor(information: Array) -> Array:
+    """Return a matrix (k, k) whose product with its transpose is the inverse of an information (k, k).
+
+    What the information hardly shows is bounded at 1e-13 of what it shows best.
+    """
+    diagonal = np.sqrt(np.diag(information))
+    values, vectors = np.linalg.eigh(information / np.outer(diagonal, diagonal))
+    values = np.maximum(values, 1e-13 * values[-1])
+    return np.asarray(vectors / np.sqrt(values) / diagonal[:, None])
 
 
 L = TypeVar("L", bound=FilterLikelihood[Any])
@@ -281,10 +289,8 @@ def maximise(likelihood: L, start: Array, free: Sequence[int], iterations: int =
         start: (unknowns,).
         iterations: largest number of steps of the optimiser.
     """
-    unknowns = likelihood.problem.unknowns
     places = np.array(list(free), dtype=np.int64)
-    lower = np.array([unknowns[n].lower for n in places])
-    upper = np.array([unknowns[n].upper for n in places])
+    lower, upper = likelihood.problem.bounds(places)
     point = likelihood.at(start)
     damping, converged, done = likelihood.first_damping, False, 0
     information = np.eye(places.size)

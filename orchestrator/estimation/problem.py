@@ -1,7 +1,7 @@
 """What is unknown about a record under a model: parameters, gap, initial state, noise; and where each is looked for."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,6 +67,11 @@ class UnknownProblem:
     def index(self, name: str) -> int:
         """Return the place of an unknown in the vector, from 0."""
         return self.names.index(name)
+
+    def bounds(self, places: Iterable[int]) -> tuple[Array, Array]:
+        """Return the least and the largest values of unknowns by their places: (k,) each."""
+        chosen = [self.unknowns[n] for n in places]
+        return np.array([unknown.lower for unknown in chosen]), np.array([unknown.upper for unknown in chosen])
 
 
 @dataclass(frozen=True)

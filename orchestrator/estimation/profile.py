@@ -62,10 +62,9 @@ def profile(fit: GapFit) -> Profile:
 
 def _fit_constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
     """Return the best fit found with alpha held: the linear prediction, then some scoring steps."""
-    unknowns = likelihood.problem.unknowns
     theta = fit.point.theta.copy()
     theta[fit.free] += slope * (alpha - fit.point.theta[place])
     theta[place] = alpha
-    theta = np.clip(theta, [u.lower for u in unknowns], [u.upper for u in unknowns])
+    theta = np.clip(theta, *likelihood.problem.bounds(range(theta.size)))
     others = [n for n in fit.free if n != place]
     return maximise(likelihood, theta, others, 5, tolerance=0.05)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.innovations import Array, Innovations
-from orchestrator.estimation.likelihood import FilterLikelihood
+from orchestrator.estimation.likelihood import FilterLikelihood, covariance_factor
 from orchestrator.estimation.problem import SCALE
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.estimation.stages.motion import VALUES
@@ -102,13 +102,10 @@ class StagesLikelihood(FilterLikelihood[StagesProblem]):
     def _basis(self, theta: Array, free: NDArray[np.int64]) -> Array:
         """Return a factor (k, k) of the covariance of the free unknowns; what is at a bound looks inward alone."""
         information = self.information[np.ix_(free, free)] + np.diag(self._floor[free])
-        lower, upper = (np.array([getattr(self.problem.unknowns[n], end) for n in free]) for end in ("lower", "upper"))
+        lower, upper = self.problem.bounds(free)
         alone = 1.0 / np.sqrt(np.diag(information))
         low, high = theta[free] - lower < NEAR * alone, upper - theta[free] < NEAR * alone
         kept = np.flatnonzero(~(low | high))
         basis = np.diag(np.where(high, -alone, alone))
-        diagonal = np.sqrt(np.diag(information)[kept])
-        values, vectors = np.linalg.eigh(information[np.ix_(kept, kept)] / np.outer(diagonal, diagonal))
-        values = np.maximum(values, 1e-13 * values[-1])
-        basis[np.ix_(kept, kept)] = vectors / np.sqrt(values) / diagonal[:, None]
+        basis[np.ix_(kept, kept)] = covariance_factor(information[np.ix_(kept, kept)])
         return basis
