@@ -1,0 +1,38 @@
+"""The variance that blocks of a record show, and unknowns that cannot add to it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.estimation.description import block_variance
+from orchestrator.estimation.problem import Unknown, UnknownProblem
+
+ROWS, BLOCKS = 2000, 20
+
+
+def fit_at(theta: list[float], covariance: np.ndarray, scores: np.ndarray) -> SimpleNamespace:
+    """A fit of two unknowns, the second of which lies between 0 and 1."""
+    unknowns = (Unknown("alpha", 0.0, np.inf, 1.0, 0.0, 3.0), Unknown("level", 0.0, np.inf, 1.0, 0.0, 1.0))
+    problem = UnknownProblem(record=None, unknowns=unknowns, outputs=np.zeros((ROWS, 1)))
+    likelihood = SimpleNamespace(problem=problem, scores=lambda point, free: scores)
+    point = SimpleNamespace(theta=np.array(theta))
+    return SimpleNamespace(likelihood=likelihood, point=point, free=np.arange(2), covariance=covariance)
+
+
+@pytest.fixture
+def white() -> np.ndarray:
+    return np.random.default_rng(0).normal(size=(ROWS, 2))
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0])
+def test_an_unknown_at_its_bound_adds_nothing(white: np.ndarray, level: float) -> None:
+    covariance = np.array([[1.0 / ROWS, 1e6], [1e6, 1e13]])
+    assert block_variance(fit_at([0.5, level], covariance, white), 0, BLOCKS) == 1.0
+    assert block_variance(fit_at([0.5, 0.5], covariance, white), 0, BLOCKS) > 1e12
+
+
+def test_a_gap_of_nothing_keeps_the_scatter_of_its_blocks(white: np.ndarray) -> None:
+    together = np.repeat(white[: ROWS // 100], 100, axis=0)
+    found = [block_variance(fit_at([alpha, 0.5], np.eye(2) / ROWS, together), 0, BLOCKS) for alpha in (0.0, 0.5)]
+    assert found[0] == found[1] > 10.0
