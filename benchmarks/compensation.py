@@ -70,7 +70,7 @@ OBSERVER = Kernels("benchmarks.observer_kernel", checked=True)
 @cache
 def kernels() -> tuple[Callable[..., None], Callable[..., Array]]:
     """The filter's sample and the plant's, compiled."""
-    step, bristle = independent_plant._step, independent_plant._bristle
+    step, bristle = independent_plant._step, independent_plant.bristle
     coulomb = independent_plant.FC_L
 
     def observe(f, model, settings, u, theta_m, theta_l, first):

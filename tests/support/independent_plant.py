@@ -175,7 +175,7 @@ def _sharp_step(t, x, v, request, fm, fl, end, h):
 
 
 @njit(cache=True)
-def _bristle(z, w, h, sigma, coulomb, extra, vs):
+def bristle(z, w, h, sigma, coulomb, extra, vs):
     """Return the LuGre bristle after ``h`` at constant speed (exact) and the mean friction torque."""
     level = coulomb + extra * np.exp(-((w / vs) ** 2))
     if level <= 0.0:
@@ -243,9 +243,9 @@ def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp, p
                 coulomb += v[MU_M] * carried / v[RATIO]
                 coulomb_l += v[MU_L] * carried
             coulomb = max(0.0, coulomb + v[WAV_M] * np.sin(v[WAV_N] * x[0] + v[WAV_PH]))
-            zm, fm = _bristle(zm, x[1], h, SIGMA_M, coulomb, v[FS_M], v[VS_M])
+            zm, fm = bristle(zm, x[1], h, SIGMA_M, coulomb, v[FS_M], v[VS_M])
             fm -= push[n_k]
-            zl, fl = _bristle(zl, x[3], h, SIGMA_L, coulomb_l, v[FS_L], v[VS_L])
+            zl, fl = bristle(zl, x[3], h, SIGMA_L, coulomb_l, v[FS_L], v[VS_L])
             cut = _sharp_step(t, x, v, request, fm, fl, end, h) if sharp else x
             x = cut if sharp else _step(t, x, v, request, fm, fl, end, 9, h)
     return out, states, applied

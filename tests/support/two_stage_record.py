@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 
 from tests.support.excitations import coloured, levels, multisine
+from tests.support.independent_plant import bristle
 
 Array = np.ndarray
 
@@ -67,17 +68,6 @@ def _rates(x, v, request, fm, fl):
 
 
 @njit(cache=True)
-def _bristle(z, w, h, sigma, coulomb, extra, vs):
-    """Return the LuGre bristle after ``h`` at constant speed (exact) and the mean friction torque."""
-    level = coulomb + extra * np.exp(-((w / vs) ** 2))
-    if level <= 0.0:
-        return 0.0, 0.0
-    settle = level / sigma * (1.0 if w > 0.0 else -1.0)
-    new = settle + (z - settle) * np.exp(-sigma * abs(w) * h / level)
-    return new, sigma * 0.5 * (z + new) + 0.02 * np.sqrt(sigma) * (new - z) / h
-
-
-@njit(cache=True)
 def _simulate(v, u, step, substeps, late, push):
     """Return the true states (n, 7) from rest under ``u`` (n,), which acts ``late`` [s]; ``push``: on the motor."""
     n = u.size
@@ -90,8 +80,8 @@ def _simulate(v, u, step, substeps, late, push):
         for m in range(substeps):
             back = int(np.floor((row * substeps + m + 0.5 - late / h) / substeps))
             request = u[back] if back >= 0 else 0.0
-            zm, fm = _bristle(zm, x[1], h, SIGMA_M, v[FC_M], v[FS_M], VS_M)
-            zl, fl = _bristle(zl, x[5], h, SIGMA_L, v[FC_L], v[FS_L], VS_L)
+            zm, fm = bristle(zm, x[1], h, SIGMA_M, v[FC_M], v[FS_M], VS_M)
+            zl, fl = bristle(zl, x[5], h, SIGMA_L, v[FC_L], v[FS_L], VS_L)
             fm -= push[row]
             a = _rates(x, v, request, fm, fl)
             b = _rates(x + 0.5 * h * a, v, request, fm, fl)
