@@ -36,9 +36,12 @@ def page(served: Served):
 
 
 def wait(driver: Any, condition: Any) -> Any:
+    """Return what the condition gives once it is true; what a redraw takes away or moves is looked up again."""
+    from selenium.common.exceptions import ElementClickInterceptedException, StaleElementReferenceException
     from selenium.webdriver.support.wait import WebDriverWait
 
-    return WebDriverWait(driver, HANGS, 0.1).until(condition)
+    moved = (ElementClickInterceptedException, StaleElementReferenceException)
+    return WebDriverWait(driver, HANGS, 0.1, ignored_exceptions=moved).until(condition)
 
 
 def open_workbench(driver: Any, served: Served, width: int = 1280, scheme: str = "light") -> None:
@@ -68,8 +71,12 @@ def pick(driver: Any, css: str, text: str) -> None:
 
 
 def choose_tab(driver: Any, name: str) -> None:
-    driver.execute_script("scrollTo({ top: 0, behavior: 'instant' })")
-    driver.find_element("id", f"tab-{name}").click()
+    def click(driver: Any) -> bool:
+        driver.execute_script("scrollTo({ top: 0, behavior: 'instant' })")
+        driver.find_element("id", f"tab-{name}").click()
+        return driver.find_element("id", f"panel-{name}").is_displayed()
+
+    wait(driver, click)
 
 
 def severe(driver: Any) -> list[str]:
@@ -234,6 +241,19 @@ def test_an_ssp_file_is_a_tree(inspected: Any, served: Served) -> None:
     branches = [one.text for one in inspected.find_elements("css selector", "#panel-fmus details summary")]
     assert "Connections (1)" in branches
     assert any(text.startswith("drivetrain (") for text in branches)
+
+
+def test_an_action_that_ends_does_not_scroll_the_page(inspected: Any) -> None:
+    choose_tab(inspected, "fmus")
+    set_screen(inspected, 1280, 400, "light")
+    written = inspected.find_element("xpath", "//*[@id='panel-fmus']//button[normalize-space()='Write it as TOML']")
+    inspected.execute_script(
+        "arguments[0].focus(); arguments[0].click(); scrollTo({ top: 0, behavior: 'instant' })", written
+    )
+    assert inspected.execute_script("return arguments[0].getBoundingClientRect().top", written) > 400, "out of sight"
+    wait(inspected, lambda d: d.switch_to.active_element == written)
+    assert inspected.execute_script("return scrollY") == 0
+    set_screen(inspected, 1280, 900, "light")
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (390, "light"), (1280, "dark")])

@@ -58,7 +58,7 @@ function controlsOf(element) {
   });
 }
 
-// Replace what an element holds; the focus stays where it was, and what was unfolded stays so.
+// Replace what an element holds; the focus stays where it was, what was unfolded stays so, and the page does not scroll.
 export function fill(element, ...children) {
   const before = controlsOf(element);
   const focused = before.find(({ one }) => one === document.activeElement)?.key;
@@ -66,7 +66,7 @@ export function fill(element, ...children) {
   element.replaceChildren(...children.flat().filter(Boolean));
   for (const { one, key } of controlsOf(element)) {
     if (unfolded.has(key) && one.tagName === "SUMMARY") one.parentElement.open = true;
-    if (key === focused) one.focus();
+    if (key === focused) one.focus({ preventScroll: true });
   }
 }
 

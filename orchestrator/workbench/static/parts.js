@@ -135,7 +135,7 @@ export function action(text, said, act, kind = "") {
     made.disabled = true;
     try { await act(); } catch (error) { said.say(error.message); }
     made.disabled = false;
-    if (document.activeElement === document.body) made.focus();
+    if (document.activeElement === document.body) made.focus({ preventScroll: true });
   } }, text);
   return made;
 }
