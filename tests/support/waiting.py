@@ -1,3 +1,16 @@
-"""How long tests wait for what must end by itself."""
+"""Waiting in tests: for the event, and only in the end for the clock."""
 
-HANGS = 3600.0  # s, after which a child process hangs: far more than a busy computer takes
+import time
+from collections.abc import Callable
+from typing import Any
+
+HANGS = 1200.0  # s, after which what ends by itself hangs: far more than a busy computer takes
+
+
+def wait_until(holds: Callable[[], Any], said: Callable[[], object] = str, pause: float = 0.02) -> Any:
+    """Return what ``holds`` returns as soon as that is true; fail with what ``said`` returns where it never is."""
+    end = time.monotonic() + HANGS
+    while not (found := holds()):
+        assert time.monotonic() < end, said()
+        time.sleep(pause)
+    return found
