@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -13,8 +12,9 @@ from orchestrator.errors import SlaveError
 from orchestrator.fmi.messages import ERROR
 from orchestrator.shared import stopping
 from tests.support.c_fmu import have_compiler
-from tests.support.engine_process import HANGS, ROOT, children
+from tests.support.engine_process import ROOT, children
 from tests.support.hostile_fmus import World, command
+from tests.support.waiting import HANGS, wait_until
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
@@ -33,8 +33,9 @@ def _ctrl_c_is_heard():
 
 def wait_for_step(pid: int, process: "subprocess.Popen[str]") -> None:
     """Wait until a child of the process spins in the FMU's step: it takes processor time, and nothing else happens."""
-    end, before, since = time.monotonic() + HANGS, {}, {}
-    while time.monotonic() < end:
+    before, since = {}, {}
+
+    def spins() -> bool:
         assert process.poll() is None, process.stderr.read()
         for child in children(pid):
             try:
@@ -48,9 +49,10 @@ def wait_for_step(pid: int, process: "subprocess.Popen[str]") -> None:
             if before.get(child) != reads:
                 before[child], since[child] = reads, spent
             elif spent - since[child] > SPINNING:
-                return
-        time.sleep(0.02)
-    raise AssertionError("no child came to its step")
+                return True
+        return False
+
+    wait_until(spins, lambda: "no child came to its step")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.support.c_fmu import build_c_fmu, have_compiler
-from tests.support.engine_process import HANGS, ROOT, children, finished_cases, wait_for_cases, wait_until_gone
+from tests.support.engine_process import ROOT, children, finished_cases, wait_for_cases, wait_until_gone
+from tests.support.waiting import HANGS
 
 SCENARIO = """
 stop = 20.0
@@ -47,9 +48,9 @@ def test_a_killed_worker_and_a_killed_parent_cost_no_result_and_leave_nothing(tm
 
     out = tmp_path / "killed"
     process = started(tmp_path, "killed")
-    wait_for_cases(out, 3)
+    wait_for_cases(process, out, 3)
     os.kill(children(process.pid)[0], signal.SIGKILL)
-    wait_for_cases(out, finished_cases(out) + 3)
+    wait_for_cases(process, out, finished_cases(out) + 3)
     workers = children(process.pid)
     process.kill()
     process.communicate()

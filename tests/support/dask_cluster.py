@@ -1,14 +1,15 @@
 """A Dask cluster of separate processes over TCP on this machine."""
 
+import contextlib
 import os
 import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 from tests.support.engine_process import ROOT, children
+from tests.support.waiting import HANGS, wait_until
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
 
@@ -34,17 +35,14 @@ class DaskProcesses:
         for process in processes:
             process.terminate()
         for process in processes:
-            try:
-                process.wait(timeout=2)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            process.wait(timeout=HANGS)
 
     def kill_worker(self, index: int) -> None:
         """Kill a worker's working process with SIGKILL; its supervisor starts a new one."""
         for pid in children(self._workers[index].pid):
-            if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes():
-                os.kill(pid, signal.SIGKILL)
+            with contextlib.suppress(OSError):  # one that has ended meanwhile
+                if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                    os.kill(pid, signal.SIGKILL)
 
     def kill_scheduler(self) -> None:
         """Kill the scheduler with SIGKILL."""
@@ -57,9 +55,12 @@ class DaskProcesses:
             return subprocess.Popen(command, cwd=self._directory, env=ENVIRONMENT, stdout=log, stderr=log)
 
     def _address(self) -> str:
-        while self._scheduler.poll() is None:  # it says where it listens, or ends
-            found = re.search(r"Scheduler at:\s+((?:tcp|tls)://\S+)", (self._directory / "scheduler.log").read_text())
-            if found:
-                return found.group(1)
-            time.sleep(0.05)
-        raise AssertionError((self._directory / "scheduler.log").read_text())
+        log = self._directory / "scheduler.log"
+
+        def said() -> "re.Match[str] | None":  # it says where it listens, or ends
+            ended = self._scheduler.poll() is not None
+            found = re.search(r"Scheduler at:\s+((?:tcp|tls)://\S+)", log.read_text())
+            assert found or not ended, log.read_text()
+            return found
+
+        return str(wait_until(said, log.read_text)[1])
