@@ -49,6 +49,7 @@ def _table() -> dict[tuple[str, str], str]:
 
 
 BEHAVIOURS = _table()
+LAST_MOMENTS = 60.0  # s, in which what was killed is gone on a busy machine, too
 COMMANDS = ("check", "simulate", "sweep", "ssp", "diagnose")
 SCENARIO = """
 stop = 0.2
@@ -100,6 +101,20 @@ def hostile_fmu(
     return write_fmu(folder / f"{IDENTIFIER}.fmu", files)
 
 
+def _sockets_of_one_number() -> tuple[socket.socket, socket.socket]:
+    """Return a TCP and a UDP socket of the same port: one that is free for TCP may be taken for UDP."""
+    while True:
+        tcp = socket.create_server(("127.0.0.1", 0))
+        udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            udp.bind(tcp.getsockname())
+        except OSError:
+            tcp.close()
+            udp.close()
+            continue
+        return tcp, udp
+
+
 @dataclass
 class World:
     """What a hostile FMU may be after: files, sockets, processes; see ``harm``."""
@@ -114,10 +129,8 @@ class World:
         self.precious = self.folder / "home" / "precious"
         self.precious.write_text("mine")
         self.before = self._state()
-        self.tcp = socket.create_server(("127.0.0.1", 0))
+        self.tcp, self.udp = _sockets_of_one_number()
         self.port = self.tcp.getsockname()[1]
-        self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.udp.bind(("127.0.0.1", self.port))
         self.unix = socket.socket(socket.AF_UNIX)
         self.unix_path = f"/tmp/hostile-{self.mark[:12]}"
         self.unix.bind(self.unix_path)
@@ -174,7 +187,7 @@ class World:
 
     def _processes(self) -> list[str]:
         mark = f"HOSTILE_MARK={self.mark}".encode()
-        end = time.monotonic() + 2.0
+        end = time.monotonic() + LAST_MOMENTS
         while True:
             found = []
             for path in Path("/proc").glob("[0-9]*"):

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import main
+from tests.support.waiting import wait_until
 from tests.support.workbench import Served, workbench
 
 pytest.importorskip("starlette")
@@ -154,11 +155,8 @@ def test_a_connection_that_breaks_off_leaves_nothing(served: Served) -> None:
     with socket.create_connection(("127.0.0.1", served.port)) as line:
         head = f"PUT /{served.token}/upload/broken.csv HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n"
         line.sendall(f"{head}Content-Length: 1000000\r\n\r\n".encode() + bytes(1000))
-    for _ in range(200):
-        if files(served) == before:
-            break
-        served.ask("GET", "state")
-    assert files(served) == before
+        wait_until(lambda: files(served) != before)  # the server is at it
+    wait_until(lambda: files(served) == before, lambda: files(served) - before)
 
 
 @pytest.mark.parametrize(

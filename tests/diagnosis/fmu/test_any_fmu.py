@@ -2,8 +2,8 @@
 
 import dataclasses
 import json
+import re
 import shutil
-import time
 
 import numpy as np
 import pytest
@@ -236,11 +236,10 @@ def test_a_run_that_hangs_is_given_up_soon_and_others_go_on(made):
             e for e in find_effects(problem, problem.must_read(problem.nominal)) if e.row.name == "input_dead_zone"
         )
         wide = FmuModel(problem.nominal.p, (zone,), (np.array([1e9]),))
-        begun = time.monotonic()
         runs = problem.simulate([problem.nominal, wide, problem.nominal])
-        assert time.monotonic() - begun < 60.0
         assert [run is None for run in runs] == [False, True, False]
-        assert "no answer within" in problem.runner.reason
+        given_up = re.search(r"no answer within ([\d.e+]+) s", problem.runner.reason)
+        assert float(given_up[1]) < settings.patience
     finally:
         problem.runner.close()
 

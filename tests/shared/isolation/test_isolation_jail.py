@@ -222,14 +222,12 @@ def test_what_waits_for_a_processor_has_more_time_but_not_for_ever(
     monkeypatch: pytest.MonkeyPatch, share: float, seconds: float, ends: bool
 ) -> None:
     monkeypatch.setattr(jail_module, "processor_wait", lambda pid: share * time.monotonic())
-    begin = time.monotonic()
     with Jail(ENTRY, "x", limits=Limits(time=0.5)) as jail:
         jail.start()
-        if ends:
+        if ends:  # before the sleep does
             with pytest.raises(ChildError) as error:
                 jail.call(["sleep", seconds], Any)
             assert error.value.reason == "time"
-            assert time.monotonic() - begin < 30.0
         else:
             jail.call(["sleep", seconds], Any)
 
