@@ -53,12 +53,14 @@ def browser() -> Iterator[Any]:
 
 
 def set_screen(driver: Any, width: int, height: int, scheme: str) -> None:
-    """Give the page a screen of this size in CSS pixels, and a system theme ("light" or "dark")."""
+    """Give the page a screen of this size in CSS pixels, and a system theme ("light" or "dark"), and have it drawn."""
     mobile = width < 600
     metrics = {"width": width, "height": height, "deviceScaleFactor": 2 if mobile else 1, "mobile": mobile}
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     features = [{"name": "prefers-color-scheme", "value": scheme}]
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+    # What a page draws for its size, it draws with the next frame; the one after it shows the result.
+    driver.execute_async_script("const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done))")
 
 
 def whole_page(driver: Any, path: Path, width: int, scheme: str) -> None:
