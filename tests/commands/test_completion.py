@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from orchestrator.cli import COMMANDS, main
+from tests.support.waiting import HANGS
 
 
 @pytest.fixture
@@ -35,7 +36,7 @@ def completed(script, *words):
     """
     )
     bash = [str(shutil.which("bash")), "--norc", "-c", program, "bash", *words]
-    done = subprocess.run(bash, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(bash, capture_output=True, text=True, check=False, timeout=HANGS)
     return set(done.stdout.split())
 
 

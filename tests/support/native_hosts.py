@@ -7,6 +7,8 @@ import sys
 import zipfile
 from pathlib import Path
 
+from tests.support.waiting import HANGS
+
 HOST = Path(__file__).with_name("step_host.c")
 ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 OUTPUTS = 6
@@ -65,7 +67,7 @@ class StepHost:
         library = folder / "binaries" / self.platform / f"{fmu.stem}.{self.suffix}"
         arguments = [library, guid[1], steps, step, amplitude, frequency, outputs, timed]
         command = [*self.command, *map(str, arguments), *words]
-        run = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+        run = subprocess.run(command, capture_output=True, text=True, check=True, timeout=HANGS)
         return run.stdout.split()
 
 

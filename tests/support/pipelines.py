@@ -6,12 +6,14 @@ import subprocess
 
 import yaml
 
+from tests.support.waiting import HANGS
+
 
 def run(words, folder, **environment):
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("GITHUB_", "PYTHON"))}
     words = [str(word) for word in words]
     return subprocess.run(
-        words, cwd=folder, capture_output=True, text=True, check=False, env=clean | environment, timeout=600
+        words, cwd=folder, capture_output=True, text=True, check=False, env=clean | environment, timeout=HANGS
     )
 
 

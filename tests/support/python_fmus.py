@@ -5,6 +5,8 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
+from tests.support.waiting import HANGS
+
 SLAVE = """
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 {imports}
@@ -46,6 +48,6 @@ def build_python_fmu(folder: Path, source: str, files: Mapping[str, str] | None 
         (work / name).write_text(text)
     projects = sorted({name.partition("/")[0] for name in files or {}})
     command = [sys.executable, "-m", "pythonfmu", "build", "-f", f"{module}.py", "-d", str(folder.resolve()), *projects]
-    subprocess.run(command, cwd=work, check=True, capture_output=True, timeout=120)
+    subprocess.run(command, cwd=work, check=True, capture_output=True, timeout=HANGS)
     (path,) = folder.glob("*.fmu")
     return path

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from orchestrator.shared.isolation.surroundings import system_folders
 from orchestrator.shared.machine_code import machine_code_folder
+from tests.support.waiting import HANGS
 
 ROOT = Path(__file__).parents[2]
 _LINE = re.compile(r"^(\d+) +(\w+)\((.*)\) += (-?\d+|0x[0-9a-f]+)(?:<([^>]*)>)?")
@@ -61,7 +62,7 @@ def traced(words: list[str], folder: Path, environment: dict[str, str]) -> Trace
     calls = ",".join((*_OPENS, *_CHANGES, *_NETWORK, "prctl", "chdir"))
     options = ["-f", "-qq", "-y", "-s", "4096", "-o", str(log), "-e", f"trace={calls}"]
     command = ["strace", *options, sys.executable, *words]
-    subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False, timeout=300)
+    subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False, timeout=HANGS)
     with log.open(encoding="utf-8", errors="replace") as stream:
         return _read(stream, Path(environment["TMPDIR"]))
 

@@ -6,7 +6,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from tests.support.waiting import HANGS, wait_until
+
 ROOT = Path(__file__).resolve().parents[2]
-HANGS = 240.0  # s
 TABLE = {"content-type": "application/json"}
 
 
@@ -70,10 +70,13 @@ class Served:
 
     def wait(self, name: str, until: Any = lambda job: job["state"] not in ("waiting", "running")) -> dict[str, Any]:
         """Wait for a job."""
-        end = time.monotonic() + HANGS
-        while not until(job := self.job(name)):
-            assert time.monotonic() < end, job
-            time.sleep(0.05)
+        job: dict[str, Any] = {}
+
+        def is_there() -> Any:
+            job.update(self.job(name))
+            return until(job)
+
+        wait_until(is_there, lambda: job, pause=0.05)
         return job
 
 
