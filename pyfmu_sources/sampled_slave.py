@@ -25,7 +25,8 @@ class SampledSlave(SlaveBase):
 
     feedthrough = True
     sample_time_reference = 0
-    _warned = False
+    _samples = 0
+    _at_sample = _warned = False
 
     def begin(self) -> None:
         """Compute the outputs at the first sample instant."""

@@ -62,8 +62,13 @@ class SlaveBase(Fmi2Slave):
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        cls._hidden = (*cls._hidden, *hidden_names(cls))
         cls._index()
+        instance = object.__new__(cls)
+        SlaveBase.__init__(instance)
+        for name in hidden_names(cls):
+            if name in vars(instance) or name in cls._hidden or any(hasattr(base, name) for base in cls.__bases__):
+                raise ValueError(f"`{name}` of {cls.__name__} must be a name of its own, but all slaves have that")
+            cls._hidden = (*cls._hidden, name)
 
     @classmethod
     def customise(cls, name: str, build: str, starts: dict[str, float]) -> None:

@@ -70,12 +70,14 @@ def slave_class(recipe: Recipe, fmi: int = 2, real_outputs: bool = False) -> Any
         fmi: version of FMI, 2 or 3; in the latter event indicators are variables too.
         real_outputs: outputs that are no real numbers become local variables.
     """
-    base = getattr(importlib.import_module(f"pyfmu_sources.{recipe.module}"), recipe.class_name)
-    cls: Any = type(base.__name__, (base,), {"__module__": base.__module__, "__doc__": base.__doc__})
     try:
+        base = getattr(importlib.import_module(f"pyfmu_sources.{recipe.module}"), recipe.class_name)
+        cls: Any = type(base.__name__, (base,), {"__module__": base.__module__, "__doc__": base.__doc__})
         cls.customise(recipe.name, "native", default_starts(recipe.class_name) | dict(recipe.starts))
     except ValueError as error:
         raise FmuError(str(error)) from None
+    except Exception as error:  # whatever is wrong in a source of the user's own
+        raise FmuError(f"cannot build {recipe.name}: {type(error).__name__}: {error}") from None
     if real_outputs:
         cls.table = tuple(_hide_whole_output(variable) for variable in cls.table)
     cls.table = (*cls.table, *_state_variables(cls), *(_indicators(cls) if fmi == 3 else ()))

@@ -44,17 +44,75 @@ def run(project: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
 
 
-def test_a_slave_of_forty_lines_is_native_in_one_command(project: Path) -> None:
-    words = ("build", "--native", "LowPass", "--platforms", "here", "--directory", "native", "--out", "out")
-    built = run(project, "-m", "orchestrator", *words)
-    assert built.returncode == 0, built.stderr
-    fmu = project / "native" / "LowPass.fmu"
+def build_native(project: Path, name: str) -> subprocess.CompletedProcess[str]:
+    words = ("build", "--native", name, "--platforms", "here", "--directory", "native", "--out", "out")
+    return run(project, "-m", "orchestrator", *words)
+
+
+def require_lag(project: Path, fmu: Path) -> None:
     rows = json.loads(run(project, "-c", RUN, str(fmu)).stdout)
     assert len(rows) == 101
     for time, y in rows:
         assert y == pytest.approx(2.0 * (1.0 - math.exp(-time / 0.25)), abs=1e-12)
+
+
+def test_a_slave_of_forty_lines_is_native_in_one_command(project: Path) -> None:
+    built = build_native(project, "LowPass")
+    assert built.returncode == 0, built.stderr
+    fmu = project / "native" / "LowPass.fmu"
+    require_lag(project, fmu)
     checked = run(project, "-m", "orchestrator", "check", str(fmu), "--out", "checked")
     assert "no findings" in checked.stdout, checked.stdout
+
+
+NAMES = '''
+_share = 2.0
+
+
+class Reference(NamedTuple):
+    """As a type of the runtime is called."""
+
+    OK: float
+    faded: float
+
+
+def _faded(time: float) -> Reference:
+    return Reference(_share, exp(-time))
+
+
+def filtered('''
+CLASHES = """    share = _share
+    NAN = step / time_constant
+    faded = _faded(NAN).faded
+    lesser = min(faded, 1.0)
+    return u + (y - u) * lesser * share / _share
+"""
+
+
+def test_locals_and_types_may_be_called_as_the_c_around_them_calls_others(project: Path) -> None:
+    text = (project / "pyfmu_sources" / "low_pass_slave.py").read_text(encoding="utf-8")
+    text = text.replace("LowPass", "Clashes").replace("import ClassVar", "import ClassVar, NamedTuple")
+    text = text.replace("    return u + (y - u) * exp(-step / time_constant)\n", CLASHES)
+    text = text.replace("\ndef filtered(", NAMES)
+    (project / "pyfmu_sources" / "clashes_slave.py").write_text(text, encoding="utf-8")
+    built = build_native(project, "Clashes")
+    assert built.returncode == 0, built.stderr
+    require_lag(project, project / "native" / "Clashes.fmu")
+
+
+@pytest.mark.parametrize("native", [[], ["--native", "--platforms", "here"]])
+@pytest.mark.parametrize("name", ["_stop", "real", "advance"])
+def test_hidden_state_must_not_be_called_as_what_every_slave_has(project: Path, name: str, native: list[str]) -> None:
+    text = (project / "pyfmu_sources" / "low_pass_slave.py").read_text(encoding="utf-8")
+    other = project / "pyfmu_sources" / "odd_slave.py"
+    other.write_text(text.replace("    _y: float", f"    _y: float\n    {name}: float").replace("LowPass", "Odd"))
+    try:
+        built = run(project, "-m", "orchestrator", "build", *native, "Odd", "--directory", "x")
+    finally:
+        other.unlink()
+    assert built.returncode == 2
+    assert f"`{name}` of Odd must be a name of its own" in built.stderr
+    assert "Traceback" not in built.stderr
 
 
 @pytest.mark.parametrize(
@@ -72,6 +130,8 @@ def test_a_slave_of_forty_lines_is_native_in_one_command(project: Path) -> None:
             "no way out of it",
         ),
         ("    if y > u:\n        return y", "must end with `return` on every path"),
+        ("    for n in range(3):\n        y += n\n    n = 5\n    return n * y", "`n` is the variable of a loop"),
+        ("    for n in range(3):\n        n += 1\n    return y", "`n` is the variable of a loop"),
     ],
 )
 def test_what_is_outside_the_subset_is_refused_with_file_and_line(project: Path, line: str, message: str) -> None:

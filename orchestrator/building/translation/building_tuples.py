@@ -34,7 +34,8 @@ def _fill(scope: Scope, node: ast.GeneratorExp, place: str, wanted: Tuple | None
     item_wanted = wanted.items[0] if wanted is not None and wanted.uniform else None
     inner_before, scope.before = scope.before, []
     with_loop(scope, variable, start, stop)
-    where = f"{place}.v[{variable}]" if start == 0 else f"{place}.v[{variable} - {start}]"
+    local = scope.local(variable)
+    where = f"{place}.v[{local}]" if start == 0 else f"{place}.v[{local} - {start}]"
     inner = node.elt
     if isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name) and inner.func.id == "tuple":
         generator = inner.args[0]
@@ -47,7 +48,7 @@ def _fill(scope: Scope, node: ast.GeneratorExp, place: str, wanted: Tuple | None
         item = code.kind
         lines = [*scope.before, f"{where} = {code.text};"]
     scope.before = inner_before
-    scope.before.append(f"for (int64_t {variable} = {start}; {variable} < {stop}; {variable}++) {{")
+    scope.before.append(f"for (int64_t {local} = {start}; {local} < {stop}; {local}++) {{")
     scope.before += [f"    {line}" for line in lines] + ["}"]
     without_loop(scope, variable)
     return Tuple((item,) * (stop - start))
@@ -139,10 +140,11 @@ def _translate_comprehension(scope: Scope, node: ast.ListComp, kind: Items, plac
     if stop - start > kind.capacity:
         scope.refuse(node, f"a list of at most {kind.capacity} is given {stop - start} items")
     with_loop(scope, variable, start, stop)
-    item = Code(f"{base}v[{variable}{f' - {start}' if start else ''}]", kind.item, place=True)
+    local = scope.local(variable)
+    item = Code(f"{base}v[{local}{f' - {start}' if start else ''}]", kind.item, place=True)
     inner = list_lines(scope, node.elt, item) if isinstance(kind.item, Items) else None
     if inner is None:
         inner = [f"{item.text} = {convert(scope, node, scope.expression(node.elt), kind.item).text};"]
     without_loop(scope, variable)
-    head = f"for (int64_t {variable} = {start}; {variable} < {stop}; {variable}++) {{"
+    head = f"for (int64_t {local} = {start}; {local} < {stop}; {local}++) {{"
     return [head, *(f"    {line}" for line in inner), "}", f"{base}n = {stop - start};"]

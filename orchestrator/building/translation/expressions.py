@@ -64,6 +64,7 @@ def constant(scope: Scope, value: Any, node: ast.AST, name: str = "") -> Code:
         scope.refuse(node, f"`{name or value}` must be a finite number, but is {value!r}")
     kind = WHOLE if isinstance(value, int) else REAL
     text = scope.program.constant(scope.source, name, value) if name else repr(value)
+    scope.constants.add(text)
     if scope.program.paired and kind == REAL:
         return constant_pair(text)
     return Code(text, kind, UNARY if value < 0 and not name else PRIMARY)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -17,6 +18,8 @@ from orchestrator.building.translation.statements import block
 MOST_PASSES = 8
 # Tuples of more numbers are handed on by address to functions that can change nothing.
 LARGEST_BY_VALUE = 12
+_TEXTS = re.compile(r'/\*.*?\*/|"[^"]*"')
+_CALLED = re.compile(r"\b([A-Za-z_]\w*)\(")
 
 
 def translate(
@@ -27,19 +30,21 @@ def translate(
     mutated: set[str] = set()
     function.by_address = _by_address(function, node)
     kinds: dict[str, Kind] = {}
-    found = _survey(node, [name for name, _ in function.parameters])
+    found = _survey(source, node, [name for name, _ in function.parameters])
+    covered: set[str] = set()
     for _ in range(MOST_PASSES):
         scope = Scope(program, source, expression, owner, function.returns)
         scope.kinds = kinds | dict(function.parameters)
         scope.pointers = {name for name, kind in function.parameters if isinstance(kind, Items)} | function.by_address
         scope.fixed = function.by_address
-        scope.mutated = set(mutated)
+        scope.mutated, scope.covered = set(mutated), set(covered)
         scope.read, scope.once, scope.homes = set(found.read), set(found.once), dict(found.homes)
         body = block(scope, _without_docstring(node))
         mutated = scope.mutated
         parameters = {name for name, _ in function.parameters}
         kinds = {name: kind for name, kind in scope.kinds.items() if name not in parameters}
-        if not scope.changed:
+        covered |= _needed_names(scope, body) & {scope.local(name) for name in (*scope.kinds, *found.counters)}
+        if not scope.changed and covered == scope.covered:
             break
     _check_end(source, node, function.returns)
     function.mutated = {
@@ -48,10 +53,16 @@ def translate(
     function.faults = scope.faults > 0
     late = [name for name in scope.homes if name in scope.kinds and scope.homes[name] is node]
     unused = [name for name, _ in function.parameters if name not in scope.read]
-    voids = [f"(void){program.local_name(name)};" for name in unused]
+    voids = [f"(void){scope.local(name)};" for name in unused]
     function.body = [*voids, *_late_declarations(scope, late), *body]
-    function.head = _head(program, function)
+    function.head = _head(scope, function)
     return function
+
+
+def _needed_names(scope: Scope, body: list[str]) -> set[str]:
+    """Return the names at file scope that a body needs: of functions, constants and types."""
+    called = {name for line in body for name in _CALLED.findall(_TEXTS.sub("", line))}
+    return called | scope.constants | scope.program.names.in_use()
 
 
 def _signature(source: ModuleSource, node: ast.FunctionDef, c_name: str, owner: Owner | None) -> Function:
@@ -90,10 +101,11 @@ def _by_address(function: Function, node: ast.FunctionDef) -> set[str]:
     return large - stored
 
 
-def _head(program: Program, function: Function) -> str:
+def _head(scope: Scope, function: Function) -> str:
+    program = scope.program
     parameters = [f"{program.owner_name} *self"] if function.owned else []
     for name, kind in function.parameters:
-        local = program.local_name(name)
+        local = scope.local(name)
         if isinstance(kind, Items) or name in function.by_address:
             constant = "" if name in function.mutated else "const "
             parameters.append(f"{constant}{program.names.c(kind)} *{local}")
@@ -127,27 +139,27 @@ def _late_declarations(scope: Scope, names: list[str]) -> list[str]:
 
 
 class _Locals(NamedTuple):
-    """The locals of a function: those that are read, those that are assigned once, and where each begins."""
+    """The locals of a function: those that are read, those that are assigned once, where each begins; loops' own."""
 
     read: set[str]
     once: set[str]
     homes: dict[str, ast.AST]
+    counters: set[str]
 
 
-def _survey(node: ast.FunctionDef, parameters: list[str]) -> _Locals:
+def _survey(source: ModuleSource, node: ast.FunctionDef, parameters: list[str]) -> _Locals:
     """Return what the text of a function says about its locals."""
-    seen = _Locals(set(), set(), {})
     places: dict[str, list[tuple[tuple[int, ...], ast.stmt, bool]]] = {}
-    counters = {
-        name.id
-        for loop in ast.walk(node)
-        if isinstance(loop, ast.For | ast.comprehension)
-        for name in ast.walk(loop.target)
-        if isinstance(name, ast.Name)
-    }
+    loops = [loop.target for loop in ast.walk(node) if isinstance(loop, ast.For | ast.comprehension)]
+    counted = [name for target in loops for name in ast.walk(target) if isinstance(name, ast.Name)]
+    counters = {name.id for name in counted}
+    seen = _Locals(set(), set(), {}, counters)
     for path, statement in _statements(node.body, ()):
         for own in _own_names(statement):
-            places.setdefault(own.id, []).append((path, statement, isinstance(own.ctx, ast.Store)))
+            stored = isinstance(own.ctx, ast.Store)
+            if stored and own.id in counters and own not in counted:
+                source.refuse(statement, f"`{own.id}` is the variable of a loop and must not be assigned elsewhere")
+            places.setdefault(own.id, []).append((path, statement, stored))
     for name, found in places.items():
         stores = [place for place in found if place[2]]
         if any(not store for *_, store in found) or any(isinstance(s, ast.AugAssign) for _, s, _ in found):

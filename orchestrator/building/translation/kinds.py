@@ -188,10 +188,14 @@ class KindNames:
             self._order.append(kind)
         if kind not in self._names:
             name = plain = self._unique_name(self._make(kind))
-            while name in self._names.values():  # two modules may call their own tuples the same
+            while name in self._names.values() or name in self._taken:  # two modules may call their tuples the same
                 name += f"_of_{plain}"
             self._names[kind] = name
         return self._names[kind]
+
+    def in_use(self) -> set[str]:
+        """Return the names of all that was asked for."""
+        return {self._names[kind] for kind in self._order}
 
     def _unique_name(self, name: str) -> str:
         return f"{name}{PAIR}" if self._paired and PAIR not in name else name

@@ -15,10 +15,10 @@ from orchestrator.errors import FmuError
 _TAKEN = (
     "abs acos asin atan atan2 ceil copysign cos cosh div erf erfc exit exp fabs floor fmax fmin fmod free frexp gamma "
     "hypot isfinite isinf isnan j0 j1 jn labs ldexp lgamma log log10 main malloc modf nan pow powf printf qsort rand "
-    "remainder remove rename rint round sin sinh sqrt system tan tanh tgamma time trunc y0 y1 yn clock signal index "
-    "EOF NULL NAN INFINITY DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE"
+    "remainder remove rename rint round sin sinh sqrt system tan tanh tgamma time trunc y0 y1 yn clock signal index"
 )
-RESERVED = KEYWORDS | {"self", "fault"}
+_MACROS = "EOF NULL NAN INFINITY DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE"
+RESERVED = KEYWORDS | {"self", "fault", *_MACROS.split()}
 TAKEN = RESERVED | frozenset(_TAKEN.split())
 
 Translator = Callable[["Program", ModuleSource, ast.FunctionDef, str, Owner | None], Function]

@@ -77,6 +77,8 @@ class Scope:
     once: set[str] = field(default_factory=set)
     read: set[str] = field(default_factory=set)
     begun: set[str] = field(default_factory=set)
+    constants: set[str] = field(default_factory=set)
+    covered: set[str] = field(default_factory=set)
 
     def refuse(self, node: ast.AST, message: str) -> NoReturn:
         """Raise for what is outside the subset."""
@@ -116,8 +118,11 @@ class Scope:
         return " pair_of(0.0)" if self.program.paired and self.returns == REAL else " 0"
 
     def local(self, name: str) -> str:
-        """Return the C name of a local variable."""
-        return self.program.local_name(name)
+        """Return the C name of a local variable, which covers nothing that the function needs by that name."""
+        plain = self.program.local_name(name)
+        while plain in self.covered or (plain != name and plain in self.kinds):
+            plain += "_"
+        return plain
 
     def note_mutation(self, node: ast.expr) -> None:
         """Note that the list to which ``node`` leads is changed."""

@@ -86,7 +86,11 @@ def attributes_of(cls: Any) -> dict[str, Kind]:
             if not isinstance(node, ast.AnnAssign) or not isinstance(node.target, ast.Name):
                 continue
             if not ast.unparse(node.annotation).startswith("ClassVar"):
-                found[node.target.id] = source.annotation(node.annotation, node)
+                kind = source.annotation(node.annotation, node)
+                alike = next((name for name in found if name.lstrip("_") == node.target.id.lstrip("_")), node.target.id)
+                if alike != node.target.id:
+                    source.refuse(node, f"`{node.target.id}` and `{alike}` must differ in more than underscores")
+                found[node.target.id] = kind
     return found
 
 

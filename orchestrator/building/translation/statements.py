@@ -161,7 +161,7 @@ def _translate_range(scope: Scope, node: ast.For, call: ast.Call) -> list[str]:
 def _loop_variable(scope: Scope, name: str) -> str:
     if name == "_":
         return scope.temporary("pass")
-    return scope.program.local_name(name)
+    return scope.local(name)
 
 
 def _narrow(scope: Scope, name: str, ends: tuple[Any, Any], step: int) -> None:
@@ -199,7 +199,7 @@ def _over_items(scope: Scope, node: ast.For) -> list[str]:
     if counted:
         if not isinstance(target, ast.Tuple) or not isinstance(target.elts[0], ast.Name):
             scope.refuse(node, "enumerate must be unpacked into a name and an item")
-        index, target = scope.program.local_name(target.elts[0].id), target.elts[1]
+        index, target = scope.local(target.elts[0].id), target.elts[1]
     if isinstance(source.kind, Items):
         length, item = f"{member(source)}n", source.kind.item
     elif isinstance(source.kind, Tuple) and source.kind.uniform and source.place:
