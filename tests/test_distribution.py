@@ -42,6 +42,14 @@ def test_the_oldest_versions_are_those_that_are_allowed():
     }
 
 
+def test_a_tool_that_takes_no_arguments_starts_nothing_with_one():
+    programs = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tools").glob("*.py")}
+    programs = {path.stem: text for path, text in programs.items() if 'if __name__ == "__main__":' in text}
+    assert len(programs) > 5
+    assert not [name for name, text in programs.items() if "refuse_arguments(" not in text and "Parser(" not in text]
+    assert "usage: release.py" in run([sys.executable, "-m", "tools.release", "--help"], ROOT)
+
+
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """Source archive and wheel of what git knows of, as a release makes them."""

@@ -9,6 +9,7 @@ changes (a test says so); until then they are made on the user's machine.
 from orchestrator.paired.calibration import SHIPPED, calibrate, calibration_text
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.pair import with_settings
+from tools import refuse_arguments
 
 NOISE = (0.0, 1e-4)
 
@@ -24,4 +25,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     main()

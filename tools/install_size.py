@@ -10,6 +10,8 @@ import tomllib
 from importlib import metadata
 from pathlib import Path
 
+from tools import refuse_arguments
+
 PROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
 NAME = re.compile(r"[\w.-]+")
 LARGEST = 12
@@ -53,4 +55,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     main()

@@ -15,6 +15,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+from tools import refuse_arguments
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -37,4 +39,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     sys.exit(main())

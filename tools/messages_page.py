@@ -9,6 +9,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from tools import refuse_arguments
+
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = sorted(path for room in ("orchestrator", "pyfmu_sources") for path in (ROOT / room).rglob("*.py"))
 HEAD = """# Messages
@@ -167,4 +169,5 @@ def _escaped(text: str) -> str:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     print(page())

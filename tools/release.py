@@ -20,6 +20,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from orchestrator.building.installing import PLATFORMS
+from tools import refuse_arguments
 
 ROOT = Path(__file__).resolve().parents[1]
 DIST = ROOT / "dist"
@@ -122,4 +123,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     sys.exit(main())

@@ -6,6 +6,7 @@ python -m tools.rules_page
 from pathlib import Path
 
 from orchestrator.checking.rules import RULES, VERSIONS, Rule, Version
+from tools import refuse_arguments
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "rules.md"
 HEAD = """# Rules of the checker
@@ -39,4 +40,5 @@ def _place(rule: Rule, version: Version) -> str:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     PAGE.write_text(page(), encoding="utf-8")

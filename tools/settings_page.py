@@ -10,6 +10,7 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.settings import Settings, describe_settings
+from tools import refuse_arguments
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
 WORKFLOWS: tuple[tuple[str, str, type[Settings]], ...] = (
@@ -69,4 +70,5 @@ def _shown(default: object) -> str:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     PAGE.write_text(page(), encoding="utf-8")

@@ -13,6 +13,7 @@ from PIL import Image
 from orchestrator.building.build import ensure_built
 from tests.support.browser import browser, set_screen
 from tests.support.workbench import Served, drive_log, workbench
+from tools import refuse_arguments
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 WIDTH, HEIGHT = 1100, 900
@@ -117,4 +118,5 @@ def _save(driver: Any, name: str, height: int) -> None:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     main()
