@@ -18,7 +18,13 @@ from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor, read_fmu_record
 from orchestrator.diagnosis.fmu.report import Array, FmuDiagnosis, first_test, misfit_on_record, stage_runs
 from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
-from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, misfit_found, steps_found
+from orchestrator.diagnosis.report.json_results import (
+    dependence_found,
+    effect_found,
+    library_found,
+    misfit_found,
+    steps_found,
+)
 from orchestrator.diagnosis.report.summary import summarise_fmu
 from orchestrator.diagnosis.result import TestMisfit
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -84,6 +90,7 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
             notes=d.notes,
             settings=as_tables(d.settings),
             candidates=steps_found(d.workings.search),
+            library=library_found(d.workings.search),
             model=None if not self.delivered else str(place / self.delivered[0].file),
             delivery=tuple(self.delivered),
             step_cost=d.workings.problem.runner.step_cost,
@@ -101,7 +108,7 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
     def write_files(self, folder: Path, pictures: bool = False) -> None:
         """Write measured and simulated outputs, a picture where it is asked for, and the corrected system."""
         super().write_files(folder, pictures)
-        if self.verdict != "unknown":
+        if self.verdict != "unknown" or self.diagnosis.workings.search.asked:
             workings = self.diagnosis.workings
             self.delivered[:] = [write_corrected(folder / "corrected.ssp", workings.problem, workings.final)]
 
@@ -168,6 +175,7 @@ def diagnose_fmu(
     test: Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
+    effects: Sequence[str] | None = None,
     time_limit: float | None = None,
     progress: Progress = lambda what: None,
 ) -> FmuDiagnosisResult:
@@ -187,8 +195,8 @@ def diagnose_fmu(
     further = dict(zip([name for name, path in (("validate", validate), ("test", test)) if path is not None],
                        read[len(paths) :], strict=True))  # fmt: skip
     found = diagnose_records(
-        system, given, read[: len(paths)], used, test=further.get("test"), search=search, time_limit=time_limit,
-        progress=progress,
+        system, given, read[: len(paths)], used, test=further.get("test"), search=search, effects=effects,
+        time_limit=time_limit, progress=progress,
     )  # fmt: skip
     try:
         second = misfit_on_record(found.workings, further["validate"]) if "validate" in further else None

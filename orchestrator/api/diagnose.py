@@ -34,6 +34,7 @@ def diagnose(
     test: Record | Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
+    effects: Sequence[str] | None = None,
     with_law: bool = False,
     time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
@@ -51,6 +52,7 @@ def diagnose(
     test: Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
+    effects: Sequence[str] | None = None,
     time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
 ) -> "FmuDiagnosisResult":
@@ -66,6 +68,7 @@ def diagnose(
     test: Record | Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
+    effects: Sequence[str] | None = None,
     with_law: bool = False,
     time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
@@ -82,6 +85,8 @@ def diagnose(
         test: a record, or its path, that is test data as a whole; None: the last part of each record is.
         settings: thresholds, or the path of a TOML file with those that differ from the default.
         search: False: the model is re-fitted and judged as it stands, no effect is looked for.
+        effects: labels (``name@site``) of exactly the effects that the fitted model has, whatever they gain; none is
+            looked for. Those of the model file that are not among them are left out. None: they are looked for.
         with_law: where the verdict is "unknown" and a law is learned, the corrected FMU has it: off until its parameter
             ``effects.learned_law.on`` is 1. Where there is none, a warning says why.
         time_limit: seconds after which the search ends with what it has; None: none.
@@ -104,6 +109,10 @@ def diagnose(
         >>> oc.diagnose("axis.csv", "axis.fmu", "axis_map.toml").effects[0].name
         'coulomb_friction'
     """
+    if effects is not None and not search:
+        raise ScenarioError(
+            "`effects` must be left out without a search: the model is then judged as it stands", "effects"
+        )
     if map is None and isinstance(model, (Path, str)) and Path(model).suffix == ".toml":
         model = read_model(Path(model))
     if map is not None or isinstance(model, (Path, str)):
@@ -111,7 +120,8 @@ def diagnose(
             raise ScenarioError(
                 "`with_law` must be left out with an FMU of others, of which no law is learned", "with_law"
             )
-        options = {"validate": validate, "test": test, "settings": settings, "search": search, "time_limit": time_limit}
+        options = {"validate": validate, "test": test, "settings": settings, "search": search, "effects": effects,
+                   "time_limit": time_limit}  # fmt: skip
         return _of_an_fmu(record, model, map, options, progress)
     model = read_model(None) if model is None else model
     chosen = choose_settings(settings, DiagnosisSettings)
@@ -124,7 +134,7 @@ def diagnose(
     begun, fits = time.monotonic(), itertools.count(1)
     with numeric_errors(f"{measured.source}: no model can be fitted to this record"):
         found = diagnosing.diagnose(
-            [measured, *more], model, chosen, test=tested, search=search, time_limit=time_limit,
+            [measured, *more], model, chosen, test=tested, search=search, effects=effects, time_limit=time_limit,
             progress=lambda what: progress(next(fits), 0, what),
         )  # fmt: skip
         validated = None if other is None else misfit_on_record(found, other)

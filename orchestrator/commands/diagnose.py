@@ -1,6 +1,7 @@
 """``diagnose``: where a record and the model disagree, what is missing, and the corrected FMU."""
 
 import argparse
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,6 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-search", action="store_true", help="re-fit and judge the model as it stands (a corrected.toml)"
     )
+    parser.add_argument(
+        "--effects",
+        type=_labels,
+        metavar="NAME@SITE,...",
+        help="fit exactly these effects, whatever they gain, and look for no others; none: fit no effect",
+    )
     parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="end the search then, with what it has")
     parser.add_argument(
         "--with-law",
@@ -76,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         with _show_stages(sum(record.size for record in records)) as progress:
             found = diagnose(
                 records, model, validate=other, test=tested, settings=settings, search=not args.no_search,
-                with_law=args.with_law, time_limit=args.time_limit, progress=progress,
+                effects=args.effects, with_law=args.with_law, time_limit=args.time_limit, progress=progress,
             )  # fmt: skip
         found.write(folder, args.out, given, args.pictures)
         fmu = args.out / found.fmu_name
@@ -116,7 +123,8 @@ def _any_fmu(args: argparse.Namespace) -> int:
     with stage_output(args.out, FmuDiagnosisResult.replaces) as folder:
         found = diagnose(
             args.records, fmu, args.map, validate=args.validate, test=args.test, settings=args.settings,
-            search=not args.no_search, time_limit=args.time_limit, progress=lambda done, expected, what: say(what),
+            search=not args.no_search, effects=args.effects, time_limit=args.time_limit,
+            progress=lambda done, expected, what: say(what),
         )  # fmt: skip
         try:
             found.write(folder, args.out, pictures=args.pictures)
@@ -125,6 +133,14 @@ def _any_fmu(args: argparse.Namespace) -> int:
         print_blocks(found.blocks())
     print_blocks([f"Written to {args.out}: report.html, diagnose.json, diagnose.csv"])
     return 0
+
+
+def _labels(text: str) -> tuple[str, ...]:
+    """Return the labels of a list of effects; "none": no effect. A comma in brackets belongs to a name, `x[1,2]`."""
+    labels = tuple(dict.fromkeys(label.strip() for label in re.split(r",(?![^\[]*\])", text)))
+    if "" in labels:
+        raise argparse.ArgumentTypeError(f"must be effects such as backlash@shaft, or none, but is {text!r}")
+    return () if labels == ("none",) else labels
 
 
 @contextmanager

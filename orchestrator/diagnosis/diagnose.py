@@ -13,7 +13,7 @@ from orchestrator.diagnosis.data.records import check_model, check_record, check
 from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import Values
 from orchestrator.diagnosis.model.law_arguments import law_arguments
-from orchestrator.diagnosis.model.plant_effects import effect_parameters, in_metres, unit_in
+from orchestrator.diagnosis.model.plant_effects import effect_parameters, effects_of, in_metres, keep_effects, unit_in
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.estimates import (
     add_test_evidence,
@@ -36,8 +36,9 @@ from orchestrator.diagnosis.selection.evidence import (
 )
 from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
-from orchestrator.diagnosis.selection.search import search_effects
+from orchestrator.diagnosis.selection.search import fit_effects, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.effects.words import list_effects
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
@@ -52,6 +53,7 @@ def diagnose(
     *,
     test: Record | None = None,
     search: bool = True,
+    effects: Sequence[str] | None = None,
     time_limit: float | None = None,
     progress: Progress = lambda what: None,
 ) -> Diagnosis:
@@ -59,12 +61,17 @@ def diagnose(
 
     Args:
         records: at least 200 rows each; one encoder or two.
+        effects: labels of exactly those that the fitted model has, and none is looked for; None: they are looked for.
         time_limit: seconds after which the search ends with what it has; None: none.
 
     Returns:
         Graded effects, the corrected model, and what is left.
     """
     whole = [records] if isinstance(records, Record) else list(records)
+    left_out: list[str] = []
+    if effects is not None:
+        left_out = [label for label in effects_of(model) if label not in effects]
+        model, search = keep_effects(model, effects), False
     check_model(model)
     for record in whole:
         check_record(record)
@@ -78,14 +85,20 @@ def diagnose(
         settings.selection if search and gap is None else msgspec.structs.replace(settings.selection, most_effects=0)
     )
     problem = fit_problem(models, settings.fit)
-    result = search_effects(problem, chosen, progress, lambda: bool(time.monotonic() > until))
+    if effects is None:
+        result = search_effects(problem, chosen, progress, lambda: bool(time.monotonic() > until))
+    else:
+        own = effects_of(model)
+        result = fit_effects(problem, settings.selection, [label for label in effects if label not in own], progress)
     points = (result.problem.start, result.base.point, result.final.point)
     nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
     workings = Workings(fitted, test_data, result, tuple(models), nominal, base, final)
     if gap is not None:
         values = model.plant.extend_values(gap.values.tolist())
         return _report_hidden_gap(replace(workings, final=values), gap, model, settings)
-    return _report(workings, model, settings)
+    found = _report(workings, model, settings)
+    notes = [f"left out of the model file, as asked: {list_effects(left_out)}"] if left_out else []
+    return replace(found, notes=(*found.notes, *notes))
 
 
 def _report_hidden_gap(workings: Workings, gap: HiddenGap, model: Model, settings: DiagnosisSettings) -> Diagnosis:
@@ -127,13 +140,13 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     )
     remaining = find_dependences(result, arguments, settings.selection)
     verdict = form_verdict(result, graded, remaining, record, settings)
-    trust = judge_trust(verdict, graded, bool(searched.steps), record, test, parameters, model.uncertain, settings)
+    trust = judge_trust(verdict, graded, searched.searched, record, test, parameters, model.uncertain, settings)
     left = torque_shares(result.problem, result.final.point)
     return Diagnosis(
         verdict=verdict, effects=effects, nuisances=_nuisances(result, graded, parameters, model, settings),
         parameters=parameters, left=dict(zip(workings.balances[0].channels, map(float, left), strict=True)),
         remaining=remaining, law=_law(verdict, remaining, settings), test=test, record=record, trust=trust,
-        notes=_notes(result, record, test, settings), settings=settings, searched=bool(searched.steps),
+        notes=_notes(result, record, test, settings), settings=settings, searched=searched.searched,
         model=model, workings=workings,
     )  # fmt: skip
 

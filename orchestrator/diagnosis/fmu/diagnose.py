@@ -35,7 +35,7 @@ from orchestrator.diagnosis.selection.evidence import (
     torque_shares,
 )
 from orchestrator.diagnosis.selection.remaining import find_dependences
-from orchestrator.diagnosis.selection.search import fit_base, search_effects
+from orchestrator.diagnosis.selection.search import fit_base, fit_effects, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings, FitSettings
 from orchestrator.errors import ScenarioError
 
@@ -56,6 +56,7 @@ def diagnose_fmu(
     *,
     test: FmuRecord | None = None,
     search: bool = True,
+    effects: Sequence[str] | None = None,
     time_limit: float | None = None,
     progress: Progress = lambda what: None,
 ) -> FmuDiagnosis:
@@ -65,6 +66,7 @@ def diagnose_fmu(
         records: at one sample time.
         test: a record that is test data as a whole; None: the last rows of each record are.
         search: False: parameters are re-fitted and the model is judged as it stands.
+        effects: labels of exactly those that are fitted around it, and none is looked for; None: they are looked for.
         time_limit: seconds after which the search ends with what it has; None: the map's budget.
         progress: called with what was fitted.
 
@@ -83,7 +85,10 @@ def diagnose_fmu(
         with np.errstate(all="ignore"):
             problem = _fit_problem(problems, settings)
             chosen = settings.selection if search else msgspec.structs.replace(settings.selection, most_effects=0)
-            found = search_effects(problem, chosen, progress, lambda: time.monotonic() > until)
+            if effects is None:
+                found = search_effects(problem, chosen, progress, lambda: time.monotonic() > until)
+            else:
+                found = fit_effects(problem, settings.selection, effects, progress)
             residuals = tuple(model for model in problem.models if isinstance(model, FmuResiduals))
             return _report(FmuWorkings(test_data, found, residuals), notes, settings)
     except BaseException:
@@ -143,9 +148,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection)
     verdict = form_verdict(found, graded, remaining, record, settings)
-    trust = judge_trust(
-        verdict, graded, bool(searched.steps), record, test, parameters, problem.map.uncertain, settings
-    )
+    trust = judge_trust(verdict, graded, searched.searched, record, test, parameters, problem.map.uncertain, settings)
     left = torque_shares(found.problem, found.final.point)
     notes = [*notes, *problem.runner.remarks]
     if not found.complete:
@@ -153,7 +156,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     return FmuDiagnosis(
         verdict, tuple(sorted(graded, key=lambda effect: -effect.grade)), parameters,
         dict(zip(problem.outputs, map(float, left), strict=True)), remaining, test, record, trust, tuple(notes),
-        settings, bool(searched.steps), problem.map, workings,
+        settings, searched.searched, problem.map, workings,
     )  # fmt: skip
 
 

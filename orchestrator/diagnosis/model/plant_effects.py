@@ -2,7 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,17 +19,37 @@ SINE, COSINE = "sine", "cosine"
 
 def candidate_effects(model: Model, scales: SignalScales, channels: Sequence[str]) -> dict[str, CandidateEffect]:
     """Return the effects that a model may lack, by label."""
-    plant = model.plant
+    plant, own = model.plant, effects_of(model)
     found = {}
     for row in plant.bank:
-        place = row.places(plant)[row.size]
-        given = place < len(plant.table) and model.values[place] != plant.entry(place).default
-        if given or (row.angular and not scales.angular) or (row.both_encoders and len(channels) < 2):
+        if row.label in own or (row.angular and not scales.angular) or (row.both_encoders and len(channels) < 2):
             continue
         if row.rare_torque and not scales.torque_raster:
             continue
         found[row.label] = _candidate(plant, row, scales, channels)
     return found
+
+
+def effects_of(model: Model) -> tuple[str, ...]:
+    """Return the labels of the effects that a model has by its own values."""
+    plant = model.plant
+    sizes = {row.label: row.places(plant)[row.size] for row in plant.bank}
+    return tuple(
+        label for label, place in sizes.items()
+        if place < len(plant.table) and model.values[place] != plant.entry(place).default
+    )  # fmt: skip
+
+
+def keep_effects(model: Model, labels: Collection[str]) -> Model:
+    """Return a model without its effects that are not among some labels: their values are the plant's defaults."""
+    plant = model.plant
+    kept = {name for row in plant.bank if row.label in labels for name in row.parameters.values()}
+    gone = {name for row in plant.bank if row.label in effects_of(model) for name in row.parameters.values()} - kept
+    parameters = {
+        name: replace(one, value=plant.entry(plant.index(name)).default, uncertainty=0.0) if name in gone else one
+        for name, one in model.parameters.items()
+    }
+    return replace(model, parameters=parameters)
 
 
 def _candidate(plant: Plant, row: Effect, scales: SignalScales, channels: Sequence[str]) -> CandidateEffect:

@@ -1,10 +1,11 @@
 """A diagnosis in the form of ``diagnose.json``."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
+from orchestrator.diagnosis.model.plant_effects import effects_of
 from orchestrator.diagnosis.report.missing_torque import Array, MissingTorque, missing_torques
 from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit, ValueEstimate
@@ -54,6 +55,10 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
         notes=diagnosis.notes,
         settings=as_tables(diagnosis.settings),
         candidates=steps_found(diagnosis.workings.search),
+        library=library_found(
+            diagnosis.workings.search,
+            [*effects_of(diagnosis.model), *(one.label for one in diagnosis.effects if one.in_model)],
+        ),
         summary=tuple(summarise(diagnosis)),
     )
 
@@ -68,6 +73,16 @@ def steps_found(search: SearchResult) -> tuple[StepFound, ...]:
         )
         for step in search.steps
     )
+
+
+def library_found(search: SearchResult, more: Sequence[str] = ()) -> dict[str, bool]:
+    """Return the label of each effect that the records can show, and whether the corrected model has it.
+
+    Args:
+        more: labels that it has besides those of the search.
+    """
+    has = {*more, *search.final.labels}
+    return {label: label in has for label in [*more, *search.problem.effects]}
 
 
 def misfit_found(test: TestMisfit, report: ReportSettings) -> TestFound:

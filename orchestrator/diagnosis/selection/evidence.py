@@ -55,7 +55,7 @@ def _effect_evidence(result: SearchResult, label: str, base: float, left: float)
         max(leaving.comparison.gain, entry.comparison.gain), min(max(without - left, before - after) / base, 1.0),
         size_over_error(problem, final, label), family, len(kinds) > 1,
         problem.is_possible(label, final.point),
-        torque=missing_torque(problem, final.point.without_effects([label]), final.point),
+        torque=missing_torque(problem, final.point.without_effects([label]), final.point), asked=label in result.asked,
     )  # fmt: skip
 
 
@@ -147,8 +147,8 @@ def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, 
 def possible_effects(
     evidence: Sequence[EffectEvidence], record: RecordEvidence, settings: DiagnosisSettings
 ) -> list[EffectEvidence]:
-    """Return the effects that are not even likely."""
-    return [one for one in evidence if grade_effect(one, record, settings)[0] is Grade.POSSIBLE]
+    """Return the effects that are not even likely, and were not asked for."""
+    return [one for one in evidence if not one.asked and grade_effect(one, record, settings)[0] is Grade.POSSIBLE]
 
 
 def leave_out_possible(

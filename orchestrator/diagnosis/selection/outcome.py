@@ -50,6 +50,7 @@ class SearchResult:
         reviews: label -> the step that it makes in the final model, with the family that it has there.
         refused: labels that entered once and did not pay in the end.
         complete: False when time ran out.
+        asked: labels of effects that were asked for: they stay, whatever they gain.
     """
 
     problem: FitProblem
@@ -59,6 +60,12 @@ class SearchResult:
     reviews: Mapping[str, SearchStep] = field(default_factory=dict)
     refused: frozenset[str] = field(default_factory=frozenset)
     complete: bool = True
+    asked: frozenset[str] = field(default_factory=frozenset)
+
+    @property
+    def searched(self) -> bool:
+        """Return whether effects were looked for."""
+        return bool(self.steps) and not self.asked
 
 
 class Grade(IntEnum):
@@ -133,6 +140,7 @@ class EffectEvidence:
         test_torque: the same of what the torque balance leaves of test data, block by block; None: not worked out.
         runs_hold: free runs of the final model stay by the test data; else they drift, and the torque decides.
         torque: power of its own torque, in shares of what the nominal model misses.
+        asked: it was asked for, and stays in the model whatever its grade.
     """
 
     label: str
@@ -148,6 +156,7 @@ class EffectEvidence:
     test_torque: ScoreComparison | None = None
     runs_hold: bool = True
     torque: float = 0.0
+    asked: bool = False
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ earlier effect that no longer pays is taken out. At the end each effect of the m
 does as well in its place is its family.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint
 from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
 from orchestrator.diagnosis.selection.screening import Screening, start_of_fit
 from orchestrator.diagnosis.settings import SelectionSettings
+from orchestrator.errors import ScenarioError
 
 Progress = Callable[[str], None]
 LOUDER = 2.0  # times that weights must rise by it: else the model leaves hardly any
@@ -34,6 +35,34 @@ def search_effects(
     base, problem = fit_base(problem)
     search = _Search(settings, progress, out_of_time)
     return search.run(SearchResult(problem, base, base))
+
+
+def fit_effects(
+    problem: FitProblem,
+    settings: SelectionSettings,
+    labels: Collection[str],
+    progress: Progress = lambda what: None,
+) -> SearchResult:
+    """Return the model with the effects that were asked for, whatever they gain, and the way to it.
+
+    Raises:
+        ScenarioError: the record cannot show one of them, or two of them exclude each other.
+    """
+    _check_asked(problem, labels)
+    base, problem = fit_base(problem)
+    search = _Search(settings, progress, lambda: False)
+    return search.take(SearchResult(problem, base, base, asked=frozenset(labels)))
+
+
+def _check_asked(problem: FitProblem, labels: Collection[str]) -> None:
+    """Refuse effects that this record cannot show, and effects that no model has together."""
+    for label in labels:
+        if label not in problem.effects:
+            known = ", ".join(problem.effects)
+            raise ScenarioError(f"`effects` must be of those that this record can show ({known}), but has {label}")
+        other = next((one for one in labels if one in problem.effects[label].excludes), None)
+        if other is not None:
+            raise ScenarioError(f"`effects` must not have both {label} and {other}: one takes the place of the other")
 
 
 def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
@@ -97,6 +126,17 @@ class _Search:
             result = replace(result, problem=problem, final=final, refused=result.refused | gone)
         return self._review(result)
 
+    def take(self, result: SearchResult) -> SearchResult:
+        """Take the effects that are asked for, the one first that gains most."""
+        while missing := result.asked - set(result.final.labels):
+            problem, model = result.problem, result.final
+            tried = self._try_effects(problem, model, frozenset(problem.effects) - missing, len(missing))
+            tried = tried or [self._try_small(problem, model, min(missing))]
+            step = SearchStep(model, tuple(tried), tried[0].label)
+            problem, final = settle_anew(problem, tried[0].fitted)
+            result = replace(result, problem=problem, final=final, steps=(*result.steps, step))
+        return self._review(result)
+
     def _review(self, result: SearchResult) -> SearchResult:
         """Return the result with the family of each effect as the final model has it, and its simplest one in place.
 
@@ -110,6 +150,9 @@ class _Search:
             start = fit_model(problem, model.point.without_effects([label]), 0)
             tried = self._try_effects(problem, without, frozenset((label,)), self.settings.refined, start)
             step = self._simplest(problem, without, reviewed, (reviewed, *tried))
+            if label in result.asked:  # it stays, with what would do as well
+                alike = (step.taken, *step.family)
+                step = replace(step, taken=label, family=tuple(one for one in alike if one != label))
             result = replace(result, reviews={**result.reviews, step.taken: step})
             if step.taken != label:
                 assert step.entry is not None
@@ -235,6 +278,19 @@ class _Search:
             tried.append(TriedEffect(screened.label, compare(model, fitted), fitted))
             self.progress(" + ".join((*model.labels, screened.label)))
         return sorted(tried, key=lambda trial: -trial.comparison.gain)
+
+    @staticmethod
+    def _try_small(problem: FitProblem, model: FittedModel, label: str) -> TriedEffect:
+        """Return an effect that no start speaks for, fitted from a small size: it may end at none."""
+        effect = problem.effects[label]
+        values = list(effect.starts[0])
+        for place in effect.amplitudes:
+            values[place] = effect.scales[place]
+        try:
+            fitted = fit_model(problem, model.point.with_effect(label, tuple(values)))
+        except np.linalg.LinAlgError:
+            raise ScenarioError(f"`effects` must leave out {label}: no size of it fits this record") from None
+        return TriedEffect(label, compare(model, fitted), fitted)
 
     @staticmethod
     def _candidates(problem: FitProblem, model: FittedModel, refused: frozenset[str]) -> Sequence[CandidateEffect]:

@@ -50,6 +50,7 @@ class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
     candidates: tuple[StepFound, ...] = ()
+    library: dict[str, bool] = msgspec.field(default_factory=dict)
     model: str | None = None
     delivery: tuple[DeliveredFound, ...] = ()
     step_cost: float | None = None

@@ -196,7 +196,10 @@ class DifferenceFound(msgspec.Struct, frozen=True):
 
 
 class DiagnoseFound(ResultData, frozen=True, kw_only=True):
-    """``diagnose``: graded effects, the corrected model, what is left, and how it was found."""
+    """``diagnose``: graded effects, the corrected model, what is left, and how it was found.
+
+    ``library``: label of each effect that the record can show -> whether the corrected model has it.
+    """
 
     schema_version: int = 3
     verdict: str
@@ -214,6 +217,7 @@ class DiagnoseFound(ResultData, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
     candidates: tuple[StepFound, ...] = ()
+    library: dict[str, bool] = msgspec.field(default_factory=dict)
     cosimulation: DifferenceFound = DifferenceFound()
     live: LiveFound | None = None
     angle_unit: str = "rad"
