@@ -9,7 +9,7 @@ from orchestrator.errors import InputError
 from orchestrator.estimation.protocol import METHODS
 from orchestrator.workbench.session import SessionFolder
 
-MOST_INPUTS = 20
+MOST_INPUTS, MOST_EFFECTS = 20, 100
 Reader = Callable[[Any, str, SessionFolder], str | None]
 
 
@@ -46,6 +46,16 @@ def _part(value: Any, name: str, session: SessionFolder) -> str:
     return value
 
 
+def _effects(value: Any, name: str, session: SessionFolder) -> str:
+    if not isinstance(value, list) or len(value) > MOST_EFFECTS or not all(map(_is_effect, value)):
+        raise InputError(f"`{name}` must be a list of effects such as backlash@shaft, but is {str(value)[:60]!r}")
+    return ",".join(value) or "none"
+
+
+def _is_effect(value: Any) -> bool:
+    return isinstance(value, str) and len(value) <= 300 and value.isprintable() and "@" in value
+
+
 @dataclass(frozen=True)
 class CommandForm:
     """A command as pages may ask for it.
@@ -78,7 +88,8 @@ FORMS: dict[str, CommandForm] = {
         (1, MOST_INPUTS),
         {
             "model": _file, "settings": _file, "fmu": _file, "map": _file, "draft_map": _flag, "validate": _file,
-            "test": _file, "no_search": _flag, "time_limit": _number, "with_law": _flag, **_READING,
+            "test": _file, "no_search": _flag, "effects": _effects, "time_limit": _number, "with_law": _flag,
+            **_READING,
         },
     ),
     "calibrate": CommandForm((1, 1), {"fmu": _file, "map": _file}),

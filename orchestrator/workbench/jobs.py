@@ -9,7 +9,7 @@ import shlex
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,7 @@ from orchestrator.workbench.settings import WorkbenchSettings
 PROGRAM = "backlash-cosim"  # as it is called on a command line
 JOB_FILE, OUTPUT_FILE = "job.json", "output.txt"
 _SHOWN = (
-    "name", "command", "state", "stage", "share", "left", "exit_code", "messages", "begun", "ended", "stops",
+    "name", "command", "asked", "state", "stage", "share", "left", "exit_code", "messages", "begun", "ended", "stops",
 )  # fmt: skip
 STOPPED = (130, 143, 129)  # exit codes after Ctrl-C, SIGTERM and SIGHUP
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
@@ -38,6 +38,7 @@ class Job:
     Attributes:
         name: of its folder of results, such as ``estimate-3``.
         words: the command line behind the program's name.
+        asked: ``inputs`` and ``options`` as the page asked for it.
         state: "waiting", "running", "done", "failed" or "stopped"; "ended" where the server went first.
         stage, share, left: as ``--progress json`` tells them.
         messages: what it wrote to standard error besides.
@@ -49,6 +50,7 @@ class Job:
     command: str
     words: tuple[str, ...]
     folder: Path
+    asked: Mapping[str, Any] = field(default_factory=dict)
     state: str = "waiting"
     stage: str = ""
     share: float | None = None
@@ -85,11 +87,11 @@ class Jobs:
         self._tasks: set[asyncio.Task[None]] = set()
         self.all: dict[str, Job] = {job.name: job for job in _of_earlier_servers(session)}
 
-    def start(self, command: str, words: Sequence[str]) -> Job:
+    def start(self, command: str, words: Sequence[str], asked: Mapping[str, Any] | None = None) -> Job:
         """Start a command; its results go into a folder of its own."""
         folder = self._session.reserve_result(command)
         line = (*words, "--progress", "json", "--out", self._session.reference_of(folder))
-        job = Job(folder.name, command, line, folder, begun=time.time())
+        job = Job(folder.name, command, line, folder, asked or {}, begun=time.time())
         self.all[job.name] = job
         self._write(job)
         task = asyncio.get_running_loop().create_task(self._run(job))
@@ -208,9 +210,10 @@ def _of_earlier_servers(session: SessionFolder) -> list[Job]:
         try:
             said = json.loads(note.read_text(encoding="utf-8"))
             job = Job(
-                note.parent.name, str(said["command"]), tuple(map(str, said["words"])), note.parent, str(said["state"]),
-                exit_code=said["exit_code"], messages=[str(text) for text in said["messages"]],
-                begun=float(said["begun"]), ended=float(said["ended"]),
+                note.parent.name, str(said["command"]), tuple(map(str, said["words"])), note.parent,
+                dict(said.get("asked", {})), str(said["state"]), exit_code=said["exit_code"],
+                messages=[str(text) for text in said["messages"]], begun=float(said["begun"]),
+                ended=float(said["ended"]),
             )  # fmt: skip
         except (OSError, ValueError, TypeError, KeyError):
             continue

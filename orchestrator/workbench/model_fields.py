@@ -61,7 +61,7 @@ def model_text(base: Path | None, changes: Mapping[str, Any]) -> str:
     Args:
         base: the model file that the fields were read from; None: the default model.
         changes: ``parameters``: by name ``value`` and ``uncertainty`` (absolute); ``columns``, ``encoders`` and
-            ``header`` in place of those of ``base``; ``without``: labels of effects that the model is to lose.
+            ``header`` in place of those of ``base``.
 
     Raises:
         InputError: something of this is unknown, or of the wrong kind. What values may be, ``read_model`` says.
@@ -72,7 +72,6 @@ def model_text(base: Path | None, changes: Mapping[str, Any]) -> str:
     for name in given:
         if name not in model.parameters:
             raise InputError(f"`parameters.{name[:60]}` must be a parameter of {model.fmu}, but is not")
-    removed = _effect_parameters(model, changes.get("without", []))
     lines = [f"fmu = {toml_text(model.fmu)}"]
     header = changes.get("header", model.header)
     if header is not None:
@@ -83,8 +82,7 @@ def model_text(base: Path | None, changes: Mapping[str, Any]) -> str:
             lines += ["", f"[{group}.{_key(name)}]", *(f"{_key(key)} = {_text(v, key)}" for key, v in entry.items())]
     stated = [name for name in model.parameters if name in model.stated or name in given]
     for name in stated:
-        if name not in removed:
-            lines += ["", *_parameter_lines(model.parameters[name], given.get(name), said.get(name, ""))]
+        lines += ["", *_parameter_lines(model.parameters[name], given.get(name), said.get(name, ""))]
     return "\n".join(lines) + "\n"
 
 
@@ -97,14 +95,6 @@ def _parameter_lines(parameter: ModelParameter, change: Mapping[str, Any] | None
     remark = f"{parameter.unit or '1'}: {YOURS}" if changed else said
     note = f"   # {plain_text(remark)}" if remark else ""
     return [f"[parameters.{toml_text(parameter.name)}]", f"value = {value!r}{note}", f"uncertainty = {uncertainty!r}"]
-
-
-def _effect_parameters(model: Model, labels: Any) -> set[str]:
-    """Return the parameters of the effects with these labels."""
-    rows = {row.label: row for row in model.plant.bank}
-    if not isinstance(labels, list) or not all(isinstance(label, str) and label in rows for label in labels):
-        raise InputError(f"`without` must be a list of effects of {model.fmu}, but is {str(labels)[:60]}")
-    return {name for label in labels for name in rows[label].parameters.values()}
 
 
 def _remarks(text: str) -> dict[str, str]:

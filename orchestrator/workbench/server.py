@@ -124,8 +124,10 @@ class Workbench:
     async def start(self, request: Request) -> Response:
         """Start a command."""
         asked = await self._asked(request)
-        words = command_line(self.session, asked.get("command"), asked.get("inputs"), asked.get("options", {}))
-        return JSONResponse(self.jobs.start(words[0], words).as_plain(), 201)
+        inputs, options = asked.get("inputs"), asked.get("options", {})
+        words = command_line(self.session, asked.get("command"), inputs, options)
+        job = self.jobs.start(words[0], words, {"inputs": inputs, "options": options})
+        return JSONResponse(job.as_plain(), 201)
 
     async def stop(self, request: Request) -> Response:
         """Stop a job."""

@@ -64,7 +64,7 @@ def test_one_that_was_not_found_is_in_the_corrected_model_with_its_own_grade(ask
     assert grades[RIPPLE] == ("possible", True)
     assert grades[PLAY] == ("certain", True)
     library = diagnosis_found(asked).library
-    assert {label for label, has in library.items() if has} == {RIPPLE, PLAY, FRICTION}
+    assert {label for label, one in library.items() if one.in_model} == {RIPPLE, PLAY, FRICTION}
     assert diagnosis_found(searched).library.keys() == library.keys()
     (tmp_path / "corrected.toml").write_text(format_corrected_model(MODEL, asked))
     size = read_model(tmp_path / "corrected.toml").parameters["effects.torque_ripple.amplitude"].value
@@ -90,7 +90,7 @@ def test_effects_of_the_model_file_that_are_not_asked_for_are_left_out(record) -
     assert found.model.parameters["effects.coulomb_friction.motor.torque"].value == 0.8
     assert any("as asked: backlash in the shaft" in note for note in found.notes)
     library = diagnosis_found(found).library
-    assert (library[FRICTION], library[PLAY]) == (True, False)
+    assert (library[FRICTION].in_model, library[PLAY].in_model) == (True, False)
 
 
 def test_an_effect_that_the_record_speaks_against_ends_at_none() -> None:

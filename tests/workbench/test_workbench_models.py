@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import InputError
 from orchestrator.records.model_file import read_model
 from orchestrator.workbench.model_fields import model_fields, model_text
 
@@ -76,18 +75,3 @@ def test_a_change_is_the_users_and_the_rest_keeps_its_words(base: Path, tmp_path
     assert (fields["k"]["value"], fields["k"]["source"]) == (500.0, "yours")
     assert (fields["b_l"]["uncertainty"], fields["b_l"]["source"]) == (0.1, "yours")
     assert (fields["J_m"]["source"], fields["i"]["source"]) == ("assumed", "from the record")
-
-
-def test_effects_are_ticked_off_by_their_labels(base: Path, tmp_path: Path) -> None:
-    effects = [one["label"] for one in model_fields(base)["effects"]]
-    assert effects == ["backlash@shaft", "coulomb_friction@motor"]
-    path = again(tmp_path, model_text(base, {"without": ["coulomb_friction@motor"]}))
-    model = read_model(path)
-    assert [one["label"] for one in model_fields(path)["effects"]] == ["backlash@shaft"]
-    assert model.parameters["effects.coulomb_friction.motor.torque"].value == 0.0
-    assert model.parameters["alpha"].value == 0.006
-
-
-def test_an_effect_that_is_unknown_is_refused(base: Path) -> None:
-    with pytest.raises(InputError, match="without"):
-        model_text(base, {"without": "backlash@shaft"})

@@ -205,6 +205,9 @@ def test_uploads_are_never_shown_as_pages(served: Served) -> None:
         ({"command": "inspect", "inputs": ["files/log.csv"], "options": {"resample": "any"}}, "resample"),
         ({"command": "inspect", "inputs": ["files/log.csv"], "options": {"model": "/etc/passwd"}}, "file"),
         ({"command": "inspect", "inputs": ["files/log.csv"], "options": []}, "options"),
+        ({"command": "diagnose", "inputs": ["files/log.csv"], "options": {"effects": "backlash@shaft"}}, "effects"),
+        ({"command": "diagnose", "inputs": ["files/log.csv"], "options": {"effects": ["a@b\n--trust"]}}, "effects"),
+        ({"command": "diagnose", "inputs": ["files/log.csv"], "options": {"effects": ["backlash", 7]}}, "effects"),
         ([], "object"),
     ],
 )
@@ -236,7 +239,6 @@ def test_models_say_what_is_wrong_with_them(served: Served) -> None:
         ({"columns": {"u": {"unit": "furlong"}}}, "unit"),
         ({"columns": {"w": {"unit": "s"}}}, "must be one of"),
         ({"columns": 3}, "columns"),
-        ({"without": ["nothing@here"]}, "without"),
         ({"base": "../../etc/passwd"}, "file"),
         ({"name": "../x.toml"}, "name"),
     ]:

@@ -11,6 +11,7 @@ from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit, ValueEstimate
 from orchestrator.diagnosis.selection.outcome import Dependence, SearchResult
 from orchestrator.diagnosis.settings import ReportSettings
+from orchestrator.effects.words import effect_words
 from orchestrator.shared.results.diagnose import (
     AnalysisFound,
     DependenceFound,
@@ -18,6 +19,7 @@ from orchestrator.shared.results.diagnose import (
     EffectFound,
     ExplainedFound,
     LearnedFound,
+    LibraryFound,
     MissingTorqueFound,
     NuisanceFound,
     ParameterFound,
@@ -75,14 +77,14 @@ def steps_found(search: SearchResult) -> tuple[StepFound, ...]:
     )
 
 
-def library_found(search: SearchResult, more: Sequence[str] = ()) -> dict[str, bool]:
-    """Return the label of each effect that the records can show, and whether the corrected model has it.
+def library_found(search: SearchResult, more: Sequence[str] = ()) -> dict[str, LibraryFound]:
+    """Return by label each effect that the records can show, and whether the corrected model has it.
 
     Args:
         more: labels that it has besides those of the search.
     """
     has = {*more, *search.final.labels}
-    return {label: label in has for label in [*more, *search.problem.effects]}
+    return {label: LibraryFound(effect_words(label), label in has) for label in [*more, *search.problem.effects]}
 
 
 def misfit_found(test: TestMisfit, report: ReportSettings) -> TestFound:

@@ -5,7 +5,14 @@ from typing import Any, Literal
 import msgspec
 
 from orchestrator.shared.results import ResultData, TrustFound
-from orchestrator.shared.results.diagnose import DependenceFound, EffectFound, ParameterFound, StepFound, TestFound
+from orchestrator.shared.results.diagnose import (
+    DependenceFound,
+    EffectFound,
+    LibraryFound,
+    ParameterFound,
+    StepFound,
+    TestFound,
+)
 
 
 class FmuRemainingFound(msgspec.Struct, frozen=True):
@@ -50,7 +57,7 @@ class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
     candidates: tuple[StepFound, ...] = ()
-    library: dict[str, bool] = msgspec.field(default_factory=dict)
+    library: dict[str, LibraryFound] = msgspec.field(default_factory=dict)
     model: str | None = None
     delivery: tuple[DeliveredFound, ...] = ()
     step_cost: float | None = None

@@ -188,6 +188,13 @@ class StepFound(msgspec.Struct, frozen=True):
     tried: tuple[TriedFound, ...]
 
 
+class LibraryFound(msgspec.Struct, frozen=True):
+    """An effect that the record can show, in words, and whether the corrected model has it."""
+
+    words: str
+    in_model: bool
+
+
 class DifferenceFound(msgspec.Struct, frozen=True):
     """The corrected FMU against the compiled equations."""
 
@@ -198,7 +205,7 @@ class DifferenceFound(msgspec.Struct, frozen=True):
 class DiagnoseFound(ResultData, frozen=True, kw_only=True):
     """``diagnose``: graded effects, the corrected model, what is left, and how it was found.
 
-    ``library``: label of each effect that the record can show -> whether the corrected model has it.
+    ``library``: by label (``name@site``) each effect that the record can show.
     """
 
     schema_version: int = 3
@@ -217,7 +224,7 @@ class DiagnoseFound(ResultData, frozen=True, kw_only=True):
     notes: tuple[str, ...] = ()
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
     candidates: tuple[StepFound, ...] = ()
-    library: dict[str, bool] = msgspec.field(default_factory=dict)
+    library: dict[str, LibraryFound] = msgspec.field(default_factory=dict)
     cosimulation: DifferenceFound = DifferenceFound()
     live: LiveFound | None = None
     angle_unit: str = "rad"

@@ -1,9 +1,8 @@
 /* global Units */
-import { get, post } from "./api.js";
 import { check, digits, fill, make, plain } from "./dom.js";
 import { inputs, needLog, reading, trustTag } from "./gap.js";
 import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
-import { choices, choose, start } from "./state.js";
+import { choices, choose, jobOf, start } from "./state.js";
 
 const GRADES = { certain: "good", likely: "good", possible: "warn" };
 
@@ -19,12 +18,15 @@ export function build(panel, go) {
 
   async function show(job, place) {
     const found = await resultOf(job);
-    if (!found) return;
+    const from = jobOf(choices.before?.[job.name]), earlier = from ? await resultOf(from) : null;
+    const back = earlier ? action(`Back to ${from.name}`, said, () => view.show(from.name)) : null;
+    if (!found) { fill(place, earlier ? refit(from, earlier) : null, back); return; }
     fill(place,
       make("p", { class: "answer" }, `Verdict: ${found.verdict} `, trustTag(found.trust)),
       (found.trust?.reasons ?? []).map((reason) => make("p", { class: "note" }, plain(reason))),
       found.effects?.length ? effects(found) : make("p", {}, "No effect is named."),
-      job.files.includes("corrected.toml") ? await refit(job) : null,
+      ...misfits(found, earlier),
+      refit(job, found), back,
       (found.notes ?? []).length ? make("div", {}, make("h3", {}, "To know"), found.notes.map((text) => make("p", {}, plain(text)))) : null);
   }
 
@@ -40,21 +42,42 @@ export function build(panel, go) {
         make("td", { "data-label": "size, 95 %" }, Object.entries(one.parameters).map(size).join("; ")), make("td", { "data-label": "not told apart from" }, (one.family ?? []).map((name) => name.replaceAll("_", " ")).join(", ") || "none"))))));
   }
 
-  // The corrected model with some of its effects ticked off, re-fitted by `diagnose --no-search`.
-  async function refit(job) {
-    const base = `results/${job.name}/corrected.toml`;
-    const model = await get(`model?file=${encodeURIComponent(base)}`);
-    const off = new Set();
-    if (!model.effects.length) return null;
+  // Rms of free runs on test data, beside that of the model before effects were ticked.
+  function misfits(found, earlier) {
+    const rows = found.test.flatMap((test, n) => Object.entries(test.misfit).map(([signal, one]) => {
+      const { factor, name } = Units.shown(one.unit, found.angle_unit);
+      const before = earlier?.test[n]?.misfit[signal]?.final;
+      const cells = [one.nominal, one.parameters, ...(earlier ? [before] : []), one.final, one.noise];
+      return [signal, ...cells.map((value) => (value === null || value === undefined ? "none" : `${digits(factor * value)} ${name}`))];
+    }));
+    const heads = ["signal", "as given", "re-fitted", ...(earlier ? ["before"] : []), "with effects", "noise"];
+    return rows.length ? [make("h3", {}, "Misfit on test data (rms)"), make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Misfit on test data" }, make("table", { class: "stack" },
+      make("thead", {}, make("tr", {}, heads.map((text) => make("th", { scope: "col" }, text)))),
+      make("tbody", {}, rows.map((row) => make("tr", {}, row.map((text, n) => make("td", { "data-label": n ? heads[n] : null }, text)))))))] : [];
+  }
+
+  // The model fitted again by `diagnose --effects`, with exactly the effects that are ticked.
+  function refit(job, found) {
+    const labels = Object.keys(found.library ?? {}), on = new Set(labels.filter((label) => found.library[label].in_model));
+    if (!labels.length || !job.asked.inputs) return null;
+    const last = found.candidates?.at(-1);
+    const gains = new Map(last && !last.taken ? last.tried.map((one) => [one.effect, one.gain]) : []);
+    const box = (label) => {
+      const gain = gains.get(label), takes = gain > 0 ? ` (${digits(100 * gain, 2)} % of what is left)` : "";
+      return check(found.library[label].words + takes, on.has(label), (event) => {
+        if (event.target.checked) on.add(label);
+        else on.delete(label);
+      });
+    };
+    const lacks = labels.filter((label) => !on.has(label));
     return make("fieldset", { class: "card" }, make("legend", {}, "Effects in the model"),
-      make("div", { class: "row" }, model.effects.map((effect) => check(effect.label.replaceAll("_", " "), true, (event) => {
-        if (event.target.checked) off.delete(effect.label);
-        else off.add(effect.label);
-      }))),
+      make("div", { class: "ticks" }, on.size ? labels.filter((label) => on.has(label)).map(box) : make("span", { class: "note" }, "none")),
+      make("details", {}, make("summary", {}, `Effects that it lacks (${lacks.length})`), make("div", { class: "ticks" }, lacks.map(box))),
       action("Fit the model again with what is ticked", said, async () => {
-        needLog();
-        const made = await post("models", { base, name: "refit.toml", without: [...off] });
-        view.show(await start("diagnose", [choices.log], { ...options(), model: made.file, no_search: true }));
+        const { no_search, time_limit, ...rest } = job.asked.options;
+        const name = await start("diagnose", job.asked.inputs, { ...rest, effects: [...on] });
+        choose({ before: { ...choices.before, [name]: job.name } });
+        view.show(name);
       }));
   }
 
