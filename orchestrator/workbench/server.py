@@ -296,13 +296,7 @@ def serve(
     Raises:
         InputError: the port is taken.
     """
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(("127.0.0.1", port))
-    except OSError as error:
-        listener.close()
-        raise InputError(f"`port` must be free, but {port} is not: {error.strerror}", "port") from None
+    listener = listen(port)
     token, bound = secrets.token_urlsafe(24), listener.getsockname()[1]
     app = Guard(application(session, settings or WorkbenchSettings()), token, bound)
     config = uvicorn.Config(
@@ -310,10 +304,28 @@ def serve(
         lifespan="on", ws="none", limit_concurrency=200, timeout_graceful_shutdown=2,
     )  # fmt: skip
     server = uvicorn.Server(config)
-    listener.listen()
     tell(f"http://127.0.0.1:{bound}/{token}/")
     with listener:
         asyncio.run(server.serve(sockets=[listener]))
 
 
-__all__ = ["Workbench", "application", "serve"]
+def listen(port: int) -> socket.socket:
+    """Return a socket that takes connections of this machine alone.
+
+    It names its protocol: asyncio sets TCP_NODELAY for sockets that do, and without it each answer waits 40 ms.
+
+    Raises:
+        InputError: the port is taken.
+    """
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(("127.0.0.1", port))
+        listener.listen()
+    except OSError as error:
+        listener.close()
+        raise InputError(f"`port` must be free, but {port} is not: {error.strerror}", "port") from None
+    return listener
+
+
+__all__ = ["Workbench", "application", "listen", "serve"]

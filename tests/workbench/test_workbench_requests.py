@@ -1,5 +1,6 @@
 """Requests that are hostile, or wrong: refused in a line, and nothing of them stays."""
 
+import asyncio
 import http.client
 import os
 import socket
@@ -126,8 +127,6 @@ def test_a_log_of_two_gigabytes_is_refused_before_it_is_sent(served: Served) -> 
 
 def test_a_stream_without_end_is_cut_off(tmp_path: Path) -> None:
     """Chunks without a stated length are counted; what is too large does not stay."""
-    import asyncio
-
     from orchestrator.workbench.session import open_session
     from orchestrator.workbench.settings import WorkbenchSettings
     from orchestrator.workbench.uploads import UploadTooLargeError, save_upload
@@ -148,6 +147,26 @@ def test_a_stream_without_end_is_cut_off(tmp_path: Path) -> None:
     full = WorkbenchSettings(largest_session=5)
     with pytest.raises(UploadTooLargeError):
         asyncio.run(save_upload(session, "more.csv", chunks(), 6, full))
+
+
+def test_answers_do_not_wait_for_each_other() -> None:
+    """Headers and body are two packets: held back until the first is acknowledged, each answer takes 40 ms more."""
+    from orchestrator.workbench.server import listen
+
+    async def held_back() -> int:
+        seen: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+
+        async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            accepted = writer.get_extra_info("socket")
+            seen.set_result(accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+            writer.close()
+
+        with listen(0) as listener:
+            async with await asyncio.start_server(answer, sock=listener):
+                with socket.create_connection(listener.getsockname()):
+                    return await seen
+
+    assert asyncio.run(held_back()) == 1
 
 
 def test_a_connection_that_breaks_off_leaves_nothing(served: Served) -> None:
