@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.led_axes import model_of
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import ModelPoint
@@ -20,6 +21,7 @@ from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, Reco
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model, read_model
 from tests.support.axis_record import MODEL, axis_record
+from tests.support.led_axis import led_axis
 
 SETTINGS = DiagnosisSettings()
 FRICTION = "effects.coulomb_friction.motor.torque"
@@ -164,3 +166,25 @@ def test_a_test_part_at_rest_says_nothing_of_an_effect(model: Model) -> None:
     assert found.effects
     assert all(np.isnan(one.evidence.motion_share) and "confirmed" in one.lowered_by for one in found.effects)
     assert "on test data" not in " ".join(sureness(one) + words_on_test_data(one) for one in found.effects)
+
+
+@pytest.mark.parametrize(("hidden", "seed"), [("by hand", 7021), ("one push", 7611)])
+def test_an_axis_that_is_pushed_has_no_limit(hidden: str, seed: int) -> None:
+    case = led_axis(seed, hidden)
+    (found,) = [one for one in diagnose(case.record, model_of(case)).effects if one.name == "torque_saturation"]
+    assert (found.grade, "little left" in found.lowered_by) == (Grade.POSSIBLE, True)
+    assert found.evidence.left_where_it_acts > SETTINGS.grades.most_left
+
+
+def test_a_limit_that_is_reached_in_one_stretch_is_not_told_from_a_push() -> None:
+    case = led_axis(7600, "one push")
+    (found,) = diagnose(case.record, model_of(case)).effects
+    assert (found.grade, found.lowered_by) == (Grade.LIKELY, ("alone of its kind",))
+    assert found.evidence.family == ("outside_torque@motor",)
+
+
+def test_a_limit_that_is_reached_at_times_is_certain() -> None:
+    case = led_axis(7613, "saturation")
+    found = {one.name: one for one in diagnose(case.record, model_of(case)).effects}["torque_saturation"]
+    assert found.grade is Grade.CERTAIN
+    assert found.parameters["limit"].value == pytest.approx(case.truth["torque_saturation"], rel=0.02)

@@ -27,7 +27,7 @@ BROKEN = {
     "possible size": ({"possible": False}, {}),
     "confirmed": ({"motion_share": 0.02}, {}),
     "not refuted": ({"motion_share": -0.3}, {}),
-    "timing follows": ({"kind": "timing"}, {"left": 0.3}),
+    "little left": ({"kind": "timing"}, {"left": 0.3}),
 }
 
 

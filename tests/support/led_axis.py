@@ -17,10 +17,12 @@ Array = NDArray[np.float64]
 
 STEP, ROWS = 1e-3, 12000
 HIDDEN = ("none", "friction", "gravity", "friction and gravity", "drag", "by hand", "growing friction", "ripple")
+FURTHER = ("saturation", "one push")  # not in the round of seeds
 CYCLES = 17  # of the ripple, a turn
 RIGHT: dict[str, set[str]] = {
     "friction": {"coulomb_friction"}, "gravity": {"gravity_load"}, "drag": {"quadratic_drag"},
     "friction and gravity": {"coulomb_friction", "gravity_load"}, "ripple": {"torque_ripple"},
+    "saturation": {"torque_saturation"},
 }  # fmt: skip
 
 
@@ -29,7 +31,7 @@ class LedAxis:
     """A case: what is hidden, the record, the values that a data sheet states, and the true ones.
 
     Attributes:
-        hidden: one of ``HIDDEN``.
+        hidden: one of ``HIDDEN`` or ``FURTHER``.
         record: its torque and position.
         stated: inertia and viscous friction, up to 40 and 60 % off.
         right: names of the effects that are right; empty: none is.
@@ -44,30 +46,33 @@ class LedAxis:
 
 
 @njit
-def led(asked, speed, noise, push, law, gains, bristle, count, finer):
+def led(asked, speed, noise, push, law, gains, bristle, count, finer, limit=np.inf):
     """Return measured angles and torques of steps of 1 ms.
 
     ``asked`` [rad] and ``speed`` [rad/s] are led to; ``noise`` is on the torque that is measured, ``push`` [N.m] acts
     on the axis. ``law``: inertia, viscous, dry, gravity, drag, ripple; ``gains`` are those on position, speed and the
     integral of the position. Friction builds up over ``bristle``, the encoder counts ``count`` [rad]; a step has
-    ``finer`` parts.
+    ``finer`` parts. The drive delivers up to ``limit`` [N.m]; beyond it the integral waits.
     """
     inertia, viscous, dry, gravity, drag, ripple = law
     angle, rate, bent, integral, filtered, before = asked[0], 0.0, 0.0, 0.0, 0.0, asked[0]
     angles, torques = np.empty(asked.size), np.empty(asked.size)
+    torque = 0.0
     h = STEP / finer
     for n in range(asked.size):
         seen = np.round(angle / count) * count
         filtered += 0.4 * ((seen - before) / STEP - filtered)
         before = seen
-        integral += (asked[n] - seen) * STEP
+        if abs(torque) < limit:
+            integral += (asked[n] - seen) * STEP
         torque = gains[0] * (asked[n] - seen) + gains[1] * (speed[n] - filtered) + gains[2] * integral
         angles[n], torques[n] = seen, torque + noise[n]
+        delivered = min(max(torque, -limit), limit)
         for _ in range(finer):
             bent += h * (rate - abs(rate) * bent / bristle)
             resists = viscous * rate + dry * bent / bristle + drag * rate * abs(rate)
             resists += gravity * np.sin(angle + 0.3) + ripple * np.sin(CYCLES * angle)
-            rate += h * (torque - resists + push[n]) / inertia
+            rate += h * (delivered - resists + push[n]) / inertia
             angle += h * rate
     return angles, torques
 
@@ -86,9 +91,11 @@ def _path(rng: np.random.Generator, time: Array) -> tuple[Array, Array]:
     return STEP * np.cumsum(speed), speed
 
 
-def led_axis(seed: int) -> LedAxis:
-    """Return a case; what is hidden goes round with the seed, its size from half to sixteen times the other torques."""
-    rng, hidden = np.random.default_rng([seed, 77]), HIDDEN[seed % len(HIDDEN)]
+def led_axis(seed: int, hidden: str = "") -> LedAxis:
+    """Return a case of a size from half to sixteen times the other torques; "": what is hidden goes round with the
+    seed.
+    """
+    rng, hidden = np.random.default_rng([seed, 77]), hidden or HIDDEN[seed % len(HIDDEN)]
     time = STEP * np.arange(ROWS)
     inertia, loop = 10.0 ** rng.uniform(-5.0, 0.0), 2.0 * np.pi * rng.uniform(3.0, 12.0)
     position, speed = _path(rng, time)
@@ -105,19 +112,26 @@ def led_axis(seed: int) -> LedAxis:
         for _ in range(6):
             middle, width = rng.uniform(0.0, time[-1]), rng.uniform(0.1, 0.5)
             push += size * rng.normal() * np.exp(-0.5 * ((time - middle) / width) ** 2)
+    if hidden == "one push":
+        push = size * np.exp(-0.5 * ((time - rng.uniform(0.0, time[-1])) / rng.uniform(0.1, 1.0)) ** 2)
     if hidden == "growing friction":
         push -= size * np.sign(speed) * (time / time[-1]) ** 2
     share = float(rng.choice([0.003, 0.02, 0.08]))
-    noise = share * math.hypot(plain, size if hidden != "none" else 0.0) * rng.standard_normal(ROWS)
+    noise = share * math.hypot(plain, size if hidden not in ("none", "saturation") else 0.0) * rng.standard_normal(ROWS)
     bristle = max(1e-5, 1e-3 * float(np.std(position)))
     gains = (inertia * loop**2, 1.6 * loop * inertia, 0.2 * inertia * loop**3)
     count = 2.0 * np.pi / float(rng.choice([4096, 65536]))
     quick = max(3.0 * math.sqrt(dry / bristle / inertia), 3.0 * turns / bristle)
     finer = int(min(400, max(20, math.ceil(STEP * quick))))
     law = (inertia, viscous, dry, gravity, drag, ripple)
-    angles, torques = led(position, speed, noise, push, law, gains, bristle, count, finer)
+    limit = math.inf
+    given = (position, speed, noise, push, law, gains, bristle, count, finer)
+    angles, torques = led(*given)
+    if hidden == "saturation":
+        limit = float(np.quantile(np.abs(torques - noise), rng.uniform(0.9, 0.99)))
+        angles, torques = led(*given, limit)
     record = record_from_columns({"time": time, "u": torques, "theta_m": angles}, f"axis-{seed}")
     stated = (inertia * rng.uniform(0.7, 1.4), viscous * rng.uniform(0.6, 1.6))
     names = ("J", "b", "coulomb_friction", "gravity_load", "quadratic_drag", "torque_ripple")
-    truth = dict(zip(names, law, strict=True)) | {"noise": share, "size": size / plain}
+    truth = dict(zip(names, law, strict=True)) | {"noise": share, "size": size / plain, "torque_saturation": limit}
     return LedAxis(hidden, record, stated, RIGHT.get(hidden, set()), truth)

@@ -1,6 +1,6 @@
 """Evidence for the effects of a final model: what leaves with each, and what the record says of the whole model."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,9 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 Array = NDArray[np.float64]
 FREE_SPREAD = 30.0  # of a parameter whose prior is off
 ACTIVE = 0.5  # of the largest weight, from which a row counts whole
+ACTS = 0.1  # of its largest torque, from which an effect acts
+LOUDER = 2.0  # power over that elsewhere up to which it may be chance: fifty rows differ so once in a hundred times
+ONE_STRETCH = 0.95  # share of a torque's power that is in one stretch of a record, from which the rest is noise
 ONE_WAY = 0.05  # share of a torque's power that varies, up to which it is a constant: one row of eighty the other way
 
 
@@ -38,7 +41,7 @@ def effect_evidence(result: SearchResult) -> list[EffectEvidence]:
     return [_effect_evidence(result, label, *missing) for label in result.final.labels]
 
 
-def _effect_evidence(result: SearchResult, label: str, base: float, left: float) -> EffectEvidence:
+def _effect_evidence(result: SearchResult, label: str, base: float, remains: float) -> EffectEvidence:
     problem, final, review = result.problem, result.final, result.reviews[label]
     effect = problem.effects[label]
     step = next((step for step in result.steps if step.taken == label), review)
@@ -50,27 +53,60 @@ def _effect_evidence(result: SearchResult, label: str, base: float, left: float)
     family = review.family
     if kinds == {"friction"} and acts_one_way(problem, final.point, label):
         kinds, family = {*kinds, "constant"}, (*family, f"constant_torque@{effect.site}")
+    left_there, once = where_it_acts(problem, final.point, label)
+    if effect.takes_drive and effect.kind == "limit" and once:
+        kinds, family = {*kinds, "disturbance"}, (*family, "outside_torque@motor")
     return EffectEvidence(
         label, effect.kind, max(leaving.comparison.t, entry.comparison.t),
-        max(leaving.comparison.gain, entry.comparison.gain), min(max(without - left, before - after) / base, 1.0),
+        max(leaving.comparison.gain, entry.comparison.gain), min(max(without - remains, before - after) / base, 1.0),
         size_over_error(problem, final, label), family, len(kinds) > 1,
         problem.is_possible(label, final.point),
         torque=missing_torque(problem, final.point.without_effects([label]), final.point), asked=label in result.asked,
+        left_where_it_acts=left_there,
     )  # fmt: skip
 
 
 def acts_one_way(problem: FitProblem, point: ModelPoint, label: str) -> bool:
     """Tell whether an effect is a constant torque to the records: dry friction of a body that turns one way alone."""
     square = variance = 0.0
-    points = (problem.record_points(one) for one in (point, point.without_effects([label])))
-    for model, *seen in zip(problem.models, *points, strict=True):
-        plain = band_only(model, problem.settings)
-        with_it, without = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen))
-        for torque, active in zip(with_it - without, plain.active, strict=True):
+    for _, own, actives in _torques_within_band(problem, point, label):
+        for torque, active in zip(own, actives, strict=True):
             moving = torque[active > ACTIVE * active.max()]
             square += float(moving @ moving)
             variance += float(moving.size * np.var(moving)) if moving.size else 0.0
     return variance < ONE_WAY * square
+
+
+def where_it_acts(problem: FitProblem, point: ModelPoint, label: str) -> tuple[float, bool]:
+    """Return what a model leaves where an effect acts, and whether that is one stretch of one record alone.
+
+    A law that is right leaves no more where it acts than elsewhere; one that stands for an unknown torque does.
+
+    Returns:
+        What is left over the effect's own torque there (rms), 0.0 where it is no more than elsewhere; one stretch.
+    """
+    here, elsewhere, own_here, stretches = (np.zeros(0),) * 4
+    for left, own, _ in _torques_within_band(problem, point, label):
+        body = int(np.argmax(np.sum(own**2, axis=1)))
+        acts = np.abs(own[body]) > ACTS * np.abs(own[body]).max()
+        here, elsewhere = np.append(here, left[body][acts]), np.append(elsewhere, left[body][~acts])
+        own_here = np.append(own_here, own[body][acts])
+        begins = np.cumsum(np.diff(acts, prepend=False) & acts)
+        stretches = np.append(stretches, np.bincount(begins[acts], own[body][acts] ** 2))
+    if not here.size or not elsewhere.size:
+        return 0.0, False
+    excess = np.mean(here**2) - LOUDER * np.mean(elsewhere**2)
+    share = float(np.sqrt(max(excess, 0.0) / np.mean(own_here**2)))
+    return share, bool(stretches.max() > ONE_STRETCH * stretches.sum())
+
+
+def _torques_within_band(problem: FitProblem, point: ModelPoint, label: str) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield of each record what a model leaves, an effect's own torque, and weights, each (channels, rows)."""
+    points = (problem.record_points(one) for one in (point, point.without_effects([label])))
+    for model, *seen in zip(problem.models, *points, strict=True):
+        plain = band_only(model, problem.settings)
+        left, without = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen))
+        yield left, left - without, plain.active
 
 
 def missing_torque(problem: FitProblem, point: ModelPoint, other: ModelPoint | None = None) -> float:

@@ -60,6 +60,13 @@ def _is_confirmed(effect: EffectEvidence, s: GradeSettings) -> bool:
     return speaks and not _is_contradicted(effect, s)
 
 
+def _left(effect: EffectEvidence, record: RecordEvidence) -> float:
+    """Return what is left of the torque that a delay makes late, or at the ceiling of a limit, which must be flat."""
+    if effect.kind == "timing":
+        return record.left
+    return effect.left_where_it_acts if effect.kind == "limit" else 0.0
+
+
 GRADE_RULES: tuple[GradeRule, ...] = (
     GradeRule(
         "surely better", Grade.LIKELY, lambda e, r, s: e.t >= s.grades.certain_t, "paired gain over its error",
@@ -121,9 +128,9 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "test data are predicted better without it",
     ),
     GradeRule(
-        "timing follows", Grade.POSSIBLE, lambda e, r, s: e.kind != "timing" or r.left < s.grades.timing_left,
-        "share of the torque that is left", "grades.timing_left",
-        "most of the misfit remains, and a delay then fits whatever is missing",
+        "little left", Grade.POSSIBLE, lambda e, r, s: _left(e, r) < s.grades.most_left,
+        "share of the torque that is left; of a limit: of its own, where it acts", "grades.most_left",
+        "too much of the misfit remains, and a delay or a limit then fits whatever is missing",
     ),
 )  # fmt: skip
 

@@ -141,6 +141,7 @@ class EffectEvidence:
         runs_hold: free runs of the final model stay by the test data; else they drift, and the torque decides.
         torque: power of its own torque, in shares of what the nominal model misses.
         asked: it was asked for, and stays in the model whatever its grade.
+        left_where_it_acts: what is left there over its own torque (rms), if it is more than elsewhere.
     """
 
     label: str
@@ -157,6 +158,7 @@ class EffectEvidence:
     runs_hold: bool = True
     torque: float = 0.0
     asked: bool = False
+    left_where_it_acts: float = 0.0
 
 
 @dataclass(frozen=True)
