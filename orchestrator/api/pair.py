@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from orchestrator.api.arguments import choose_experiment, not_negative
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, table
-from orchestrator.building.build import ensure_built
+from orchestrator.building.fastest import ensure_fastest
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import Value
 from orchestrator.paired import pair
@@ -198,7 +198,7 @@ def run_pair(
     chosen = with_settings(choose_experiment(experiment, backlash_model), noise=noise)
     given = {"alpha": alpha, "noise": noise, "experiment": chosen.name, "backlash_model": chosen.backlash_model}
     given |= {"start": dict(start)} if start else {}
-    fmus = ensure_built(FMUS)
+    fmus = ensure_fastest(FMUS).paths
     if time_limit is None:
         run = pair.run_pair(chosen, fmus, alpha, seed, start)
     else:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import orchestrator as oc
 from orchestrator.cli import main
 from orchestrator.errors import ChildError, SimulationError
 from orchestrator.paired.apart import run_pair_within
@@ -60,6 +61,13 @@ def test_estimate_of_a_pair(fmus):
     outside = run_pair(Experiment(), fmus, alpha=0.3)
     assert outside.estimate is None
     assert "outside 0.002 to 0.1 rad" in outside.no_estimate
+
+
+def test_the_fmus_that_a_pair_chooses_give_the_bits_of_the_python_ones(fmus):
+    chosen, python = oc.run_pair(0.024, noise=1e-4, seed=3), replace(Experiment(), encoder_noise=1e-4)
+    expected = run_pair(python, fmus, 0.024, 3)
+    assert chosen.run.total == expected.total
+    assert all(np.array_equal(chosen.run.machine[name], expected.machine[name]) for name in chosen.run.machine.signals)
 
 
 def test_a_run_within_a_time_is_the_run_or_says_why_not(fmus, monkeypatch):
