@@ -23,12 +23,14 @@ class CheckOptions:
     Attributes:
         archive, limits: what the archive and the running FMU may use.
         trust: run the FMU without the kernel's walls around it; limits remain.
+        probes: names of the dynamic checks to carry out (default: all).
     """
 
     static: bool = False
     archive: ArchiveLimits = field(default_factory=ArchiveLimits)
     limits: Limits = field(default_factory=lambda: Limits(total=TOTAL))
     trust: bool = False
+    probes: tuple[str, ...] = ()
 
 
 def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
@@ -47,7 +49,7 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
             assert result.description is not None
             assert result.files is not None
             probed, executions = check_dynamic(
-                result.description, result.files, result.references, options.limits, not options.trust
+                result.description, result.files, result.references, options.limits, not options.trust, options.probes
             )
             findings += probed
         elif not options.static and not has_errors(findings):

@@ -95,11 +95,15 @@ def _obstacle(d: Description, interface: Interface, files: FmuFiles) -> str:
 
 
 def check_dynamic(
-    d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits, walls: bool = True
-) -> tuple[list[Finding], tuple[Execution, ...]]:
+    d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits, walls: bool = True,
+    chosen: tuple[str, ...] = (),
+) -> tuple[list[Finding], tuple[Execution, ...]]:  # fmt: skip
     """Run each interface of the FMU in a child process and report what it did.
 
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
+
+    Args:
+        chosen: names of the probes to carry out (default: all).
 
     Returns:
         What it did wrong, and which probes were carried out.
@@ -117,7 +121,7 @@ def check_dynamic(
         except OSError as error:
             raise OutputError(f"the FMU must be unpacked to {scratch.path}, but cannot be: {error.strerror}") from None
         for interface in d.interfaces:
-            names = PROBES[d.dialect.version]
+            names = tuple(name for name in PROBES[d.dialect.version] if not chosen or name in chosen)
             reason = _obstacle(d, interface, files)
             if reason:
                 executions.append(Execution(interface.kind, dict.fromkeys(("load", *names), reason)))

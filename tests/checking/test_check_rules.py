@@ -1,6 +1,7 @@
 """Rules one by one, where no whole FMU is needed."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -196,6 +197,8 @@ def test_an_outcome_per_rule_says_what_was_run(tmp_path: Path) -> None:
     not_run = {o.rule for o in static.outcomes if o.outcome == "not run"}
     assert not_run == {o.rule for o in static.outcomes if RULES[o.rule].stage not in static.stages}
     assert {o.reason for o in static.outcomes if o.outcome == "not run"} == {"nothing is executed, as was asked"}
+    short = check_fmu(tmp_path / "good.fmu", replace(QUICK, probes=("life cycle", "misuse")))
+    assert [e.stages_run for e in short.executions] == [("load", "life cycle", "misuse", "run", "afterwards")]
 
 
 NEWER = 'previous="0" clocks="0" intermediateUpdate="true" intervalVariability="constant" maxSize="1" priority="1"'

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from orchestrator.api.records import as_record
-from orchestrator.diagnosis.report.corrected import format_corrected_model
+from orchestrator.diagnosis.report.corrected import format_corrected_model, start_values
+from orchestrator.plants.known.drivetrain import PLANT
 from orchestrator.records.model_file import Model, read_model
 
 ROWS = 400
@@ -95,3 +96,11 @@ def test_a_model_of_exact_values_stays_exact(tmp_path: Path) -> None:
     path = tmp_path / "exact.toml"
     path.write_text("[parameters.J_l]\nvalue = 5.6\nuncertainty = 0\n")
     assert not _corrected(read_model(path), tmp_path).uncertain
+
+
+def test_the_corrected_fmu_becomes_the_nominal_model_by_what_either_has() -> None:
+    nominal, final = (PLANT.extend_values([entry.default for entry in PLANT.table]) for _ in range(2))
+    places = [PLANT.index(name) for name in ("alpha", "backlash_model", "J_m", "b_l")]
+    final[places[:3]], nominal[places[2:]] = (0.03, 2.0, 0.7), (0.5, 2.5)
+    assert start_values(PLANT, final) == {"alpha": 0.03, "backlash_model": 3.0, "J_m": 0.7}
+    assert start_values(PLANT, nominal, final) == {"alpha": 0.0, "backlash_model": 2.0, "J_m": 0.5, "b_l": 2.5}

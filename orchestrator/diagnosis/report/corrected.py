@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.building.build import build_variant, ensure_built
-from orchestrator.checking.check import check_fmu
+from orchestrator.building.build import build_variant
+from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.diagnosis.model.drive import shift_signal
 from orchestrator.diagnosis.report.free_run import free_runs, run_parts
 from orchestrator.diagnosis.report.open_test_data import signals_of_test_data
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """The test part, measured and co-simulated with the nominal and the corrected FMU.
+    """The test part, measured and co-simulated with the nominal and the corrected values.
 
     Attributes:
         time: (n,) s.
@@ -68,29 +68,34 @@ def build_corrected(diagnosis: Diagnosis, source: str, directory: Path) -> Path:
 
 
 def check_corrected(path: Path) -> Path:
-    """Return the path of a corrected FMU that passes the check."""
-    report = check_fmu(path)
+    """Return the path of a corrected FMU that passes the check of what its values can break.
+
+    All else is as in the plant's own FMU, which passes the whole check.
+    """
+    report = check_fmu(path, CheckOptions(probes=("life cycle", "reference")))
     if not report.ok:
         raise SimulationError(f"{path.name}: the corrected FMU does not pass `check`: {report.findings[0]}")
     return path
 
 
-def start_values(plant: Plant, p: Array) -> dict[str, float]:
-    """Return the start values that make the plant's FMU the model ``p``: all that differ from its defaults.
+def start_values(plant: Plant, p: Array, built: Array | None = None) -> dict[str, float]:
+    """Return the start values that make an FMU the model ``p``: all that differ from those that it has.
 
     Args:
         p: (parameters,) of the analysis.
+        built: those of the model that the FMU is (default: the plant's own FMU, with its defaults).
     """
     own = plant.fmu_values(p)
+    before = [entry.default for entry in plant.table] if built is None else plant.fmu_values(built)
     return {
         entry.name: float(own[n]) + (1.0 if entry.name in plant.enumerations else 0.0)
         for n, entry in enumerate(plant.table)
-        if own[n] != entry.default
+        if own[n] != before[n]
     }
 
 
 def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
-    """Run the nominal and the corrected FMU, in one process and one system, over the test part.
+    """Run the corrected FMU, with the nominal values and with its own, in one system over the test part.
 
     Each segment starts from the initial state that :func:`free_run` finds for each model.
 
@@ -100,11 +105,10 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     w, plant, settings = diagnosis.workings, diagnosis.model.plant, diagnosis.settings.report
     _, signals, first = signals_of_test_data(w.test_data, w.balances[0])[0]
     step, count = signals.step, signals.channels
-    nominal = ensure_built([plant.name])[plant.name]
     parts = run_parts(first, signals.size, settings)
     length = parts[0].stop - parts[0].start
     models = {"before": w.nominal, "after": w.final}
-    instances = (fmu_instance("before", nominal, start_values(plant, w.nominal)), fmu_instance("after", fmu))
+    instances = (fmu_instance("before", fmu, start_values(plant, w.nominal, w.final)), fmu_instance("after", fmu))
     outputs = plant.encoders[:count]
     record = tuple(f"{model}.{name}" for model in models for name in outputs)
     asked = {model: requests_for_fmu(signals, plant, p) for model, p in models.items()}
