@@ -16,21 +16,21 @@ In all functions: ``u``: requested torque [N.m], delayed and saturated already; 
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .laws import drive, stops, waves
-from .laws import friction as friction_laws
-from .laws.bristles import bent_sign, has_settled, leaving_speed
+from .laws import drive, friction, stops, waves
 from .laws.drive import UNASKED, request_rate
 from .laws.friction import (
-    breakaway,
-    bristle_rate,
-    dependent_friction,
+    BodyFriction,
+    bristle_sign,
+    builds_up,
+    capacity,
     directional_friction,
     quadratic_drag,
     sliding_friction,
+    start_bristle,
 )
 from .laws.stops import end_stop_torque, spring_torque
 from .laws.waves import inertia_at, inertia_torque, periodic
-from .parameter_rows import BIG, TINY, Parameter, field_name, mark_linear
+from .parameter_rows import BIG, TINY, Parameter, field_name, keep_last, mark_linear
 
 PARAMETERS = (
     *mark_linear(
@@ -40,16 +40,14 @@ PARAMETERS = (
     ),
     *drive.INPUT,
     *waves.ripple_rows("Amplitude of the ripple", "Ripple, rad of phase per unit of position", "position"),
-    *friction_laws.coulomb_rows("motor", "Dry friction"),
-    *friction_laws.stribeck_rows("motor", ""),
+    *friction.coulomb_rows("motor", "Dry friction"),
+    *friction.stribeck_rows("motor", ""),
     *drive.load_rows("axis"),
     *waves.gravity_rows("position"),
-    *friction_laws.drag_rows("Drag"),
-    *friction_laws.directional_rows("motor", "Viscous friction, forward minus b"),
+    *friction.drag_rows("Drag"),
+    *friction.directional_rows("motor", "Viscous friction, forward minus b"),
     *drive.encoder_rows("motor", "encoder"),
-    *friction_laws.presliding_rows(
-        "motor", "Distance of friction to build up (0: none)", "Damping of friction building up"
-    ),
+    *friction.presliding_rows("motor", "Distance of friction to build up (0: none)", "Damping of friction building up"),
     *waves.wave_rows("periodic_friction.motor", "N.m", "Part of dry friction that repeats with the position", 1.0),
     *drive.REQUEST,
     *waves.HARMONICS,
@@ -80,29 +78,19 @@ def start(position: float, speed: float, drive: float, p: Parameters) -> State:
         speed: [rad/s].
         drive: torque of the drive [N.m].
     """
-    x = (position, speed, drive, 0.0, UNASKED)
-    if speed == 0.0 or not builds_up(p):
-        return x
-    return (position, speed, drive, reach(x, p) if speed > 0.0 else -reach(x, p), UNASKED)
+    return (position, speed, drive, start_bristle(friction_of(p), speed, position, 0.0), UNASKED)
 
 
-def friction(x: State, p: Parameters) -> float:
-    """Return the magnitude of dry friction [N.m] at the axis's speed and position."""
-    level = sliding_friction(
-        x[1], p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway,
-        p.stribeck_friction_motor_stribeck_speed,
+def _friction_of(p: Parameters) -> BodyFriction:
+    """Return the dry friction of the axis, which no torque of a shaft makes larger."""
+    return BodyFriction(
+        p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway,
+        p.stribeck_friction_motor_stribeck_speed, p.presliding_motor_distance, p.presliding_motor_damping, 0.0,
+        p.periodic_friction_motor_amplitude, p.periodic_friction_motor_cycles_per_rev, p.periodic_friction_motor_phase,
     )  # fmt: skip
-    return dependent(level, x, p)
 
 
-def dependent(level: float, x: State, p: Parameters) -> float:
-    """Return a ``level`` of dry friction [N.m] with what depends on the position."""
-    if p.periodic_friction_motor_amplitude == 0.0:
-        return level
-    return dependent_friction(
-        level, 0.0, 0.0, x[0], p.periodic_friction_motor_amplitude, p.periodic_friction_motor_cycles_per_rev,
-        p.periodic_friction_motor_phase,
-    )  # fmt: skip
+friction_of = keep_last(_friction_of)
 
 
 def filtered(p: Parameters) -> bool:
@@ -164,89 +152,34 @@ def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
         asked = x[4]
         follows = request_rate(x[4], u, p.drive_filter_time_constant, p.rate_limit_rate)
     lag = (asked - x[2]) / p.tau if p.tau > 0.0 else 0.0
-    accelerated = (sliding_torque(x, p, u, T_l) - sign * friction(x, p)) / inertia(x, p)
-    return (x[1], accelerated, lag, 0.0, follows)
-
-
-def breakaway_torque(p: Parameters) -> float:
-    """Return the breakaway torque [N.m] without what depends on the position."""
-    return breakaway(
-        p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway
-    )
-
-
-def capacity(x: State, p: Parameters) -> float:
-    """Return the breakaway torque [N.m] below which an axis that stands still keeps standing."""
-    return dependent(breakaway_torque(p), x, p)
-
-
-def builds_up(p: Parameters) -> bool:
-    """Tell whether friction builds up over a distance."""
-    return p.presliding_motor_distance > 0.0 and breakaway_torque(p) > 0.0
-
-
-def reach(x: State, p: Parameters) -> float:
-    """Return the bending [rad] at which the bristle slides at its speed."""
-    return p.presliding_motor_distance * friction(x, p) / breakaway_torque(p)
-
-
-def falls(p: Parameters) -> bool:
-    """Tell whether friction depends on the speed."""
-    return p.stribeck_friction_motor_coulomb != p.stribeck_friction_motor_breakaway
-
-
-def leaves_sliding(p: Parameters) -> float:
-    """Return the speed [rad/s] below which the bristle of an axis that slides must be followed."""
-    return (
-        leaving_speed(p.presliding_motor_distance, falls(p), p.stribeck_friction_motor_stribeck_speed)
-        if builds_up(p)
-        else 0.0
-    )
+    torque = sliding_torque(x, p, u, T_l) - sign * sliding_friction(friction_of(p), x[1], x[0], 0.0)
+    return (x[1], torque / inertia(x, p), lag, 0.0, follows)
 
 
 def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> State:
     """Return the derivative of ``x``; an axis in mode 0 bends its bristle, or sticks where it has none."""
     if mode != 0:
         return rates(x, float(mode), p, u, T_l)
-    if builds_up(p):
-        far = reach(x, p)
-        bends = bristle_rate(x[3], x[1], far)
-        r = rates(
-            x,
-            bent_sign(x[3], bends, far, breakaway_torque(p) / p.presliding_motor_distance, p.presliding_motor_damping),
-            p,
-            u,
-            T_l,
-        )
-        return (r[0], r[1], r[2], bends, r[4])
-    r = rates(x, 0.0, p, u, T_l)
-    return (0.0, 0.0, r[2], 0.0, r[4])
+    f = friction_of(p)
+    sign, bends = bristle_sign(f, mode, x[3], x[1], x[0], 0.0)
+    r = rates(x, sign, p, u, T_l)
+    return (r[0], r[1], r[2], bends, r[4]) if builds_up(f) else (0.0, 0.0, r[2], 0.0, r[4])
 
 
 def slip_at_rest(x: State, p: Parameters, u: float, T_l: float) -> int:
     """Return the direction (-1 or 1) in which an axis at rest starts to slide, 0 when friction holds it."""
     push = sliding_torque((x[0], 0.0, x[2], x[3], x[4]), p, u, T_l)
-    if push > capacity(x, p):
-        return 1
-    if push < -capacity(x, p):
-        return -1
-    return 0
+    holds = capacity(friction_of(p), x[0], 0.0)
+    return 1 if push > holds else -1 if push < -holds else 0
 
 
 def initial_mode(x: State, p: Parameters, u: float) -> int:
     """Return the direction of sliding (0: none) in which a simulation starts from ``x``, asked for ``u`` [N.m]."""
-    if builds_up(p):
+    if builds_up(friction_of(p)):
         return 0
     if x[1] != 0.0:
         return 1 if x[1] > 0.0 else -1
     return slip_at_rest(x, p, u, 0.0)
-
-
-def settled(x: State, p: Parameters) -> int:
-    """Return the direction of sliding (-1 or 1) of an axis whose bristle has settled, or 0."""
-    if has_settled(x[3], x[1], reach(x, p), leaves_sliding(p), falls(p)):
-        return 1 if x[1] > 0.0 else -1
-    return 0
 
 
 def past_stop(x: State, p: Parameters) -> int:

@@ -9,15 +9,13 @@ from math import exp, sqrt
 from .axis_equations import (
     Parameters,
     State,
-    breakaway_torque,
-    builds_up,
-    falls,
     filtered,
+    friction_of,
     mode_rates,
     past_stop,
-    reach,
     slip_at_rest,
 )
+from .laws.friction import breakaway_torque, builds_up, falls, reach
 from .parameter_rows import BIG, TINY
 
 SHARE = 0.05  # of the time in which the fastest rate acts: a step
@@ -38,7 +36,7 @@ def longest_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: fl
     step = min(h, SHARE / (max(rate, further_rate(x, mode, p)) + TINY))
     if p.tau > 0.0:
         step = min(step, step_of_lag(x, p, u))
-    if falls(p):
+    if falls(friction_of(p)):
         step = step_of_fall(x, mode, p, u, T_l, step)
     return step
 
@@ -81,9 +79,10 @@ def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float, most:
 def further_rate(x: State, mode: int, p: Parameters) -> float:
     """Return the fastest rate [1/s] of bristle, filter, harmonics, spring, end stops and varying inertia."""
     rate = 0.0
-    if mode == 0 and builds_up(p):
-        stiffness = breakaway_torque(p) / p.presliding_motor_distance
-        rate = max(sqrt(stiffness / p.J), p.presliding_motor_damping / p.J) + abs(x[1]) / (reach(x, p) + TINY)
+    f = friction_of(p)
+    if mode == 0 and builds_up(f):
+        stiffness = breakaway_torque(f) / f.distance
+        rate = max(sqrt(stiffness / p.J), f.damping / p.J) + abs(x[1]) / (reach(f, x[1], x[0], 0.0) + TINY)
     if p.drive_filter_time_constant > 0.0:
         rate = max(rate, 1.0 / p.drive_filter_time_constant)
     if p.torque_ripple_second_amplitude != 0.0 or p.torque_ripple_third_amplitude != 0.0:

@@ -9,8 +9,9 @@ length of the step [s].
 
 from math import exp, sqrt
 
-from .bristles import builds_up_l, builds_up_m, turned_signs
-from .equations import Mode, Parameters, State, rates
+from .bristles import carried_l, carried_m
+from .equations import Mode, Parameters, State, load_friction, motor_friction, rates
+from .laws.friction import bristle_sign, builds_up
 from .parameter_rows import BIG
 
 RELATIVE_TOLERANCE = 1e-11
@@ -20,14 +21,15 @@ SLOW = 0.01  # of the drive's lag: its torque is smooth within a shorter step
 
 def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
     """Return the derivative of ``x`` in ``mode``; what sticks does not move."""
-    still_m = mode[1] == 0
-    still_l = mode[2] == 0
-    if not still_m and not still_l:
-        return rates(x, mode[0], float(mode[1]), float(mode[2]), p, u, T_l)
-    sign_m, sign_l, bends_m, bends_l = turned_signs(x, mode, p)
-    r = rates(x, mode[0], sign_m, sign_l, p, u, T_l)
-    still_m = still_m and not builds_up_m(p)
-    still_l = still_l and not builds_up_l(p)
+    contact, slip_m, slip_l = mode
+    if slip_m != 0 and slip_l != 0:
+        return rates(x, contact, float(slip_m), float(slip_l), p, u, T_l)
+    motor, load = motor_friction(p), load_friction(p)
+    sign_m, bends_m = bristle_sign(motor, slip_m, x[8], x[1], x[0], carried_m(x, contact, p))
+    sign_l, bends_l = bristle_sign(load, slip_l, x[9], x[3], x[2], carried_l(x, contact, p))
+    r = rates(x, contact, sign_m, sign_l, p, u, T_l)
+    still_m = slip_m == 0 and not builds_up(motor)
+    still_l = slip_l == 0 and not builds_up(load)
     return (
         0.0 if still_m else r[0], 0.0 if still_m else r[1], 0.0 if still_l else r[2], 0.0 if still_l else r[3], r[4],
         r[5], r[6], r[7], bends_m, bends_l, r[10], r[11],

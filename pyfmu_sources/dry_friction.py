@@ -9,16 +9,7 @@ flank, -1 or 1.
 """
 
 from .backlash_models import HELD
-from .bristles import (
-    builds_up_l,
-    builds_up_m,
-    capacity_l,
-    capacity_m,
-    has_friction_l,
-    has_friction_m,
-    leaving_speed_l,
-    leaving_speed_m,
-)
+from .bristles import capacity_l, capacity_m
 from .equations import (
     Mode,
     Parameters,
@@ -27,14 +18,23 @@ from .equations import (
     gear,
     is_rigid,
     lever_arm,
+    load_friction,
     load_inertia,
     load_torque,
+    motor_friction,
     motor_torque,
     rigid_acceleration,
 )
+from .laws.friction import builds_up, is_dry, leaving_speed
 
 NEVER = 1e300
 MOTOR, LOAD = 2, 3
+
+
+def has_friction(p: Parameters) -> bool:
+    """Tell whether motor or load has dry friction."""
+    motor, load = motor_friction(p), load_friction(p)
+    return is_dry(motor) or is_dry(load)
 
 
 def capacity_of_both(x: State, p: Parameters) -> float:
@@ -81,15 +81,16 @@ def slip_of(speed: float, push: float, capacity: float, dry: bool) -> int:
 def slips(x: State, contact: int, p: Parameters, T_l: float) -> tuple[int, int]:
     """Return the directions of sliding of motor and load that follow from speeds and torques at ``contact``."""
     if is_rigid(p) and contact != 0:
-        dry = has_friction_m(p) or has_friction_l(p)
+        dry = has_friction(p)
         slip = slip_of(x[1], push_on_both(x, p, T_l), capacity_of_both(x, p), dry)
         return (slip, slip)
+    motor, load = motor_friction(p), load_friction(p)
     slip_m = 0
     slip_l = 0
-    if not builds_up_m(p):
-        slip_m = slip_of(x[1], push_on_motor(x, contact, p), capacity_m(x, contact, p), has_friction_m(p))
-    if not builds_up_l(p):
-        slip_l = slip_of(x[3], push_on_load(x, contact, p, T_l), capacity_l(x, contact, p), has_friction_l(p))
+    if not builds_up(motor):
+        slip_m = slip_of(x[1], push_on_motor(x, contact, p), capacity_m(x, contact, p), is_dry(motor))
+    if not builds_up(load):
+        slip_l = slip_of(x[3], push_on_load(x, contact, p, T_l), capacity_l(x, contact, p), is_dry(load))
     return (slip_m, slip_l)
 
 
@@ -100,26 +101,24 @@ def friction_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) 
     if is_rigid(p) and contact != 0:
         if which == LOAD or (play and p.alpha > 0.0) or contact in (-2, 2):
             return NEVER
-        if not (has_friction_m(p) or has_friction_l(p)):
+        if not has_friction(p):
             return NEVER
         if mode[1] == 0:
             return capacity_of_both(x, p) - abs(push_on_both(x, p, T_l))
         return mode[1] * x[1]
     if which == MOTOR:
-        if not has_friction_m(p):
+        motor = motor_friction(p)
+        if not is_dry(motor) or (mode[1] == 0 and builds_up(motor)):
             return NEVER
-        if builds_up_m(p):
-            return NEVER if mode[1] == 0 else mode[1] * x[1] - leaving_speed_m(p)
         if mode[1] == 0:
             return capacity_m(x, contact, p) - abs(push_on_motor(x, contact, p))
-        return mode[1] * x[1]
-    if play or not has_friction_l(p):
+        return mode[1] * x[1] - leaving_speed(motor)
+    load = load_friction(p)
+    if play or not is_dry(load) or (mode[2] == 0 and builds_up(load)):
         return NEVER
-    if builds_up_l(p):
-        return NEVER if mode[2] == 0 else mode[2] * x[3] - leaving_speed_l(p)
     if mode[2] == 0:
         return capacity_l(x, contact, p) - abs(push_on_load(x, contact, p, T_l))
-    return mode[2] * x[3]
+    return mode[2] * x[3] - leaving_speed(load)
 
 
 def held_flank_room(x: State, side: int, p: Parameters, T_l: float) -> float:
@@ -152,7 +151,7 @@ def shaft_torque(x: State, mode: Mode, p: Parameters, T_l: float) -> float:
         return 0.0
     if not is_rigid(p):
         return elastic_torque(x, contact, p)
-    if (mode[1] == 0 or contact in (-2, 2)) and (has_friction_m(p) or has_friction_l(p)):
+    if (mode[1] == 0 or contact in (-2, 2)) and has_friction(p):
         return held_torque(x, direction(contact), p, T_l)
     if contact in (-2, 2):
         return -load_torque(x, 0.0, 0.0, p, T_l)

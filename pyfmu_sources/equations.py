@@ -35,11 +35,11 @@ from .backlash_models import (
 )
 from .laws import drive, friction, shaft, stops, waves
 from .laws.drive import request_rate
-from .laws.friction import dependent_friction, directional_friction, quadratic_drag, sliding_friction
+from .laws.friction import BodyFriction, directional_friction, quadratic_drag, sliding_friction
 from .laws.shaft import hardening_torque, hysteresis_rate, resonance_torque, set_in
 from .laws.stops import end_stop_torque, spring_torque
 from .laws.waves import inertia_at, inertia_torque, periodic, periodic_curvature, periodic_slope
-from .parameter_rows import BIG, TINY, Parameter, field_name, mark_linear, with_values
+from .parameter_rows import BIG, TINY, Parameter, field_name, keep_last, mark_linear, with_values
 
 # Of the plant without effects.
 PLAIN = mark_linear(
@@ -199,42 +199,28 @@ def elastic_torque(x: State, contact: int, p: Parameters) -> float:
     return torque
 
 
-def friction_m(x: State, transmitted: float, p: Parameters) -> float:
-    """Return the magnitude of the motor's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it."""
-    level = sliding_friction(
-        x[1], p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb,
-        p.stribeck_friction_motor_breakaway, p.stribeck_friction_motor_stribeck_speed,
-    )  # fmt: skip
-    return dependent_m(level, x, transmitted, p)
-
-
-def dependent_m(level: float, x: State, transmitted: float, p: Parameters) -> float:
-    """Return a ``level`` of the motor's dry friction [N.m] with what depends on the shaft's torque and the angle."""
-    if p.load_dependent_friction_motor_coefficient == 0.0 and p.periodic_friction_motor_amplitude == 0.0:
-        return level
-    return dependent_friction(
-        level, transmitted, p.load_dependent_friction_motor_coefficient, x[0], p.periodic_friction_motor_amplitude,
+def _motor_friction(p: Parameters) -> BodyFriction:
+    """Return the dry friction of the motor; beside rigid teeth it does not build up."""
+    return BodyFriction(
+        p.coulomb_friction_motor_torque, p.stribeck_friction_motor_coulomb, p.stribeck_friction_motor_breakaway,
+        p.stribeck_friction_motor_stribeck_speed, 0.0 if is_rigid(p) else p.presliding_motor_distance,
+        p.presliding_motor_damping, p.load_dependent_friction_motor_coefficient, p.periodic_friction_motor_amplitude,
         p.periodic_friction_motor_cycles_per_rev, p.periodic_friction_motor_phase,
     )  # fmt: skip
 
 
-def friction_l(x: State, transmitted: float, p: Parameters) -> float:
-    """Return the magnitude of the load's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it."""
-    level = sliding_friction(
-        x[3], p.coulomb_friction_load_torque, p.stribeck_friction_load_coulomb,
-        p.stribeck_friction_load_breakaway, p.stribeck_friction_load_stribeck_speed,
-    )  # fmt: skip
-    return dependent_l(level, x, transmitted, p)
-
-
-def dependent_l(level: float, x: State, transmitted: float, p: Parameters) -> float:
-    """Return a ``level`` of the load's dry friction [N.m] with what depends on the shaft's torque and the angle."""
-    if p.load_dependent_friction_load_coefficient == 0.0 and p.periodic_friction_load_amplitude == 0.0:
-        return level
-    return dependent_friction(
-        level, transmitted, p.load_dependent_friction_load_coefficient, x[2], p.periodic_friction_load_amplitude,
+def _load_friction(p: Parameters) -> BodyFriction:
+    """Return the dry friction of the load; beside rigid teeth it does not build up."""
+    return BodyFriction(
+        p.coulomb_friction_load_torque, p.stribeck_friction_load_coulomb, p.stribeck_friction_load_breakaway,
+        p.stribeck_friction_load_stribeck_speed, 0.0 if is_rigid(p) else p.presliding_load_distance,
+        p.presliding_load_damping, p.load_dependent_friction_load_coefficient, p.periodic_friction_load_amplitude,
         p.periodic_friction_load_cycles_per_rev, p.periodic_friction_load_phase,
     )  # fmt: skip
+
+
+motor_friction = keep_last(_motor_friction)
+load_friction = keep_last(_load_friction)
 
 
 def ripple(theta_m: float, p: Parameters) -> float:
@@ -249,7 +235,9 @@ def ripple(theta_m: float, p: Parameters) -> float:
 
 def motor_torque(x: State, transmitted: float, sign_m: float, p: Parameters) -> float:
     """Return the torque on the motor [N.m] without the shaft's: drive, ripple, viscous and dry friction."""
-    torque = x[4] + ripple(x[0], p) - p.b_m * x[1] - sign_m * friction_m(x, transmitted, p)
+    torque = (
+        x[4] + ripple(x[0], p) - p.b_m * x[1] - sign_m * sliding_friction(motor_friction(p), x[1], x[0], transmitted)
+    )
     if p.directional_friction_motor_difference != 0.0:
         torque -= directional_friction(x[1], p.directional_friction_motor_difference)
     return torque
@@ -265,7 +253,9 @@ def follower_torque(x: State, p: Parameters) -> float:
 
 def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l: float) -> float:
     """Return the torque on the load [N.m] without the shaft's: external, friction, gravity, drag, springs, stops."""
-    against = T_l + p.load_torque_torque + p.b_l * x[3] + sign_l * friction_l(x, transmitted, p)
+    against = (
+        T_l + p.load_torque_torque + p.b_l * x[3] + sign_l * sliding_friction(load_friction(p), x[3], x[2], transmitted)
+    )
     against += periodic(x[2], p.gravity_load_amplitude, 1.0, p.gravity_load_phase) + quadratic_drag(
         x[3], p.quadratic_drag_coefficient
     )

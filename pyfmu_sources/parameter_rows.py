@@ -1,9 +1,12 @@
 """Rows that describe the parameters of a plant, and how its named tuple ``p`` comes of them."""
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, NamedTuple, TypeVar
 
 BIG = 1e12
 TINY = 1e-9
+R = TypeVar("R")
 
 
 class Parameter(NamedTuple):
@@ -37,3 +40,18 @@ def with_values(p: Any, values: dict[str, float]) -> Any:
         if field_name(name) not in p._fields:
             raise KeyError(name)
     return p._replace(**{field_name(name): float(value) for name, value in values.items()})
+
+
+def keep_last(function: Callable[[Any], R]) -> Callable[[Any], R]:
+    """Return a function of parameters that computes once while it is asked for the same ones."""
+    kept: list[tuple[Any, Any]] = [(None, None)]
+
+    @wraps(function)
+    def ask(p: Any) -> R:
+        asked, found = kept[0]
+        if asked is not p:
+            found = function(p)
+            kept[0] = (p, found)
+        return found
+
+    return ask

@@ -9,29 +9,25 @@ direction of sliding, 0: none.
 from .axis_equations import (
     Parameters,
     State,
-    breakaway_torque,
-    builds_up,
     drive_torque,
     filtered,
-    friction,
+    friction_of,
     inertia,
     initial_mode,
-    leaves_sliding,
     mode_rates,
     past_stop,
     rates,
-    reach,
-    settled,
     sliding_torque,
     slip_at_rest,
     start,
 )
 from .axis_steps import BREAKS, MEETS, SLOWS, event_time, held, longest_step, smooth_step
 from .laws.drive import UNASKED, ramp
+from .laws.friction import bristle_slip, builds_up, is_dry, leaving_speed, reach
 from .parameter_rows import BIG
 
 __all__ = [
-    "State", "advance", "advance_to_event", "drive_torque", "friction", "inertia", "initial_mode", "mode_rates",
+    "State", "advance", "advance_to_event", "drive_torque", "inertia", "initial_mode", "mode_rates",
     "past_stop", "rates", "sliding_torque", "start",
 ]  # fmt: skip
 
@@ -108,9 +104,10 @@ def request_to_event(
         h: length of the step [s].
         elapsed: time since the beginning of the step at which ``x`` is [s].
     """
-    bends = builds_up(p)
-    dry = breakaway_torque(p) + abs(p.periodic_friction_motor_amplitude) > 0.0
-    least = leaves_sliding(p)
+    f = friction_of(p)
+    bends = builds_up(f)
+    dry = is_dry(f)
+    least = leaving_speed(f)
     if mode == 0 and not dry:
         mode = 1
     most = MAX_STEPS + int(MAX_STEPS_PER_SECOND * h)
@@ -142,7 +139,7 @@ def request_to_event(
             step = event_time(SLOWS, x, mode, p, u, T_l, step, least)
             moved = smooth_step(x, mode, p, u, T_l, step)
             if bends:
-                x = (moved[0], moved[1], moved[2], mode * reach(moved, p), moved[4])
+                x = (moved[0], moved[1], moved[2], mode * reach(f, moved[1], moved[0], 0.0), moved[4])
                 mode = 0
             else:
                 x = (moved[0], 0.0, moved[2], moved[3], moved[4])
@@ -150,7 +147,7 @@ def request_to_event(
             return (x, mode, elapsed + step, pieces, True)
         x = moved
         if bends and mode == 0:
-            mode = settled(x, p)
+            mode = bristle_slip(f, mode, x[3], x[1], x[0], 0.0)
         elapsed += step
         if meets:
             return (x, mode, elapsed, pieces, True)

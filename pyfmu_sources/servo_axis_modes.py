@@ -10,19 +10,16 @@ direction of sliding, 0: none.
 from .axis_equations import (
     Parameters,
     State,
-    breakaway_torque,
-    builds_up,
-    capacity,
     drive_torque,
+    friction_of,
     initial_mode,
-    leaves_sliding,
     mode_rates,
     past_stop,
-    reach,
     sliding_torque,
     slip_at_rest,
 )
 from .laws.drive import saturated
+from .laws.friction import builds_up, capacity, is_dry, leaving_speed, reach
 from .parameter_rows import BIG
 
 Indicators = tuple[float, float]
@@ -39,12 +36,8 @@ def decided(x: State, mode: int, p: Parameters, u: float) -> int:
     """Return the direction of sliding (-1, 0, 1), from state and request if nothing has decided it yet."""
     if mode == UNDECIDED:
         mode = initial_mode(x, p, u)
-    return 1 if mode == 0 and not is_dry(p) else mode
-
-
-def is_dry(p: Parameters) -> bool:
-    """Tell whether the axis has dry friction."""
-    return breakaway_torque(p) + abs(p.periodic_friction_motor_amplitude) > 0.0
+    f = friction_of(p)
+    return 1 if mode == 0 and not is_dry(f) else mode
 
 
 def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) -> tuple[State, Outputs]:
@@ -65,11 +58,12 @@ def slipping(x: State, mode: int, p: Parameters, u: float, T_l: float) -> float:
     Returns:
         The distance; 1 where the mode cannot end: no dry friction, or a bristle that bends.
     """
-    if not is_dry(p) or (mode == 0 and builds_up(p)):
+    f = friction_of(p)
+    if not is_dry(f) or (mode == 0 and builds_up(f)):
         return 1.0
     if mode == 0:
-        return capacity(x, p) - abs(sliding_torque((x[0], 0.0, x[2], x[3], x[4]), p, u, T_l))
-    return x[1] * mode - leaves_sliding(p)
+        return capacity(f, x[0], 0.0) - abs(sliding_torque((x[0], 0.0, x[2], x[3], x[4]), p, u, T_l))
+    return x[1] * mode - leaving_speed(f)
 
 
 def stop_room(x: State) -> float:
@@ -101,8 +95,9 @@ def after_events(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: f
     """Return state, direction of sliding and end stop once none of them is at its end."""
     mode = decided(x, mode, p, u)
     if slipping(x, mode, p, u, T_l) < -slipping_room(x, mode):
-        if builds_up(p):
-            x = (x[0], x[1], x[2], mode * reach(x, p), x[4])
+        f = friction_of(p)
+        if builds_up(f):
+            x = (x[0], x[1], x[2], mode * reach(f, x[1], x[0], 0.0), x[4])
             mode = 0
         else:
             x = (x[0], 0.0, x[2], x[3], x[4])

@@ -7,7 +7,7 @@ In all functions: ``u``: requested torque [N.m], delayed and saturated already; 
 """
 
 from .backlash_models import BOUNCING, HELD, NONE
-from .bristles import bent, builds_up_l, builds_up_m, capacity_l, capacity_m, reach_l, reach_m
+from .bristles import bent, capacity_l, capacity_m, carried_l, carried_m
 from .contact import after_event, join_teeth, on_flank, stop_bodies
 from .dry_friction import (
     LOAD,
@@ -31,13 +31,16 @@ from .equations import (
     backlash_model,
     gear,
     is_rigid,
+    load_friction,
     load_torque,
+    motor_friction,
     motor_torque,
     rigid_acceleration,
     teeth_never_pull,
     twist,
     twist_rate,
 )
+from .laws.friction import builds_up, reach
 
 GUARDS = 4
 
@@ -112,15 +115,19 @@ def switched(x: State, mode: Mode, which: int, events: int, p: Parameters, u: fl
         slip = slip_after_stop(push_on_both(x, p, T_l), capacity_of_both(x, p))
         return (x, (contact, slip, slip))
     if which == MOTOR:
-        if slip_m != 0 and builds_up_m(p):
-            return (bent(x, slip_m * reach_m(x, contact, p), x[9]), (contact, 0, slip_l))
+        motor = motor_friction(p)
+        if slip_m != 0 and builds_up(motor):
+            far = reach(motor, x[1], x[0], carried_m(x, contact, p))
+            return (bent(x, slip_m * far, x[9]), (contact, 0, slip_l))
         if slip_m != 0:
             x = (x[0], 0.0, x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
         push = push_on_motor(x, contact, p)
         return (x, (contact, slip_after_stop(push, capacity_m(x, contact, p)), slip_l))
     if which == LOAD:
-        if slip_l != 0 and builds_up_l(p):
-            return (bent(x, x[8], slip_l * reach_l(x, contact, p)), (contact, slip_m, 0))
+        load = load_friction(p)
+        if slip_l != 0 and builds_up(load):
+            far = reach(load, x[3], x[2], carried_l(x, contact, p))
+            return (bent(x, x[8], slip_l * far), (contact, slip_m, 0))
         if slip_l != 0:
             x = (x[0], x[1], x[2], 0.0, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
         push = push_on_load(x, contact, p, T_l)

@@ -1,9 +1,19 @@
 """Friction of one body, be it motor, load or axis: how large it is, when it holds, how it builds up over a distance.
 
-In all functions: ``speed``: of the body [rad/s].
+Sources: Stribeck's curve as in Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30(7), 1994, with exponent 2.
+The bristle is Dahl's and LuGre's (Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Automatic Control 40(3),
+1995): the torque is ``stiffness z + damping z'`` with ``z' = v - |v| z / reach(v)``, where ``reach(v) = distance
+friction(v) / breakaway`` and ``stiffness = breakaway / distance``. Friction that grows with the torque that is carried
+builds up at this stiffness, too, with 1 N.m of it in the breakaway; where there is no other, it is set-valued, for its
+reach goes to zero with that torque. Once its bristle has settled, a body slides at the friction of its speed, without
+the stiff equation of the bristle, until it slows down.
+
+In all functions: ``speed`` [rad/s] and ``angle`` [rad] of the body; ``carried``: torque [N.m] that its bearing or its
+teeth carry; ``bristle``: its bending [rad]; ``slip``: direction in which it slides; 0: it sticks, or its bristle bends.
 """
 
 from math import exp
+from typing import NamedTuple
 
 from ..parameter_rows import BIG, TINY, Parameter, mark_linear
 from .waves import periodic, wave_rows
@@ -68,56 +78,117 @@ def directional_friction(speed: float, difference: float) -> float:
     return difference * abs(speed)
 
 
-def sliding_friction(speed: float, coulomb: float, sliding: float, breakaway: float, stribeck_speed: float) -> float:
-    """Return the magnitude of dry friction [N.m] at a sliding ``speed`` [rad/s].
+class BodyFriction(NamedTuple):
+    """The parameters of one body's dry friction, in the order of their rows; ``distance`` 0: it does not build up."""
 
-    Coulomb friction plus Stribeck's curve, ``sliding + (breakaway - sliding) exp(-(speed/stribeck_speed)^2)``
-    (Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, with exponent 2).
-
-    Args:
-        coulomb: Coulomb friction [N.m].
-        sliding: Stribeck's part at high speed [N.m].
-        breakaway: Stribeck's part at rest [N.m].
-        stribeck_speed: [rad/s].
-    """
-    if breakaway == 0.0 and sliding == 0.0:
-        return coulomb
-    ratio = speed / stribeck_speed
-    return coulomb + sliding + (breakaway - sliding) * exp(-ratio * ratio)
+    coulomb: float
+    sliding: float
+    breakaway: float
+    stribeck_speed: float
+    distance: float
+    damping: float
+    coefficient: float
+    amplitude: float
+    cycles: float
+    phase: float
 
 
-def dependent_friction(
-    level: float, transmitted: float, coefficient: float, angle: float, amplitude: float, cycles: float, phase: float
-) -> float:
-    """Return the magnitude of dry friction [N.m] that depends on load torque and on position, never below zero.
-
-    Args:
-        level: its magnitude [N.m] without both.
-        transmitted: torque [N.m] that the bearing or the teeth carry.
-        angle: of the part [rad].
-        amplitude: of what repeats with the angle [N.m].
-        phase: its phase at angle zero [rad].
-    """
-    return max(0.0, level + coefficient * abs(transmitted) + periodic(angle, amplitude, cycles, phase))
+# A bristle has settled when it is this near to its reach.
+SETTLED = 1e-6
+# Where friction falls with speed, a bristle follows its reach with a lag: it counts as settled so near to it where its
+# equation is quicker than this [1/s]; beyond these many Stribeck speeds friction falls no more.
+SETTLED_FALLING = 0.02
+QUICKEST = 5e3
+FALLEN = 4.0
+# Faster than it was left, so that no part goes to and fro between both ways of computing it.
+ENTER = 1.2
+LEAST_SPEED = 1e-9
 
 
-def breakaway(coulomb: float, sliding: float, static: float) -> float:
-    """Return the torque [N.m] below which a part that stands still keeps standing.
-
-    Args:
-        coulomb: Coulomb friction [N.m].
-        sliding: Stribeck's friction at high speed, above Coulomb's [N.m].
-        static: Stribeck's friction at rest, above Coulomb's [N.m].
-    """
-    return coulomb + max(sliding, static)
+def sliding_friction(f: BodyFriction, speed: float, angle: float, carried: float) -> float:
+    """Return the magnitude of dry friction [N.m] of a body that slides."""
+    if f.breakaway == 0.0 and f.sliding == 0.0:
+        return with_dependence(f, f.coulomb, angle, carried)
+    ratio = speed / f.stribeck_speed
+    level = f.coulomb + f.sliding + (f.breakaway - f.sliding) * exp(-ratio * ratio)
+    return with_dependence(f, level, angle, carried)
 
 
-def bristle_rate(bristle: float, speed: float, reach: float) -> float:
-    """Return the rate [rad/s] of a friction bristle (Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995).
+def with_dependence(f: BodyFriction, level: float, angle: float, carried: float) -> float:
+    """Return a ``level`` of dry friction [N.m] with what depends on torque and angle, never below zero."""
+    if f.coefficient == 0.0 and f.amplitude == 0.0:
+        return level
+    return max(0.0, level + f.coefficient * abs(carried) + periodic(angle, f.amplitude, f.cycles, f.phase))
 
-    Args:
-        bristle: its bending [rad].
-        speed: of the part [rad/s].
-        reach: bending [rad] at which it slides, in proportion to the friction at this speed.
-    """
-    return speed - abs(speed) * bristle / reach if reach > 0.0 else 0.0
+
+def breakaway_torque(f: BodyFriction) -> float:
+    """Return the torque [N.m] below which a body at rest stays there, without what depends on torque and angle."""
+    return f.coulomb + max(f.sliding, f.breakaway)
+
+
+def capacity(f: BodyFriction, angle: float, carried: float) -> float:
+    """Return the torque [N.m] below which a body at rest stays there."""
+    return with_dependence(f, breakaway_torque(f), angle, carried)
+
+
+def is_dry(f: BodyFriction) -> bool:
+    """Tell whether a body has dry friction."""
+    return f.coulomb + f.sliding + f.breakaway + f.coefficient + abs(f.amplitude) > 0.0
+
+
+def rest_level(f: BodyFriction) -> float:
+    """Return the breakaway torque [N.m] at 1 N.m that is carried, without what depends on the angle."""
+    return breakaway_torque(f) + f.coefficient
+
+
+def builds_up(f: BodyFriction) -> bool:
+    """Tell whether friction builds up over a distance; what only the carried torque makes is set-valued."""
+    return f.distance > 0.0 and breakaway_torque(f) > 0.0
+
+
+def falls(f: BodyFriction) -> bool:
+    """Tell whether friction depends on the speed."""
+    return f.sliding != f.breakaway
+
+
+def leaving_speed(f: BodyFriction) -> float:
+    """Return the speed [rad/s] below which the bristle of a body that slides must be followed; 0: it has none."""
+    return min(FALLEN * f.stribeck_speed, QUICKEST * f.distance) if falls(f) and builds_up(f) else 0.0
+
+
+def reach(f: BodyFriction, speed: float, angle: float, carried: float) -> float:
+    """Return the bending [rad] at which the bristle slides."""
+    return f.distance * sliding_friction(f, speed, angle, carried) / rest_level(f)
+
+
+def start_bristle(f: BodyFriction, speed: float, angle: float, carried: float) -> float:
+    """Return the bristle as a simulation starts: that of a body that moves has settled."""
+    if speed == 0.0 or not builds_up(f):
+        return 0.0
+    far = reach(f, speed, angle, carried)
+    return far if speed > 0.0 else -far
+
+
+def bristle_sign(
+    f: BodyFriction, slip: int, bristle: float, speed: float, angle: float, carried: float
+) -> tuple[float, float]:
+    """Return the direction of friction, -1 to 1 without damping, and the rate of the bristle [rad/s]."""
+    if slip != 0 or not builds_up(f):
+        return (float(slip), 0.0)
+    far = reach(f, speed, angle, carried)
+    if far <= 0.0:
+        return (0.0, 0.0)
+    rate = speed - abs(speed) * bristle / far
+    return ((bristle + f.damping / (rest_level(f) / f.distance) * rate) / far, rate)
+
+
+def bristle_slip(f: BodyFriction, slip: int, bristle: float, speed: float, angle: float, carried: float) -> int:
+    """Return the direction of sliding, which is that of the speed once the bristle has settled at its reach."""
+    if slip != 0 or not builds_up(f):
+        return slip
+    far = reach(f, speed, angle, carried)
+    if abs(speed) < max(LEAST_SPEED, ENTER * leaving_speed(f)) or far <= 0.0:
+        return 0
+    side = 1 if speed > 0.0 else -1
+    near = SETTLED_FALLING if falls(f) and abs(speed) > QUICKEST * far else SETTLED
+    return side if abs(side * bristle - far) <= near * far else 0

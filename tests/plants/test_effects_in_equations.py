@@ -8,6 +8,7 @@ from pyfmu_sources import backlash_models as models
 from pyfmu_sources import contact as c
 from pyfmu_sources import equations as dt
 from pyfmu_sources import equations as eq
+from pyfmu_sources.laws.friction import sliding_friction
 
 I, K, C, J_M, J_L, ALPHA = 3.984, 3300.0, 1.0, 0.4, 5.6, 0.01
 # Every value is another one, so that no state or parameter stands for its neighbour.
@@ -69,20 +70,24 @@ def test_friction_differs_by_direction() -> None:
 
 @pytest.mark.parametrize("site", ["motor", "load"])
 def test_dry_friction_depends_on_speed_torque_and_angle(site: str) -> None:
-    friction, angle, speed = (eq.friction_m, 1.7, 2.3) if site == "motor" else (eq.friction_l, 0.31, -0.6)
+    of, angle, speed = (eq.motor_friction, 1.7, 2.3) if site == "motor" else (eq.load_friction, 0.31, -0.6)
+
+    def friction(carried: float, p: eq.Parameters) -> float:
+        return sliding_friction(of(p), speed, angle, carried)
+
     coulomb = {f"coulomb_friction__{site}__torque": 0.7}
     loaded = {f"load_dependent_friction__{site}__coefficient": 0.06}
     wavy = {f"periodic_friction__{site}__{name}": value
             for name, value in (("amplitude", 0.5), ("cycles_per_rev", 3.0), ("phase", 0.4))}  # fmt: skip
     wave = 0.5 * math.sin(3.0 * angle + 0.4)
-    assert friction(X, -12.0, p_of(**coulomb)) == 0.7
-    assert friction(X, -12.0, p_of(**coulomb, **loaded)) == pytest.approx(0.7 + 0.06 * 12.0)
-    assert friction(X, -12.0, p_of(**coulomb, **wavy)) == pytest.approx(0.7 + wave)
-    assert friction(X, 5.0, p_of(**coulomb, **loaded, **wavy)) == pytest.approx(0.7 + 0.06 * 5.0 + wave)
+    assert friction(-12.0, p_of(**coulomb)) == 0.7
+    assert friction(-12.0, p_of(**coulomb, **loaded)) == pytest.approx(0.7 + 0.06 * 12.0)
+    assert friction(-12.0, p_of(**coulomb, **wavy)) == pytest.approx(0.7 + wave)
+    assert friction(5.0, p_of(**coulomb, **loaded, **wavy)) == pytest.approx(0.7 + 0.06 * 5.0 + wave)
     stribeck = {f"stribeck_friction__{site}__{name}": value
                 for name, value in (("coulomb", 0.9), ("breakaway", 1.6), ("stribeck_speed", 1.5))}  # fmt: skip
     falling = 0.9 + 0.7 * math.exp(-((speed / 1.5) ** 2))
-    assert friction(X, 5.0, p_of(**stribeck)) == pytest.approx(falling)
+    assert friction(5.0, p_of(**stribeck)) == pytest.approx(falling)
 
 
 def test_ripple_has_three_harmonics() -> None:

@@ -192,14 +192,14 @@ def _length(scope: Scope, code: Code) -> Code | None:
 def _construct(scope: Scope, node: ast.Call, target: Any) -> Code:
     kind = kind_of(target)
     assert isinstance(kind, Tuple)
-    if scope.program.paired:
-        scope.refuse(node, "a NamedTuple must not be made where derivatives are taken: it holds none")
     given: dict[str, ast.expr] = dict(zip(kind.names, node.args, strict=False))
     given |= {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg}
     if set(given) != set(kind.names):
         scope.refuse(node, f"`{target.__name__}` must be given {', '.join(kind.names)}")
-    parts = [scope.expression(given[name], item).text for name, item in zip(kind.names, kind.items, strict=True)]
-    return compound(scope, kind, ", ".join(parts))
+    parts = [scope.expression(given[name], item) for name, item in zip(kind.names, kind.items, strict=True)]
+    if scope.program.paired and not all(part.plain or part.kind != REAL for part in parts):
+        scope.refuse(node, "a NamedTuple must be made of parameters where derivatives are taken: it holds none")
+    return compound(scope, kind, ", ".join(part.plain or part.text for part in parts))
 
 
 def message(scope: Scope, node: ast.expr) -> str:

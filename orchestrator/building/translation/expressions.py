@@ -253,6 +253,8 @@ def _choice(scope: Scope, node: ast.IfExp, wanted: Kind | None) -> Code:
     kind = join_kinds(scope, node, then.kind, other.kind)
     if kind == REAL:
         then, other = as_real(scope, then), as_real(scope, other)
+    if then.plain and other.plain:
+        return constant_pair(f"({test.within(OR)} ? {then.plain} : {other.plain})")
     address = ""
     if isinstance(kind, Tuple) and (then.place or then.address) and (other.place or other.address):
         address = f"{test.within(OR)} ? {address_of(then)} : {address_of(other)}"

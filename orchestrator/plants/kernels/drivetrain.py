@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from orchestrator.building.translation.kernel_arrays import Pairs, Reals
 from orchestrator.plants.kernels.point import Point, travel_bound
-from pyfmu_sources.bristles import rest_l, rest_m
 from pyfmu_sources.contact import consistent_start
 from pyfmu_sources.drivetrain import advance, has_nonlinear_effect, initial_mode, step_table
 from pyfmu_sources.equations import (
@@ -19,14 +18,15 @@ from pyfmu_sources.equations import (
     State,
     contact_of,
     elastic_torque,
-    friction_l,
-    friction_m,
     lever_arm,
+    load_friction,
+    motor_friction,
     twist,
     twist_rate,
     twist_slope,
 )
 from pyfmu_sources.equations import rates as fmu_rates
+from pyfmu_sources.laws.friction import rest_level, sliding_friction
 from pyfmu_sources.parameter_rows import BIG
 
 __all__ = ["run"]
@@ -66,14 +66,15 @@ def friction(x: Point, values: Values) -> tuple[float, float]:
     if p.load_dependent_friction_motor_coefficient + p.load_dependent_friction_load_coefficient > 0.0:
         contact = contact_of(twist(full, p), p.alpha) if p.alpha > 0.0 else 1
         shaft = elastic_torque(full, contact, p)
-    return (friction_m(full, shaft * lever_arm(full, p), p), friction_l(full, shaft, p))
+    at_motor = sliding_friction(motor_friction(p), x[1], x[0], shaft * lever_arm(full, p))
+    return (at_motor, sliding_friction(load_friction(p), x[3], x[2], shaft))
 
 
 def rest_levels(values: Values) -> tuple[tuple[float, float], tuple[bool, bool]]:
     """Return the levels to which distances of presliding belong, and whether each depends on more than speed."""
     p = values.plant
-    at_motor = rest_m(p)
-    at_load = rest_l(p)
+    at_motor = rest_level(motor_friction(p))
+    at_load = rest_level(load_friction(p))
     wavy_m = p.periodic_friction_motor_amplitude
     wavy_l = p.periodic_friction_load_amplitude
     levels = (at_motor if at_motor > 0.0 else abs(wavy_m), at_load if at_load > 0.0 else abs(wavy_l))

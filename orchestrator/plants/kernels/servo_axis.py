@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from orchestrator.building.translation.kernel_arrays import Pairs, Reals
 from orchestrator.plants.kernels.point import Point, travel_bound
-from pyfmu_sources.axis_equations import COUNT, AxisParameters, breakaway_torque, initial_mode, start
-from pyfmu_sources.axis_equations import friction as fmu_friction
+from pyfmu_sources.axis_equations import COUNT, AxisParameters, friction_of, initial_mode, start
 from pyfmu_sources.axis_equations import rates as fmu_rates
+from pyfmu_sources.laws.friction import breakaway_torque, sliding_friction
 from pyfmu_sources.parameter_rows import BIG
 from pyfmu_sources.servo_axis import advance
 
@@ -36,12 +36,12 @@ def values_of(p: Reals) -> Values:
 
 def friction(x: Point, values: Values) -> tuple[float, float]:
     """Return the level of dry friction [N.m], and zero."""
-    return (fmu_friction((x[0], x[1], x[4], 0.0, 0.0), values.plant), 0.0)
+    return (sliding_friction(friction_of(values.plant), x[1], x[0], 0.0), 0.0)
 
 
 def rest_levels(values: Values) -> tuple[tuple[float, float], tuple[bool, bool]]:
     """Return the level to which the distance of presliding belongs, and whether it depends on more than speed."""
-    at_rest = breakaway_torque(values.plant)
+    at_rest = breakaway_torque(friction_of(values.plant))
     wavy = values.plant.periodic_friction_motor_amplitude
     return ((at_rest if at_rest > 0.0 else abs(wavy), 0.0), (wavy != 0.0, False))
 

@@ -10,7 +10,7 @@ from orchestrator.effects.of_plants import DRIVETRAIN_BANK, PRESLIDING, build_up
 from orchestrator.plants.description import Body, Drive, Plant, Resonance, Shaft
 from pyfmu_sources import equations as dt
 from pyfmu_sources.backlash_models import GRADUAL, MODELS
-from pyfmu_sources.bristles import unloaded_l, unloaded_m
+from pyfmu_sources.laws.friction import breakaway_torque
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def fmu_parameters(p: Array) -> Array:
     """
     own = dt.DrivetrainParameters._make(p[: dt.COUNT])
     gap = own.alpha if int(own.backlash_model) in GRADUAL else 0.0
-    ons = (unloaded_m(own), unloaded_l(own), gap)
+    ons = (breakaway_torque(dt.motor_friction(own)), breakaway_torque(dt.load_friction(own)), gap)
     fields = ("presliding_motor_distance", "presliding_load_distance", "impact_damping_depth")
     for field, on, fitted in zip(fields, ons, p[dt.COUNT : dt.COUNT + len(fields)], strict=True):
         if on > 0.0:

@@ -7,7 +7,7 @@ from orchestrator.effects.of_logs import EARLY_TORQUE, LEAD, SAMPLED, SAMPLED_TO
 from orchestrator.effects.of_plants import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, Drive, Plant
 from pyfmu_sources import axis_equations as ap
-from pyfmu_sources.axis_equations import breakaway_torque
+from pyfmu_sources.laws.friction import breakaway_torque
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ SERVO_AXIS_BANK = tuple(effect for effect in DRIVETRAIN_BANK if effect.label in 
 def _fmu_parameters(p: Array) -> Array:
     """Return the FMU's own parameters of a model (n,): the fitted distance of friction included."""
     own = ap.AxisParameters._make(p[: ap.COUNT])
-    if breakaway_torque(own) > 0.0:
+    if breakaway_torque(ap.friction_of(own)) > 0.0:
         distance = build_up_distance(own.presliding_motor_distance, float(p[ap.COUNT]))
         own = own._replace(presliding_motor_distance=distance)
     return np.array(own)
