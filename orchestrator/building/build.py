@@ -7,18 +7,22 @@ would have now. The fingerprint is in the FMU, so nothing beside the file itself
 import importlib
 import json
 import os
+import platform
 import re
 import subprocess
 import sys
+import sysconfig
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import orchestrator
-from orchestrator.building.launcher import find_toolchain
-from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of, with_law
+from orchestrator.building.launcher import Toolchain, find_toolchain
+from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of, recipes_of, with_law
 from orchestrator.errors import FmuError
 from orchestrator.fmi.ours import is_ours, record
 from pyfmu_sources.fmu_variables import with_starts
@@ -43,9 +47,8 @@ def ensure_built(
     names: Sequence[str] | None = None, directory: Path | None = None, force: bool = False
 ) -> dict[str, Path]:
     """Return the path of each FMU in ``names`` (default: all), after building what is missing or stale."""
-    recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = default_directory() if directory is None else directory
-    return {recipe.name: _ensure(recipe, folder, force) for recipe in recipes}
+    return {recipe.name: _ensure(recipe, folder, force) for recipe in recipes_of(names)}
 
 
 def build_variant(
@@ -87,10 +90,20 @@ def _number(value: float | str) -> float:
 
 
 def _ensure(recipe: Recipe, directory: Path, force: bool = False) -> Path:
-    path = directory / f"{recipe.name}.fmu"
-    current = fingerprint(recipe, find_toolchain().identity)
+    current = fingerprint(recipe, *python_toolchain(find_toolchain()))
+    return bring_up_to_date(directory / f"{recipe.name}.fmu", current, force, partial(_build, recipe))
+
+
+def python_toolchain(toolchain: Toolchain) -> tuple[str, ...]:
+    """Return what FMUs that run Python are made with."""
+    return version("pythonfmu"), platform.python_version(), sysconfig.get_platform(), toolchain.identity
+
+
+def bring_up_to_date(path: Path, current: str, force: bool, build: Callable[[Path, str], None]) -> Path:
+    """Return the FMU at ``path``, built if it has another fingerprint than ``current``, or is not what we built."""
     if force or stamp_of(path) != current or not is_trusted(path):
-        _build(recipe, path, current)
+        build(path, current)
+        record(path)
     return path
 
 
@@ -140,4 +153,3 @@ def _build(recipe: Recipe, path: Path, current: str) -> None:
     if run.returncode != 0:
         lines = run.stderr.strip().splitlines() or ["no message"]
         raise FmuError(f"cannot build {recipe.name}: {lines[-1]}")
-    record(path)

@@ -6,29 +6,23 @@ variables, for hosts that read every output as a real number.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from functools import cache
+from functools import partial
 from pathlib import Path
 
-import orchestrator.building.translation
-from orchestrator import __version__
 from orchestrator.building.archive import write_archive
-from orchestrator.building.build import default_directory, is_trusted, stamp_of
+from orchestrator.building.build import bring_up_to_date, default_directory
 from orchestrator.building.compilers import FLAGS, TARGETS, Compiler, compile_library, find_compiler
 from orchestrator.building.documentation import documentation
 from orchestrator.building.fmi3_description import fmi3_description
 from orchestrator.building.fmi3_files import build_description, terminals_and_icons
 from orchestrator.building.native_description import native_description
-from orchestrator.building.native_sources import RUNTIME, c_sources, indicator_count, slave_class
+from orchestrator.building.native_sources import c_sources, indicator_count, slave_class
 from orchestrator.building.reference_files import reference_files
-from orchestrator.building.sources import DATA_FILES, Recipe, catalogue, digest, recipe_of
+from orchestrator.building.sources import PLACEHOLDER, Recipe, fingerprint, recipes_of
 from orchestrator.building.stamping import content_guid, final_text, stamp
 from orchestrator.errors import FmuError
-from orchestrator.fmi.ours import record
-from orchestrator.shared.equation_files import closure
 
-PLACEHOLDER = "{00000000-0000-0000-0000-000000000000}"
 NO_COMPILER = "native FMUs need a C compiler: install one (cc), or `pip install 'backlash-cosim[native]'` for zig"
 
 
@@ -51,9 +45,8 @@ def ensure_native(
     Args:
         here: for this platform alone, with the local compiler where there is one: a second instead of half a minute.
     """
-    recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = native_directory(fmi) if directory is None else directory
-    return {recipe.name: _ensure(recipe, folder, force, here, fmi, real_outputs) for recipe in recipes}
+    return {recipe.name: _ensure(recipe, folder, force, here, fmi, real_outputs) for recipe in recipes_of(names)}
 
 
 def _require_compiler(here: bool = False) -> Compiler:
@@ -76,42 +69,16 @@ def native_remark() -> str | None:
     )
 
 
-def native_fingerprint(recipe: Recipe, compiler: Compiler, fmi: int = 2, real_outputs: bool = False) -> str:
-    """Return what changes whenever a native build would."""
-    options = {
-        "fmi": fmi,
-        "real_outputs": real_outputs,
-        "name": recipe.name,
-        "class": recipe.class_name,
-        "starts": {name: float(value).hex() for name, value in sorted(recipe.starts.items())},
-        "version": __version__,
-        "compiler": [compiler.identity, *FLAGS, *(str(target.zig) for target in compiler.targets)],
-    }
-    files = [*closure(recipe.module), *_builder_files()]
-    named = [part for path in files for part in (path.name.encode(), path.read_bytes())]
-    return digest([b"native", json.dumps(options, sort_keys=True).encode(), *named])
-
-
-@cache
-def _builder_files() -> tuple[Path, ...]:
-    here = Path(__file__).parent
-    names = (
-        "archive", "arrays", "compilers", "documentation", "fmi3_description", "fmi3_files", "native_build",
-        "native_description", "native_sources", "reference_files", "stamping",
-    )  # fmt: skip
-    translation = Path(orchestrator.building.translation.__file__).parent
-    files = [*(here / f"{name}.py" for name in names), *sorted(translation.glob("*.py")), *sorted(RUNTIME.glob("*.h"))]
-    return (*files, *DATA_FILES)
-
-
 def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int, real_outputs: bool) -> Path:
     compiler = _require_compiler(here)
-    path = directory / f"{recipe.name}.fmu"
-    current = native_fingerprint(recipe, compiler, fmi, real_outputs)
-    if force or stamp_of(path) != current or not is_trusted(path):
-        write_archive(path, _native_members(recipe, compiler, current, fmi, real_outputs))
-        record(path)
-    return path
+    targets = [str(target.zig) for target in compiler.targets]
+    current = fingerprint(recipe, "native", f"{fmi} {real_outputs}", compiler.identity, *FLAGS, *targets)
+    build = partial(_build, recipe, compiler, fmi, real_outputs)
+    return bring_up_to_date(directory / f"{recipe.name}.fmu", current, force, build)
+
+
+def _build(recipe: Recipe, compiler: Compiler, fmi: int, real_outputs: bool, path: Path, current: str) -> None:
+    write_archive(path, _native_members(recipe, compiler, current, fmi, real_outputs))
 
 
 def _native_members(

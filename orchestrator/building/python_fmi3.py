@@ -8,31 +8,28 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from orchestrator.building.archive import write_archive
-from orchestrator.building.build import default_directory, is_trusted, stamp_of
+from orchestrator.building.build import bring_up_to_date, default_directory, python_toolchain
 from orchestrator.building.documentation import documentation
 from orchestrator.building.fmi3_description import fmi3_description
 from orchestrator.building.fmi3_files import terminals_and_icons
-from orchestrator.building.launcher import NATIVE, Toolchain, compile_host, find_toolchain
+from orchestrator.building.launcher import Toolchain, compile_host, find_toolchain
 from orchestrator.building.native_description import native_description
 from orchestrator.building.native_sources import OF_FMI3, RUNTIME, count_tables, indicator_total, slave_class
 from orchestrator.building.reference_files import reference_files
-from orchestrator.building.sources import DATA_FILES, Recipe, catalogue, digest, fingerprint, recipe_of
+from orchestrator.building.sources import BRIDGE, PLACEHOLDER, Recipe, digest, fingerprint, recipes_of
 from orchestrator.building.stamping import content_guid, final_text, stamp
 from orchestrator.building.starts import default_starts
 from orchestrator.building.translation.slave import has_states, variable_table
 from orchestrator.building.worker import ENTRY, pythonfmu_license, runtime_files
 from orchestrator.errors import FmuError
-from orchestrator.fmi.ours import record
-from orchestrator.shared.equation_files import closure
 from orchestrator.shared.equation_files import members as source_members
 
 PLATFORM = "x86_64-linux"
-BRIDGE = "fmi3_bridge"
-PLACEHOLDER = "{00000000-0000-0000-0000-000000000000}"
 _SOURCE = """#define _GNU_SOURCE
 #include "translated.h"
 #include "slave_types.h"
@@ -60,30 +57,20 @@ def ensure_python_fmi3(
     Args:
         directory: where they are (default: ``fmi3/`` beside those of FMI 2.0).
     """
-    recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = default_directory(3) if directory is None else directory
-    return {recipe.name: _ensure(recipe, folder, force) for recipe in recipes}
+    return {recipe.name: _ensure(recipe, folder, force) for recipe in recipes_of(names)}
 
 
 def _ensure(recipe: Recipe, directory: Path, force: bool) -> Path:
     toolchain = find_toolchain()
     if toolchain.compiler is None:
         raise FmuError("Python FMUs of FMI 3.0 need a C compiler (cc) on Linux x86_64, but there is none")
-    path = directory / f"{recipe.name}.fmu"
-    current = _fingerprint(recipe, toolchain)
-    if force or stamp_of(path) != current or not is_trusted(path):
-        write_archive(path, _members(recipe, toolchain, current))
-        record(path)
-    return path
+    current = fingerprint(recipe, "FMI 3.0", *python_toolchain(toolchain))
+    return bring_up_to_date(directory / f"{recipe.name}.fmu", current, force, partial(_build, recipe, toolchain))
 
 
-def _fingerprint(recipe: Recipe, toolchain: Toolchain) -> str:
-    here = Path(__file__).parent
-    names = ("arrays", "fmi3_description", "fmi3_files", "native_description", "native_sources", "python_fmi3")
-    files = [here / f"{name}.py" for name in names]
-    files += [*closure(BRIDGE), *sorted(RUNTIME.glob("*.h")), *sorted(NATIVE.glob("*.h")), *DATA_FILES]
-    named = [part for path in files for part in (path.name.encode(), path.read_bytes())]
-    return digest([b"FMI 3.0", fingerprint(recipe, toolchain.identity).encode(), *named])
+def _build(recipe: Recipe, toolchain: Toolchain, path: Path, current: str) -> None:
+    write_archive(path, _members(recipe, toolchain, current))
 
 
 def _members(recipe: Recipe, toolchain: Toolchain, current: str) -> dict[str, bytes]:

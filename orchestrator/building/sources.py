@@ -3,12 +3,9 @@
 import ast
 import hashlib
 import json
-import platform
-import sysconfig
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +19,9 @@ SUFFIX = "_slave"
 LAW_SUFFIX, LAW_CLASS = "_law", "WithLaw"  # of the adapter of a plant with a learned law: module and class
 # Not themselves slaves, although their names end so.
 BASES = ("plant_slave", "sampled_slave")
-DATA_FILES = tuple(sorted(path for path in (HERE / "data").glob("*") if path.is_file()))
+BRIDGE = "fmi3_bridge"
+PLACEHOLDER = "{00000000-0000-0000-0000-000000000000}"
+"""Stands for a GUID in C until the content that it follows from is known."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +60,11 @@ def recipe_of(name: str) -> Recipe:
         raise FmuError(f"`name` must be one of {', '.join(catalogue())}, but is {name!r}") from None
 
 
+def recipes_of(names: Sequence[str] | None) -> list[Recipe]:
+    """Return the recipes of these names (default: all)."""
+    return [recipe_of(name) for name in (catalogue() if names is None else names)]
+
+
 def with_law(recipe: Recipe, law: Mapping[str, Any]) -> Recipe:
     """Return the recipe of a plant with a learned law."""
     module = _law_module(recipe)
@@ -86,32 +90,28 @@ def digest(parts: Iterable[bytes]) -> str:
     return total.hexdigest()
 
 
-def fingerprint(recipe: Recipe, launcher: str) -> str:
-    """Return what changes whenever a build of ``recipe`` would: sources, builder, versions, ``launcher``.
+def fingerprint(recipe: Recipe, *made_with: str) -> str:
+    """Return what changes whenever a build of ``recipe`` would: sources, builder, start values, what it is made with.
 
     Returns:
         64 hexadecimal digits.
     """
-    files = [*closure(recipe.module), *_builder_files()]
     options = {
         "name": recipe.name,
         "class": recipe.class_name,
         "starts": {name: float(value).hex() for name, value in sorted(recipe.starts.items())},
         "law": recipe.law,
-        "versions": [__version__, version("pythonfmu"), platform.python_version()],
-        "platform": sysconfig.get_platform(),
-        "launcher": launcher,
+        "version": __version__,
+        "made with": made_with,
     }
+    files = [*closure(recipe.module), *closure(BRIDGE)]
     named = [part for path in files for part in (path.name.encode(), path.read_bytes())]
-    return digest([json.dumps(options, sort_keys=True).encode(), *named])
+    return digest([json.dumps(options, sort_keys=True).encode(), _builder_digest().encode(), *named])
 
 
 @cache
-def _builder_files() -> tuple[Path, ...]:
-    names = (
-        "archive", "documentation", "launcher", "reference_files", "reference_runs", "sources", "stamping", "starts",
-        "worker",
-    )  # fmt: skip
-    files = [HERE / f"{name}.py" for name in names]
-    files += sorted(path for path in (*HERE.glob("native/*.[ch]"), *HERE.glob("data/*")) if path.is_file())
-    return tuple(path for path in (*files, HERE.parent / "plants" / "design.py") if path.exists())
+def _builder_digest() -> str:
+    """Return a digest of all files of this room, and of the design of the start values."""
+    files = sorted(path for path in HERE.rglob("*") if path.is_file() and path.suffix != ".pyc")
+    design = HERE.parent / "plants" / "design.py"
+    return digest(part for path in (*files, design) for part in (path.name.encode(), path.read_bytes()))
