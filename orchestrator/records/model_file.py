@@ -24,7 +24,6 @@ parameter known to 5 %.
 
 import difflib
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,6 +35,7 @@ from orchestrator.plants.known import plants
 from orchestrator.records.columns import COLUMNS, EXAMPLES, KINDS, Column
 from orchestrator.records.units import parse_unit
 from orchestrator.shared.numbers import exact_text
+from orchestrator.shared.toml_files import read_toml
 
 ENCODERS = ("theta_m", "theta_l")
 MAXIMUM_BYTES = 16 * 2**20
@@ -170,7 +170,7 @@ def read_model(path: Path | None) -> Model:
     """Return the model of a TOML file, or the default model for None."""
     if path is None:
         return default_model()
-    content = _content(_decode(path), str(path))
+    content = _content(read_toml(path, MAXIMUM_BYTES), str(path))
     parameters, encoders, columns = (content.entries[name] for name in _ENTRIES)
     stated = any("uncertainty" in entry or "relative_uncertainty" in entry for entry in parameters.values())
     plant = _plant(content)
@@ -188,22 +188,6 @@ def read_model(path: Path | None) -> Model:
         content.header,
         tuple(parameters),
     )
-
-
-def _decode(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file."""
-    try:
-        if path.stat().st_size > MAXIMUM_BYTES:
-            raise ScenarioError(f"{path}: must be at most {MAXIMUM_BYTES >> 20} MB, but is larger")
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"{path}: must be UTF-8 text, but byte {error.start} is not") from None
-    except RecursionError:
-        raise ScenarioError(f"{path}: must be TOML, but is nested too deeply") from None
-    except ValueError as error:  # of which TOMLDecodeError is one
-        raise ScenarioError(f"{path}: must be TOML, but is not: {error}") from None
 
 
 def _content(raw: dict[str, Any], where: str) -> _Content:

@@ -6,7 +6,6 @@ reported at once, each problem with its path in the file.
 
 import math
 import os
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
@@ -49,6 +48,7 @@ from orchestrator.scenarios.file_format import (
 from orchestrator.scenarios.isolated import Safety, run_safely
 from orchestrator.scenarios.joining import terminal_connections
 from orchestrator.scenarios.tables import read_table
+from orchestrator.shared.toml_files import read_toml
 
 MAXIMUM_BYTES = 16 * 2**20
 
@@ -79,7 +79,7 @@ class _Top:
 
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be."""
-    content = _content(path)
+    content = read_toml(path, MAXIMUM_BYTES)
     problems: list[Problem] = []
     top = _Top(**convert_what_fits(content, ScenarioTable, "$", problems))
     reader = _Reader(path, problems)
@@ -116,20 +116,6 @@ def _joints(top: _Top, problems: list[Problem]) -> list[tuple[str, str, str]]:
         if pair is not None:
             found.append((f"$.terminals[{k}].join", *pair.join))
     return found
-
-
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        if path.stat().st_size > MAXIMUM_BYTES:
-            raise ScenarioError(f"{path}: must be at most {MAXIMUM_BYTES >> 20} MB, but is larger")
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"`scenario` must be a readable file, but {path} is not: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise ScenarioError(f"{path}: must be UTF-8 text, but is not") from None
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        text = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise ScenarioError(f"{path}: must be TOML, but is not: {text}") from None
 
 
 class _Reader:

@@ -1,13 +1,13 @@
 """Settings: frozen structs of thresholds, each with its reason, read from TOML and written into results."""
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
 from orchestrator.errors import ScenarioError
+from orchestrator.shared.toml_files import read_toml
 
 MAXIMUM_BYTES = 2**20
 S = TypeVar("S", bound="Settings")
@@ -40,17 +40,7 @@ def note(why: str) -> msgspec.Meta:
 
 def read_settings(path: Path, kind: type[S]) -> S:
     """Return settings with the values of a TOML file; what it does not name keeps its default."""
-    try:
-        if path.stat().st_size > MAXIMUM_BYTES:
-            raise ScenarioError(f"{path}: must be at most {MAXIMUM_BYTES >> 20} MB, but is larger")
-        content = tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
-    except RecursionError:
-        raise ScenarioError(f"{path}: must be TOML, but is nested too deeply") from None
-    except ValueError as error:  # of which TOMLDecodeError and UnicodeDecodeError are two
-        raise ScenarioError(f"{path}: must be TOML in UTF-8, but is not: {error}") from None
-    return settings_of(content, kind, str(path))
+    return settings_of(read_toml(path, MAXIMUM_BYTES), kind, str(path))
 
 
 def settings_of(content: dict[str, Any], kind: type[S], where: str = "settings") -> S:
