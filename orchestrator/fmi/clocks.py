@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from lxml import etree
 
-from orchestrator.fmi.variables3 import Variables3
+from orchestrator.fmi.variables3 import Variables
 from orchestrator.master.protocol import PeriodicClock, TriggeredClock
 
 _TIME = re.compile(
@@ -57,7 +57,7 @@ class Clocks:
     left_out: Sequence[str]
 
 
-def read_clocks(variables: Variables3) -> Clocks:
+def read_clocks(variables: Variables) -> Clocks:
     """Return the clocks of an FMU."""
     periodic: dict[str, PeriodicClock] = {}
     triggered: dict[str, TriggeredClock] = {}
@@ -92,7 +92,7 @@ def read_clocks(variables: Variables3) -> Clocks:
     return Clocks(periodic, triggered, outputs, features, left_out)
 
 
-def _members(variables: Variables3, reference: int) -> tuple[str, ...]:
+def _members(variables: Variables, reference: int) -> tuple[str, ...]:
     return tuple(name for name, clocks in variables.clocked.items() if reference in clocks)
 
 

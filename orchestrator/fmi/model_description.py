@@ -13,7 +13,7 @@ from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, names_in_words, read_clocks
 from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange2, read_exchange3
-from orchestrator.master.protocol import EXPONENTS, ModelInterface, Unit, Value, Variable
+from orchestrator.master.protocol import EXPONENTS, ModelInterface, Unit, Value
 from orchestrator.shared.isolation.archives import open_archive
 
 MAXIMUM_XML = 64 * 2**20
@@ -144,75 +144,46 @@ def parse_description(
         alone = ": it is for scheduled execution alone" if root.find("ScheduledExecution") is not None else ""
         raise FmuError(f"{origin}: must be an FMU for co-simulation or model exchange, but is for neither{alone}")
     try:
-        if version == "2.0":
-            return _description2(root, interface, python)
-        return _description3(root, interface, python, configured or {})
+        return _describe(root, interface, version == "2.0", python, configured or {})
     except FmuError as error:
         raise FmuError(f"{origin}: {error}") from None
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise FmuError(f"{origin}: modelDescription.xml must follow FMI {version}, but does not: {error}") from None
 
 
-def _description2(root: etree._Element, interface: etree._Element, python: bool) -> FmuDescription:
-    variables, accesses = variables2.read_variables(root)
-    names = _unique([v.name for v in variables])
-    exchange = None if interface.tag == "CoSimulation" else read_exchange2(root, interface)
-    inputs = continuous_inputs({v.name: v for v in variables}) if exchange else frozenset[str]()
-    model = ModelInterface(
-        name=root.attrib["modelName"],
-        variables=dict(zip(names, variables, strict=True)),
-        units=_units(root),
-        feedthrough=variables2.read_feedthrough(root, variables),
-        can_save_state=_flag(interface, "canGetAndSetFMUstate"),
-        can_vary_step=exchange is not None or _flag(interface, "canHandleVariableCommunicationStepSize"),
-        has_events=exchange is not None,
-        inputs_inside_steps=inputs,
-    )
-    return FmuDescription(
-        model=model,
-        version="2.0",
-        guid=root.attrib["guid"],
-        identifier=_identifier(interface),
-        python=python or "PythonFMU" in (root.get("generationTool") or ""),
-        once=_flag(interface, "canBeInstantiatedOnlyOncePerProcess"),
-        access=dict(zip(names, accesses, strict=True)),
-        exchange=exchange,
-        inputs=inputs,
-    )
-
-
-def _description3(
-    root: etree._Element, interface: etree._Element, python: bool, configured: Mapping[str, Value]
+def _describe(
+    root: etree._Element, interface: etree._Element, is_old: bool, python: bool, configured: Mapping[str, Value]
 ) -> FmuDescription:
-    found = variables3.read_variables(root, configured)
-    variables: Sequence[Variable] = found.scalars
-    names = _unique([v.name for v in variables])
-    exchange = None if interface.tag == "CoSimulation" else read_exchange3(root, interface)
-    inputs = continuous_inputs({v.name: v for v in variables}) if exchange else frozenset[str]()
-    has_events = exchange is not None or _flag(interface, "hasEventMode")
+    """Return what a description of FMI 2.0 (``is_old``) or 3.0 says."""
+    found = variables2.read_variables(root) if is_old else variables3.read_variables(root, configured)
+    names = _unique([v.name for v in found.scalars])
+    variables = dict(zip(names, found.scalars, strict=True))
+    read_exchange = read_exchange2 if is_old else read_exchange3
+    exchange = None if interface.tag == "CoSimulation" else read_exchange(root, interface)
+    inputs = continuous_inputs(variables) if exchange else frozenset[str]()
+    has_events = exchange is not None or (not is_old and _flag(interface, "hasEventMode"))
     clocks = read_clocks(found)
     if found.clocks and not has_events:
         raise ValueError(f"it has clocks ({names_in_words(list(found.clocks))}), but no event mode")
+    inside = clocks.features.inside if not is_old and _flag(interface, "providesIntermediateUpdate") else inputs
     model = ModelInterface(
         name=root.attrib["modelName"],
-        variables=dict(zip(names, variables, strict=True)),
+        variables=variables,
         units=_units(root),
-        feedthrough=variables3.read_feedthrough(root, found),
-        can_save_state=_flag(interface, "canGetAndSetFMUState"),
+        feedthrough=(variables2 if is_old else variables3).read_feedthrough(root, found),
+        can_save_state=_flag(interface, "canGetAndSetFMUstate" if is_old else "canGetAndSetFMUState"),
         can_vary_step=exchange is not None or _flag(interface, "canHandleVariableCommunicationStepSize"),
         has_events=has_events,
-        output_derivatives=int(interface.get("maxOutputDerivativeOrder", "0")) if has_events else 0,
-        inputs_inside_steps=clocks.features.inside
-        if has_events and _flag(interface, "providesIntermediateUpdate")
-        else inputs,
+        output_derivatives=0 if is_old or not has_events else int(interface.get("maxOutputDerivativeOrder", "0")),
+        inputs_inside_steps=inside if has_events else inputs,
         clocks=clocks.periodic,
         triggered=clocks.triggered,
         output_clocks=clocks.outputs,
     )
     return FmuDescription(
         model=model,
-        version="3.0",
-        guid=root.attrib["instantiationToken"],
+        version="2.0" if is_old else "3.0",
+        guid=root.attrib["guid" if is_old else "instantiationToken"],
         identifier=_identifier(interface),
         python=python or "PythonFMU" in (root.get("generationTool") or ""),
         once=_flag(interface, "canBeInstantiatedOnlyOncePerProcess"),

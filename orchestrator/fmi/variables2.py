@@ -4,13 +4,14 @@ from lxml import etree
 
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.starts import number, start_value
+from orchestrator.fmi.variables3 import Variables
 from orchestrator.master.protocol import Variable
 
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 
 
-def read_variables(root: etree._Element) -> tuple[list[Variable], list[Access]]:
-    """Return the variables and where their values are, in the order of declaration."""
+def read_variables(root: etree._Element) -> Variables:
+    """Return the variables of a model description."""
     types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/SimpleType")}
     found = []
     for scalar in root.findall("ModelVariables/ScalarVariable"):
@@ -19,7 +20,7 @@ def read_variables(root: etree._Element) -> tuple[list[Variable], list[Access]]:
             raise ValueError(f"the variable {scalar.get('name')!r} has no type")
         found.append(_variable(scalar, kind, types))
     accesses = [Access("Integer" if v.type == "Enumeration" else v.type, v.reference) for v in found]
-    return found, accesses
+    return Variables(found, accesses)
 
 
 def _variable(scalar: etree._Element, kind: etree._Element, types: dict[str, etree._Element]) -> Variable:
@@ -54,13 +55,13 @@ def _limit(kind: etree._Element, text: str | None) -> float | None:
     return None if kind.tag != "Real" and limit is not None and abs(limit) > 2**31 else limit
 
 
-def read_feedthrough(root: etree._Element, variables: list[Variable]) -> dict[str, frozenset[str]]:
+def read_feedthrough(root: etree._Element, variables: Variables) -> dict[str, frozenset[str]]:
     """Return for each output whose dependencies are declared the inputs on which it depends at once."""
     direct = {}
     for unknown in root.findall("ModelStructure/Outputs/Unknown"):
         listed = unknown.get("dependencies")
         if listed is not None:
-            known = [variables[int(index) - 1] for index in listed.split()]
-            output = variables[int(unknown.attrib["index"]) - 1]
+            known = [variables.scalars[int(index) - 1] for index in listed.split()]
+            output = variables.scalars[int(unknown.attrib["index"]) - 1]
             direct[output.name] = frozenset(v.name for v in known if v.causality == "input")
     return direct

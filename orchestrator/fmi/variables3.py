@@ -24,7 +24,7 @@ TYPES = {
 
 
 @dataclass(frozen=True)
-class Variables3:
+class Variables:
     """The variables of an FMU.
 
     Attributes:
@@ -52,7 +52,7 @@ class Variables3:
     resized: list[str] = field(default_factory=list)
 
 
-def read_variables(root: etree._Element, configured: Mapping[str, Value] | None = None) -> Variables3:
+def read_variables(root: etree._Element, configured: Mapping[str, Value] | None = None) -> Variables:
     """Return the variables of a model description.
 
     Args:
@@ -66,7 +66,7 @@ def read_variables(root: etree._Element, configured: Mapping[str, Value] | None 
         for e in elements
         if e.get("causality") == "structuralParameter" and "start" in e.attrib
     }
-    found = Variables3()
+    found = Variables()
     for element in elements:
         name = element.attrib["name"]
         if element.tag == "Clock":
@@ -109,7 +109,7 @@ def element_places(shape: tuple[int, ...]) -> list[str]:
 
 
 def _add(
-    variables: Variables3,
+    variables: Variables,
     element: etree._Element,
     declared: etree._Element | None,
     shape: tuple[int, ...],
@@ -215,7 +215,7 @@ def _starts(element: etree._Element, count: int, resized: bool) -> list[str] | N
     return texts
 
 
-def read_feedthrough(root: etree._Element, variables: Variables3) -> dict[str, frozenset[str]]:
+def read_feedthrough(root: etree._Element, variables: Variables) -> dict[str, frozenset[str]]:
     """Return for each output whose dependencies are declared the inputs on which it depends at once."""
     inputs = {v.name for v in variables.scalars if v.causality == "input"}
     direct: dict[str, frozenset[str]] = {}
