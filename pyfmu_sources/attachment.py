@@ -67,12 +67,7 @@ class AttachedEffect(Fmi2Slave):
         self.result = self.q1 if changes else self.signal
 
     def do_step(self, time: float, step: float) -> bool:
-        """Compute what arrives over this step from what is sent at its start.
-
-        Args:
-            time: beginning of the step [s].
-            step: its length [s].
-        """
+        """Compute what arrives over a step of ``step`` from ``time`` [s], of what is sent at its start."""
         kind = FEEDBACK if self.series < 0 else SERIES[self.series]
         if kind == FEEDBACK and cuts(self.law):
             self.result = across(self.law, self.signal, self._ahead(self.position), self.sign, self.q0)

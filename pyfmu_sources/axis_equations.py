@@ -71,13 +71,7 @@ Parameters = AxisParameters
 
 
 def start(position: float, speed: float, drive: float, p: Parameters) -> State:
-    """Return the state in which a simulation starts: the bristle of an axis that moves has settled.
-
-    Args:
-        position: [rad].
-        speed: [rad/s].
-        drive: torque of the drive [N.m].
-    """
+    """Return the state in which a simulation starts, of position [rad], speed [rad/s] and torque of the drive [N.m]."""
     return (position, speed, drive, start_bristle(friction_of(p), speed, position, 0.0), UNASKED)
 
 

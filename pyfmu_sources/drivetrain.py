@@ -111,9 +111,6 @@ def advance_to_event(
 ) -> tuple[State, Mode, float, int]:
     """Return :func:`advance` up to the first event, which has not had its effect yet.
 
-    Args:
-        h: step [s], positive.
-
     Returns:
         State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
     """

@@ -11,7 +11,7 @@ Conventions, the same in every function:
 - ``mode = (contact, slip_m, slip_l)``: ``contact`` is the flank that touches (-1, 0, 1; -2 and 2: touching and
   standing still, ``hysteresis`` only), ``slip`` the direction in which dry friction slides (0: it sticks);
 - ``p`` holds the parameters of ``PARAMETERS`` by name;
-- ``u`` [N.m] and ``T_l`` [N.m] are held over a step of ``h`` [s].
+- ``u`` [N.m], delayed and saturated already, and ``T_l`` [N.m] are held over a step of ``h`` [s].
 
 Torques are positive when they drive motor or load forward; ``T_l`` and the loads' effects act against the load.
 
@@ -318,7 +318,6 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
 
     Args:
         sign_m: direction of the motor's dry friction, -1 to 1; a smooth approximation passes ``tanh(w/v)``.
-        u: requested torque [N.m], delayed and saturated already.
     """
     wound_rate = 0.0
     if contact == 0 and x[7] != 0.0:

@@ -37,12 +37,9 @@ MAX_STEPS_PER_SECOND = 20000.0
 
 
 def advance(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, int]:
-    """Return state and direction of sliding after ``h`` [s] with the inputs held; stops are located.
+    """Return state and direction of sliding after ``h`` [s], positive, with the inputs held; stops are located.
 
     The state is NaN where damping, lag or ripple are so quick that no sensible number of steps resolves them.
-
-    Args:
-        h: step [s], positive.
     """
     if x[4] == UNASKED and filtered(p):
         x = (x[0], x[1], x[2], x[3], u)
@@ -71,10 +68,7 @@ def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h:
 def advance_to_event(
     x: State, mode: int, p: Parameters, u: float, T_l: float, h: float
 ) -> tuple[State, int, float, bool]:
-    """Return :func:`advance` up to the first event, its effect included.
-
-    Args:
-        h: step [s], positive.
+    """Return :func:`advance` over at most ``h`` [s], positive, up to the first event, its effect included.
 
     Returns:
         State, direction of sliding, how far it is [s], and whether there is an event.

@@ -121,12 +121,7 @@ class SlaveBase(Fmi2Slave):
         raise NotImplementedError
 
     def advance(self, time: float, step: float) -> None:
-        """Move state and outputs on by ``step`` [s], or raise and change nothing.
-
-        Args:
-            time: beginning of the step [s].
-            step: its length [s].
-        """
+        """Move state and outputs on from ``time`` by ``step`` [s], or raise and change nothing."""
         raise NotImplementedError
 
     def refresh(self) -> None:
@@ -171,12 +166,7 @@ class SlaveBase(Fmi2Slave):
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        """Take the start time; refused unless finite and before the stop time.
-
-        Args:
-            start_time: [s].
-            stop_time: [s]; None: open.
-        """
+        """Take the start time [s]; refused unless finite and before the stop time [s], which may be open."""
         if not self._expects("fmi2SetupExperiment", INSTANTIATED):
             return
         stop = LARGEST if stop_time is None else stop_time
@@ -204,11 +194,7 @@ class SlaveBase(Fmi2Slave):
             self._failed("fmi2ExitInitializationMode", error)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Move on by ``step_size`` [s]; False (``fmi2Discard``) leaves everything as it was.
-
-        Args:
-            current_time: beginning of the step [s].
-            step_size: its length [s].
+        """Move on from ``current_time`` by ``step_size`` [s]; False (``fmi2Discard``) leaves everything as it was.
 
         Returns:
             Whether the step was taken.

@@ -35,12 +35,7 @@ def column(x: State6, start: State6) -> Row:
 
 
 def propagate(x: State6, law: Law, p: Parameters, u: float, T_l: float, h: float) -> State6:
-    """Return the state after ``h`` [s] in one linear mode, whatever its guards say.
-
-    Args:
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-    """
+    """Return the state after ``h`` [s] in one linear mode, whatever its guards say, under ``u`` and ``T_l`` [N.m]."""
     count = max(1, ceil(h * fastest_rate(law, p)))
     for _ in range(count):
         x = evaluate(taylor(x, law, p, u, T_l, h / count, 0.0), 1.0)

@@ -327,11 +327,7 @@ class FmuSlave(Slave):
         return native_calls(self._functions, self._accesses(inputs), self._accesses(outputs), self._description.python)
 
     def note_warnings(self, count: int, function: str, time: float) -> None:
-        """Take warnings that the compiled loop met.
-
-        Args:
-            time: when [s].
-        """
+        """Take warnings that the compiled loop met at ``time`` [s]."""
         self._inbox.warn(f"{function} at t = {time:g} s", count)
 
     def raise_for_status(

@@ -46,11 +46,7 @@ class TimedClocks:
         self._ticks: dict[int, _Tick] = {}
 
     def begin(self, start: float) -> None:
-        """Ask for the first ticks, at the end of initialisation.
-
-        Args:
-            start: of the run [s].
-        """
+        """Ask for the first ticks, at the end of initialisation, of a run from ``start`` [s]."""
         self._ticks = {}
         for reference, kind in self._kinds.items():
             interval, qualifier = self._interval(reference)
@@ -64,11 +60,7 @@ class TimedClocks:
         return min((tick.time for tick in self._ticks.values()), default=math.inf)
 
     def take(self, time: float) -> list[int]:
-        """Return the clocks that tick now, and forget that they do.
-
-        Args:
-            time: [s].
-        """
+        """Return the clocks that tick at ``time`` [s], and forget that they do."""
         near = time + 1e-12 * max(1.0, abs(time))
         due = [reference for reference, tick in self._ticks.items() if tick.time <= near]
         for reference in due:
@@ -82,11 +74,7 @@ class TimedClocks:
         return due
 
     def ask(self, time: float, ticked: Sequence[int]) -> None:
-        """Ask for intervals that may be others now, in event mode.
-
-        Args:
-            time: [s].
-        """
+        """Ask for intervals that may be others from ``time`` [s] on, in event mode."""
         for reference, kind in self._kinds.items():
             if kind == "countdown" or (kind == "changing" and reference in ticked):
                 interval, qualifier = self._interval(reference)

@@ -113,8 +113,6 @@ def run_adaptive(
 
     Args:
         signals: signals in place of those of ``System.sources``, by index.
-        start: [s].
-        stop: [s].
         record: (recorded,) slots of the recorded signals.
 
     Returns:
@@ -141,13 +139,7 @@ def check_adaptive(layout: Layout) -> None:
 
 
 def window_end(time: float, length: float, target: float) -> float:
-    """Return where a window ends [s] that shall have a length, so that no little one is left before ``target``.
-
-    Args:
-        time: where it begins [s].
-        length: wanted [s].
-        target: beyond which it must not go [s].
-    """
+    """Return where a window from ``time`` [s] ends, of a ``length`` that leaves no little one before ``target`` [s]."""
     left = target - time
     if left <= 1.01 * length:
         return target

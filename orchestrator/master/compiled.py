@@ -166,11 +166,9 @@ class CompiledWiring:
             first += len(block.feeds)
 
     def run(self, table: Array, start: float, step: float, simultaneous: bool, out: Array, record: Slots) -> None:
-        """Run on the grid; ``out`` has shape (steps + 1, recorded), row 0 is already there.
+        """Run on the grid ``start + n step`` [s]; ``out`` has shape (steps + 1, recorded), with row 0 there.
 
         Args:
-            start: [s].
-            step: [s].
             record: (recorded,) slots of the recorded signals.
         """
         table, record = np.ascontiguousarray(table), np.ascontiguousarray(record)

@@ -15,11 +15,7 @@ Gather = Callable[[Stage], None]
 
 
 def slack(time: float) -> float:
-    """Return the distance [s] below which instants about ``time`` [s] are one: some roundings of time.
-
-    Args:
-        time: [s].
-    """
+    """Return the distance [s] below which instants about ``time`` [s] are one: some roundings of time."""
     return 1e-12 * max(1.0, abs(time))
 
 
@@ -101,12 +97,7 @@ class EventStage:
             rates[self.rate_slots] = self.events.output_rates(self.rated)
 
     def step(self, begin: float, end: float) -> StepOutcome:
-        """Step towards ``end`` [s]. Return where it ended; ``end`` itself, where that is missed by rounding.
-
-        Args:
-            begin: where the slave is [s].
-            end: [s].
-        """
+        """Step from ``begin`` towards ``end`` [s]. Return where it ended; ``end`` itself where rounding misses it."""
         self.steps += 1
         self.ends_run = ""
         if not self.has_events:
@@ -150,10 +141,7 @@ class EventStage:
         return found.again
 
     def raise_end(self, time: float) -> None:
-        """Raise where the slave wants the run to end.
-
-        Args:
-            time: [s].
+        """Raise where the slave wants the run to end, at ``time`` [s].
 
         Raises:
             RunEndedError: it wants the run to end.

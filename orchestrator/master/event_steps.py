@@ -125,12 +125,10 @@ class FixedSteps:
         gather(stage, self.view, self.table, self._column)
 
     def run(self, steps: int, rows: Array, record: Slots) -> None:
-        """Run; a row holds the values after the events at its time.
+        """Run ``steps`` communication steps; a row holds the values after the events at its time.
 
         Args:
-            steps: how many communication steps to take.
             rows: results, shape (steps + 1, recorded); row 0 is already there.
-            record: recorded slots, shape (recorded,).
 
         Raises:
             ChatteringError: there is no end of events.

@@ -79,12 +79,7 @@ class Sweeper:
         self.rated = events.rated
 
     def sweep(self, begin: float, end: float, rates: Array, guess: Track | None) -> Swept:
-        """Take all slaves from ``begin`` to ``end`` [s], or to the first event before it.
-
-        Args:
-            begin: where they are [s].
-            end: [s].
-        """
+        """Take all slaves from ``begin`` to ``end`` [s], or to the first event before it."""
         with rollback(self.wiring) as restore:
             track = self._guess_track(begin, end, rates, guess)
             for sweep in range(MOST_SWEEPS):

@@ -86,7 +86,6 @@ class EventWindows:
 
         Args:
             rows: results, shape (grid points, recorded); row 0 is already there.
-            record: recorded slots, shape (recorded,).
 
         Returns:
             Windows taken and refused, calls of slaves, events.

@@ -114,11 +114,7 @@ class EventIteration:
         return min(self._clocks.next_time(), min((s.next_event for s in self._taking), default=math.inf))
 
     def begin(self, time: float, gather: Gather) -> None:
-        """Take the first instants, in which all slaves are after initialisation.
-
-        Args:
-            time: start of the run [s].
-        """
+        """Take the first instants at ``time`` [s], in which all slaves are after initialisation."""
         self._forget(time)
         for stage in self.stages:
             if not stage.has_events:
@@ -144,11 +140,7 @@ class EventIteration:
             stage.events.enter_event_mode()
 
     def settle_alone(self, stage: EventStage, time: float) -> None:
-        """Take one slave through an event with inputs as they are; others do not see it.
-
-        Args:
-            time: where it is [s].
-        """
+        """Take one slave through an event at ``time`` [s] with inputs as they are; others do not see it."""
         self._note(time)
         stage.events.enter_event_mode()
         for _ in range(MOST_INSTANTS):
@@ -167,10 +159,7 @@ class EventIteration:
         self.catch_up(time, gather)
 
     def raise_end(self, time: float) -> None:
-        """Raise where a slave wants the run to end, after a step or an instant.
-
-        Args:
-            time: where the slaves are [s].
+        """Raise where a slave wants the run to end, after a step or an instant at ``time`` [s].
 
         Raises:
             RunEndedError: one wants the run to end.

@@ -51,14 +51,7 @@ def run_sequential(
 def run_simultaneous(
     wiring: Wiring, table: Array, start: float, step: float, steps: int, rows: Array, record: Slots
 ) -> None:
-    """Step all instances with the values of the start of the step; arguments as for ``run_sequential``.
-
-    Args:
-        start: [s].
-        step: [s].
-        rows: (steps + 1, recorded) filled from row 1 on.
-        record: (recorded,) slots of the recorded signals.
-    """
+    """Step all instances with the values of the start of the step; arguments as for ``run_sequential``."""
     values, view, stages = wiring.values, wiring.view, wiring.stages
     for n in range(steps):
         time, ended = start + n * step, None

@@ -64,11 +64,10 @@ class Iterated:
     iterations: int = 50
 
     def run(self, wiring: Wiring, table: Array, start: float, steps: int, rows: Array, record: Slots) -> int:
-        """Run on the grid; the instances of each algebraic loop are stepped until what they exchange settles.
+        """Run on the grid from ``start`` [s]; each algebraic loop is stepped until what it exchanges settles.
 
         Args:
             table: signals, shape (signals, steps + 1).
-            start: [s].
             rows: (steps + 1, recorded) filled from row 1 on.
             record: (recorded,) slots of the recorded signals.
 

@@ -43,8 +43,6 @@ def call_reporting_step(address: int, component: int, time: float, length: float
     """Return the status of a step of FMI 3.0 from ``time`` over ``length`` [s].
 
     Args:
-        time: [s].
-        length: [s].
         report: (4,) filled: event, end and early return (1: yes), time reached [s], which is set before.
     """
     flags = [_Truth() for _ in range(3)]

@@ -87,12 +87,7 @@ def dense_matrix(nodes: int) -> Array:
 
 
 def piece_times(start: float, end: float, closing: bool) -> tuple[list[float], list[bool]]:
-    """Return the instants [s] between which a slave is stepped through a window, and whether a node ends there.
-
-    Args:
-        start: of the window [s].
-        end: of the window [s].
-    """
+    """Return the instants between which a slave is stepped from ``start`` to ``end`` [s], and which are nodes."""
     edges = _breakpoints(closing)
     length = (end - start) / CELLS
     times, at_node = [start], []

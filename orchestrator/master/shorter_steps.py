@@ -27,12 +27,7 @@ class ShorterSteps:
         """Refuse calls from machine code, which shortens no steps."""
 
     def do_step(self, time: float, step: float) -> None:
-        """Advance from ``time`` to ``time + step`` [s], in parts where the whole is discarded.
-
-        Args:
-            time: [s].
-            step: [s].
-        """
+        """Advance from ``time`` to ``time + step`` [s], in parts where the whole is discarded."""
         end, now, length = time + step, time, step
         while now < end:
             last = end - now <= 1.01 * length
@@ -49,12 +44,7 @@ class ShorterSteps:
                 raise StepDiscardedError(f"{refused}: {text}", self._slave.name, time)
 
     def step(self, time: float, step: float) -> StepOutcome:
-        """Advance from ``time`` by at most ``step`` [s], less where that is discarded; see ``EventSlave``.
-
-        Args:
-            time: [s].
-            step: [s].
-        """
+        """Advance from ``time`` by at most ``step`` [s], less where that is discarded; see ``EventSlave``."""
         slave, length = cast(EventSlave, self._slave), step
         while True:
             try:
