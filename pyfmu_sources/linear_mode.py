@@ -21,7 +21,7 @@ from .equations import Parameters, backlash_model, is_rigid, shaft_damping, shaf
 State6 = tuple[float, float, float, float, float, float]
 Law = tuple[int, float, float, float]
 Row = tuple[float, float, float, float, float, float]
-Transition = tuple[Row, Row, Row, Row, Row]
+Transition = Annotated[tuple[Row, ...], 5]
 
 ELASTIC, COUPLED, LOAD_HELD, AT_REST = range(4)
 TERMS = 20

@@ -13,9 +13,8 @@ from .train_equations import Mode, Parameters, State, Torques, linear_rates
 
 # By what twists beyond the gaps (two), speeds (three), T_m, request and constant torques on the three bodies move a
 # state in one step.
-Row = tuple[float, float, float, float, float, float, float, float, float, float]
-Transition = tuple[Row, Row, Row, Row, Row, Row, Row]
-Columns = tuple[State, State, State, State, State, State, State, State, State, State]
+Row = Annotated[tuple[float, ...], 10]
+Transition = Annotated[tuple[Row, ...], 7]
 # Without contact, with that of stage 1, of stage 2, of both; for how many equal parts of a step (0: none are made).
 Table = tuple[Transition, Transition, Transition, Transition, int]
 Coefficients = Annotated[list[State], TERMS + 1]
@@ -109,26 +108,14 @@ def transition(contact_1: int, contact_2: int, p: Parameters, h: float) -> Trans
         column(rest, mode, p, (0.0, 0.0, 1.0, 0.0), h),
         column(rest, mode, p, (0.0, 0.0, 0.0, 1.0), h),
     )
-    return (
-        row_of(columns, 0), row_of(columns, 1), row_of(columns, 2), row_of(columns, 3), row_of(columns, 4),
-        row_of(columns, 5), row_of(columns, 6),
-    )  # fmt: skip
-
-
-def row_of(columns: Columns, n: int) -> Row:
-    """Return the row ``n`` of columns."""
-    return (
-        columns[0][n], columns[1][n], columns[2][n], columns[3][n], columns[4][n], columns[5][n], columns[6][n],
-        columns[7][n], columns[8][n], columns[9][n],
-    )  # fmt: skip
+    return tuple(tuple(columns[m][n] for m in range(10)) for n in range(7))
 
 
 def prepare(p: Parameters, h: float) -> Table:
     """Return the transitions of a part of a step; a step of too many parts goes by power series alone."""
     parts = max(1.0, ceil(h * fastest_rate((1, 1, 1, 1, 1), p) / SMOOTH))
     if parts > MOST_PARTS:
-        row = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        none = (row, row, row, row, row, row, row)
+        none = tuple(tuple(0.0 for m in range(10)) for n in range(7))
         return (none, none, none, none, 0)
     part = h / parts
     return (

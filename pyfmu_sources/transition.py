@@ -60,13 +60,7 @@ def transition(law: Law, p: Parameters, h: float) -> Transition:
     d = column(propagate(torque, free, p, 0.0, 0.0, h), torque)
     e = column(propagate(zero, free, p, 1.0, 0.0, h), zero)
     f = column(propagate(zero, free, p, 0.0, 1.0, h), zero)
-    rows = (
-        (a[0], b[0], c[0], d[0], e[0], f[0]),
-        (a[1], b[1], c[1], d[1], e[1], f[1]),
-        (a[2], b[2], c[2], d[2], e[2], f[2]),
-        (a[3], b[3], c[3], d[3], e[3], f[3]),
-        (a[4], b[4], c[4], d[4], e[4], f[4]),
-    )
+    rows = tuple((a[n], b[n], c[n], d[n], e[n], f[n]) for n in range(5))
     for _ in range(doublings):
         rows = double_step(rows, p.i)
     return rows
@@ -74,15 +68,8 @@ def transition(law: Law, p: Parameters, h: float) -> Transition:
 
 def double_step(rows: Transition, i: float) -> Transition:
     """Return the transition rows of two steps in a row: a stiff law needs too many Taylor steps for one."""
-    r0, r1, r2, r3, r4 = rows
-    wound = add(scale(r0, 1.0 / i), scale(r2, -1.0))
-    return (
-        add(r0, followed(r0, wound, r1, r3, r4)),
-        add(r1, followed(r1, wound, r1, r3, r4)),
-        add(r2, followed(r2, wound, r1, r3, r4)),
-        add(r3, followed(r3, wound, r1, r3, r4)),
-        add(r4, followed(r4, wound, r1, r3, r4)),
-    )
+    wound = add(scale(rows[0], 1.0 / i), scale(rows[2], -1.0))
+    return tuple(add(rows[n], followed(rows[n], wound, rows[1], rows[3], rows[4])) for n in range(5))
 
 
 def scale(row: Row, f: float) -> Row:

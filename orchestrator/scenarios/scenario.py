@@ -6,7 +6,7 @@ reported at once, each problem with its path in the file.
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from pathlib import Path
@@ -110,12 +110,15 @@ def load_scenario(path: Path) -> Scenario:
 
 def _joints(top: _Top, problems: list[Problem]) -> list[tuple[str, str, str]]:
     """Return where each pair of terminals is asked for, and the two."""
-    found = []
-    for k, table in enumerate(top.terminals):
-        pair: TerminalsTable | None = convert_table(table, TerminalsTable, f"$.terminals[{k}]", problems)
-        if pair is not None:
-            found.append((f"$.terminals[{k}].join", *pair.join))
-    return found
+    return [(f"{path}.join", *pair.join) for path, pair in _each(top.terminals, TerminalsTable, "terminals", problems)]
+
+
+def _each(tables: Sequence[Any], kind: Any, name: str, problems: list[Problem]) -> Iterator[tuple[str, Any]]:
+    """Yield the place of each table of a list that is what ``kind`` says, and the table."""
+    for k, table in enumerate(tables):
+        found = convert_table(table, kind, f"$.{name}[{k}]", problems)
+        if found is not None:
+            yield f"$.{name}[{k}]", found
 
 
 class _Reader:
@@ -219,32 +222,19 @@ class _Reader:
         return path
 
     def connections(self, tables: Sequence[Any]) -> tuple[Connection, ...]:
-        found = []
-        for k, table in enumerate(tables):
-            c: ConnectionTable | None = convert_table(table, ConnectionTable, f"$.connections[{k}]", self.problems)
-            if c is not None:
-                found.append(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit))
-        return tuple(found)
+        found = _each(tables, ConnectionTable, "connections", self.problems)
+        return tuple(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit) for _, c in found)
 
     def clock_connections(self, tables: Sequence[Any]) -> tuple[ClockConnection, ...]:
-        found = []
-        for k, table in enumerate(tables):
-            c: ClockConnectionTable | None = convert_table(
-                table, ClockConnectionTable, f"$.clock_connections[{k}]", self.problems
-            )
-            found += [] if c is None else [ClockConnection(c.source, c.target)]
-        return tuple(found)
+        found = _each(tables, ClockConnectionTable, "clock_connections", self.problems)
+        return tuple(ClockConnection(c.source, c.target) for _, c in found)
 
     def sources(
         self, tables: Sequence[Any], instances: tuple[Instance, ...], step: float, start: float
     ) -> tuple[SignalSource, ...]:
         found = []
         system = System(instances)
-        for k, table in enumerate(tables):
-            path = f"$.sources[{k}]"
-            source = convert_table(table, AnySource, path, self.problems)
-            if source is None:
-                continue
+        for path, source in _each(tables, AnySource, "sources", self.problems):
             variable = system.variable(source.target)
             before = len(self.problems)
             for name in ("value", "after", "time", "before", "amplitude", "frequency", "phase", "offset", "delay"):

@@ -113,9 +113,9 @@ def _with_capacity(base: Any, capacity: Any) -> Kind:
         raise KindError(f"a capacity must be a positive integer, but is {capacity!r}")
     if get_origin(base) is list:
         return Items(kind_of(get_args(base)[0]), capacity)
-    if get_origin(base) is tuple and get_args(base) == (float, Ellipsis):
-        return Tuple((REAL,) * capacity)
-    raise KindError("only a list or tuple[float, ...] has a capacity")
+    if get_origin(base) is tuple and get_args(base)[1:] == (Ellipsis,):
+        return Tuple((kind_of(get_args(base)[0]),) * capacity)
+    raise KindError("only a list or a tuple such as tuple[float, ...] has a capacity")
 
 
 def is_type(value: Any) -> bool:
