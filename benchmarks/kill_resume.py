@@ -89,7 +89,7 @@ def kill_once(command: list[str], out: Path, dice: random.Random, after: float) 
         workers = children(process.pid)
         process.kill()
         process.communicate()
-        wait_until_gone(workers, limit=60.0)
+        wait_until_gone(workers)
         return True, finished_cases(out), lost
     if process.returncode not in {0, 1} or "error:" in errors:
         raise SystemExit(f"the sweep ended with {process.returncode}: {errors}")
