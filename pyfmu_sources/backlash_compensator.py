@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 from .gap_traversal import Traversal, plan, point_at, request_at
 from .lqr import Estimate, Gains, control
+from .state_prediction import Train
 
 HOLD, CROSS = 0, 1
 ANY_TORQUE = 1e300  # limit of a request that is not to be limited [N.m]
@@ -51,18 +52,6 @@ class Tuning(NamedTuple):
     u_max: float
     margin: float
     sample_time: float
-
-
-class Train(NamedTuple):
-    """The drivetrain as the compensator knows it, in SI units."""
-
-    J_m: float
-    J_l: float
-    b_m: float
-    b_l: float
-    i: float
-    compliance: float
-    tau: float
 
 
 class Gap(NamedTuple):
@@ -217,11 +206,13 @@ def act(
     shifted = (x[0] - flank * d.i * gap.alpha, x[1], x[2], x[3], x[4], x[5])
     held = hold(r, shifted, gains, d, s)
     way = flank * (x[0] / d.i - x[2])
-    on_flank = way > gap.alpha or s.torque_share == 0.0
-    if on_flank or (phase == HOLD and held * flank >= 0.0):
+    unsure = DEVIATIONS * max(gap.deviation, 0.0) if phase == CROSS else 0.0
+    on_flank = way > gap.alpha + unsure or s.torque_share == 0.0
+    if on_flank or (phase == HOLD and way > 0.0 and held * flank >= 0.0):
         return (CrossingState(HOLD, flank, 0, lead, once, twice, traversal), held)
-    if phase == HOLD or samples == 0 or way < -gap.alpha - s.margin:
-        # Still on the other flank: the way begins where that is left.
+    if phase == HOLD or samples == 0 or traversal.third == 0.0 or way < -gap.alpha - s.margin:
+        # Too near or too quick for a plan: speed is what is left to be had. Still on the other flank: the way begins
+        # where that is left.
         samples = 0
         traversal = plan_crossing(flank, x, end, speed, d, s)
     state = CrossingState(CROSS, flank, samples, lead, once, twice, traversal)

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .backlash_compensator import CrossingState, Gap, Train, Tuning, act, start_state
+from .backlash_compensator import CrossingState, Gap, Tuning, act, start_state
 from .controller_variables import GAINS, INPUTS
 from .fmu_variables import FmuVariable
 from .gap_traversal import Traversal
 from .lqr import Estimate, Gains
 from .sampled_slave import SampledSlave
+from .state_prediction import MOST_LATE, Sent, Train, foresee_late, n_under_way
 
 REFERENCE, REFERENCE_SPEED, FIRST_ESTIMATE = range(3)
 ALPHA, DEVIATION, OFFSET, U, FLANK, CROSSING, FIRST_GAIN = range(FIRST_ESTIMATE + 6, FIRST_ESTIMATE + 13)
 FIRST_TRAIN = FIRST_GAIN + 5
 FIRST_TUNING = FIRST_TRAIN + 7
 SAMPLE_TIME = FIRST_TUNING + 4
+DELAY = SAMPLE_TIME + 1
 
 _INPUTS = (
     *INPUTS,
@@ -44,7 +46,7 @@ _TUNING = (
     ("margin", "rad", 3e-4, "Way before the flank at which a plan ends: noise of the encoders", 0.0, 1e6),
 )
 _INPUT_NAMES = tuple(row[0] for row in _INPUTS)
-_PARAMETER_NAMES = tuple(row[0] for row in (*GAINS, *_TRAIN, *_TUNING))
+_PARAMETER_NAMES = tuple(row[0] for row in (*GAINS, *_TRAIN, *_TUNING, ("sample_time",), ("delay",)))
 
 
 class BacklashCompensator(SampledSlave):
@@ -66,6 +68,10 @@ class BacklashCompensator(SampledSlave):
         *(FmuVariable(name, "parameter", unit, start, text, least, most)
             for name, unit, start, text, least, most in _TUNING),
         FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
+        FmuVariable(
+            "delay", "parameter", "1", 0.0, "Samples from the instant of the estimate until a request acts", 0.0,
+            MOST_LATE,
+        ),
     )  # fmt: skip
 
     _gains: Gains
@@ -76,6 +82,7 @@ class BacklashCompensator(SampledSlave):
     _once: float
     _twice: float
     _plan: Traversal
+    _sent: Sent
     _next_stage: int
     _next_flank: int
     _next_age: int
@@ -91,7 +98,10 @@ class BacklashCompensator(SampledSlave):
         self._gains = (real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4])
 
     def begin(self) -> None:
-        """Hold on the side on which the twist is."""
+        """Hold on the side on which the twist is; the torque that acts is what was requested before."""
+        self._sent = []
+        for _ in range(n_under_way(self.real[DELAY])):
+            self._sent.append(self.real[FIRST_ESTIMATE + 5])
         state = start_state(self._estimate(), self.real[REFERENCE_SPEED], self.real[FIRST_TRAIN + 4])
         self._stage = state.phase
         self._flank = state.flank
@@ -111,6 +121,8 @@ class BacklashCompensator(SampledSlave):
         self._once = self._next_once
         self._twice = self._next_twice
         self._plan = self._next_plan
+        self._sent.append(self.real[U])
+        del self._sent[:1]
 
     def correct(self) -> None:
         """Compute the torque request of this sample."""
@@ -121,9 +133,13 @@ class BacklashCompensator(SampledSlave):
         n = FIRST_TRAIN
         train = Train(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6])
         n = FIRST_TUNING
-        tuning = Tuning(real[n], real[n + 1], real[n + 2], real[n + 3], real[SAMPLE_TIME])
+        h = real[SAMPLE_TIME]
+        tuning = Tuning(real[n], real[n + 1], real[n + 2], real[n + 3], h)
         gap = Gap(real[ALPHA], real[DEVIATION])
-        state, u = act(state, real[REFERENCE], real[REFERENCE_SPEED], self._estimate(), gap, self._gains, train, tuning)
+        speed = real[REFERENCE_SPEED]
+        reference = real[REFERENCE] + real[DELAY] * h * speed
+        x = foresee_late(self._estimate(), self._sent, real[DELAY], h, max(gap.alpha, 0.0), train)
+        state, u = act(state, reference, speed, x, gap, self._gains, train, tuning)
         self._next_stage = state.phase
         self._next_flank = state.flank
         self._next_age = state.samples

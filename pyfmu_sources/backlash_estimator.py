@@ -3,8 +3,10 @@
 One filter cannot start from "anything between 2 mrad and 0.2 rad": whether the teeth touch decides everything. So
 several filters start from sizes a factor of two apart, each with the half-gap among its states (Lagerberg and
 Egardt, IEEE Trans. Control Systems Technology 15, 2007), and their likelihoods weigh them (Alspach and Sorenson,
-IEEE Trans. Automatic Control 17, 1972). The dead zone is averaged over what each filter does not know (statistical
-linearisation, Booton 1954), which keeps the estimate smooth while the gap is still uncertain.
+IEEE Trans. Automatic Control 17, 1972). A half-gap to start from is a prior: the middle filter starts there, and the
+others, still a factor of two apart, have the weights of a log-normal density. The dead zone is averaged over what
+each filter does not know (statistical linearisation, Booton 1954), which keeps the estimate smooth while the gap is
+still uncertain.
 
 A filter is a flat sequence ``f`` of ``SIZE`` floats, changed in place: nine states, their covariance row by row, and
 the logarithm of the filter's weight. The states are
@@ -60,28 +62,22 @@ def covariance(r: int, c: int) -> int:
 
 
 def start(
-    f: Filter,
-    number: int,
-    theta_m: float,
-    theta_l: float,
-    noise_m: float,
-    noise_l: float,
-    stiffness_spread: float,
-    offset_spread: float,
+    f: Filter, size: float, spread: float, weight: float, theta_m: float, theta_l: float, s: SettingValues
 ) -> None:
-    """Set filter ``number`` (0 to ``FILTERS`` - 1) at the first measured angles [rad].
+    """Set a filter at the first measured angles [rad].
 
     Args:
-        noise_m: standard deviation of the motor's angle [rad].
-        offset_spread: standard deviation of the twist in mid-gap [rad].
+        size: half-gap [rad].
+        spread: its relative standard deviation.
+        weight: logarithm of the filter's weight.
     """
     for n in range(SIZE):
         f[n] = 0.0
-    size = SMALLEST * 2.0**number
     f[0] = theta_m
     f[2] = theta_l
     f[ALPHA] = size
-    spreads = (noise_m, 1.0, noise_l, 0.3, 5.0, 1.0, RELATIVE_SPREAD * size, stiffness_spread, offset_spread)
+    f[WEIGHT] = weight
+    spreads = (s[0], 1.0, s[1], 0.3, 5.0, 1.0, spread * size, s[6], s[7])
     for n in range(STATES):
         f[covariance(n, n)] = spreads[n] * spreads[n]
 
@@ -274,10 +270,24 @@ def contact(f: Filter, i: float) -> int:
     return -1 if wound < -f[ALPHA] else 0
 
 
-def begin(filters: Filters, theta_m: float, theta_l: float, s: SettingValues) -> None:
-    """Set all filters at the first measured angles [rad] with the settings ``s``."""
+def begin(
+    filters: Filters, alpha_start: float, alpha_spread: float, theta_m: float, theta_l: float, s: SettingValues
+) -> None:
+    """Set all filters at the first measured angles [rad] with the settings ``s``.
+
+    Args:
+        alpha_start: half-gap to start from [rad]; 0: not known.
+        alpha_spread: its relative standard deviation.
+    """
+    if alpha_start <= 0.0:
+        for n in range(FILTERS):
+            start(filters[n], SMALLEST * 2.0**n, RELATIVE_SPREAD, 0.0, theta_m, theta_l, s)
+        return
+    spread = min(alpha_spread, RELATIVE_SPREAD)
     for n in range(FILTERS):
-        start(filters[n], n, theta_m, theta_l, s[0], s[1], s[6], s[7])
+        octaves = n - FILTERS // 2
+        away = octaves * log(2.0) / alpha_spread
+        start(filters[n], alpha_start * 2.0**octaves, spread, -0.5 * away * away, theta_m, theta_l, s)
 
 
 def advance(filters: Filters, m: Model, s: SettingValues, u: float, h: float) -> None:

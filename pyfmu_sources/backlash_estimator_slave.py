@@ -9,12 +9,13 @@ from .backlash_estimator import Filters, Model, SettingValues
 from .controller_variables import ENCODERS, ESTIMATED, MEASURED
 from .fmu_variables import FmuVariable, Terminals
 from .sampled_slave import SampledSlave
+from .state_prediction import MOST_LATE, Sent, n_under_way, oldest_share
 
 U, THETA_M, THETA_L, ALPHA_HAT, ALPHA_DEVIATION, CONTACT_HAT, FIRST_ESTIMATE = range(7)
 FIRST_MODEL = FIRST_ESTIMATE + 6
 FIRST_SETTING = FIRST_MODEL + 8
 SAMPLE_TIME = FIRST_SETTING + 9
-OFFSET_HAT = SAMPLE_TIME + 1
+OFFSET_HAT, ALPHA_START, ALPHA_SPREAD, DELAY = range(SAMPLE_TIME + 1, SAMPLE_TIME + 5)
 
 _MEASURED = ("theta_m", "theta_l")
 _STATES = (*ESTIMATED[:4], ESTIMATED[5], ESTIMATED[4])
@@ -40,7 +41,7 @@ _SETTINGS = (
     ("offset_spread", "rad", "Standard deviation of the twist in mid-gap", 0.0),
     ("lag_spread", "1", "Relative standard deviation of the torque's time constant", 0.0),
 )
-_BEGINNING = (*_MEASURED, *(row[0] for row in (*_MODEL, *_SETTINGS)))
+_BEGINNING = (*_MEASURED, *(row[0] for row in (*_MODEL, *_SETTINGS)), "alpha_start", "alpha_spread")
 _ZERO_ALLOWED = ("c", "b_m", "b_l")
 
 
@@ -76,6 +77,12 @@ class BacklashEstimator(SampledSlave):
             "offset_hat", "output", "rad", None, "Estimated twist in mid-gap", variability="discrete",
             depends_on=_MEASURED,
         ),
+        FmuVariable("alpha_start", "parameter", "rad", 0.0, "Half-gap to start from; 0: not known", 0.0, 1e6),
+        FmuVariable("alpha_spread", "parameter", "1", 0.2, "Relative standard deviation of alpha_start", 1e-3, 10.0),
+        FmuVariable(
+            "delay", "parameter", "1", 0.0, "Samples from a request until it acts in the measured motion", 0.0,
+            MOST_LATE,
+        ),
     )  # fmt: skip
     terminals: ClassVar[Terminals] = ENCODERS
 
@@ -83,6 +90,7 @@ class BacklashEstimator(SampledSlave):
     _settings: SettingValues
     _filters: Filters
     _predicted: Filters
+    _sent: Sent
 
     def take_parameters(self) -> None:
         """Collect model and settings."""
@@ -98,16 +106,29 @@ class BacklashEstimator(SampledSlave):
         )  # fmt: skip
 
     def begin(self) -> None:
-        """Start all filters at the first measurement."""
+        """Start all filters at the first measurement; before, the same was requested."""
+        self._sent = []
+        for _ in range(n_under_way(self.real[DELAY])):
+            self._sent.append(self.real[U])
         self._predicted = [[0.0] * source.SIZE for _ in range(source.FILTERS)]
-        source.begin(self._predicted, self.real[THETA_M], self.real[THETA_L], self._settings)
+        real = self.real
+        source.begin(
+            self._predicted, real[ALPHA_START], real[ALPHA_SPREAD], real[THETA_M], real[THETA_L], self._settings
+        )  # fmt: skip
         self._filters = [list(f) for f in self._predicted]
         self._report()
 
     def predict(self) -> None:
-        """Predict with the torque request that was held over the sample period."""
+        """Predict with the torque requests that acted over the sample period."""
+        real = self.real
         self._predicted = [list(f) for f in self._filters]
-        source.advance(self._predicted, self._model, self._settings, self.real[U], self.real[SAMPLE_TIME])
+        self._sent.append(real[U])
+        share = oldest_share(real[DELAY]) if len(self._sent) > 1 else 1.0
+        source.advance(self._predicted, self._model, self._settings, self._sent[0], share * real[SAMPLE_TIME])
+        if share < 1.0:
+            rest = (1.0 - share) * real[SAMPLE_TIME]
+            source.advance(self._predicted, self._model, self._settings, self._sent[1], rest)
+        del self._sent[:1]
 
     def correct(self) -> None:
         """Correct the prediction with the measurement."""

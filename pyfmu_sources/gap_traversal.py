@@ -97,13 +97,13 @@ def end_of_parts(
 def plan(start: Point, end_way: float, end_speed: float, level: float, tau: float, inertia: float) -> Traversal:
     """Return the traversal from ``start`` that is at ``end_way`` [rad] with ``end_speed`` [rad/s] and without torque.
 
-    Where there is none, since the start is too near or too quick to end so, its three parts last no time: what follows
-    it goes on from the start with the speed asked for. The first part is enclosed, then found by the Illinois method
+    Where there is none, since the start is too near or too quick to end so, its three parts last no time: it
+    is a way from the start on with the speed asked for. The first part is enclosed, then found by the Illinois method
     (Dowell and Jarratt, BIT 11, 1971); where its lower end has no way yet, by halving.
     """
     momentum = (end_speed - start[1]) * inertia - start[2] * tau
     ratio = exp(max(-LARGEST_EXPONENT, min(LARGEST_EXPONENT, momentum / level / tau)))
-    none = Traversal(start[0], start[1], start[2], level, 0.0, 0.0, 0.0, start[0], end_speed)
+    none = Traversal(start[0], end_speed, 0.0, level, 0.0, 0.0, 0.0, start[0], end_speed)
     has_low, second, third, way = end_of_parts(start, 0.0, ratio, level, tau, inertia)
     below = way - end_way
     if has_low and below > 0.0:

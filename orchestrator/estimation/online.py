@@ -36,7 +36,7 @@ def follow(
     first = 0
     while first < len(u) - 1 and (isnan(theta_m[first]) or isnan(theta_l[first])):
         first += 1
-    begin(filters, theta_m[first], theta_l[first], s)
+    begin(filters, 0.0, 1.0, theta_m[first], theta_l[first], s)
     for n in range(len(u)):
         if n > 0:
             advance(filters, m, s, u[n - 1], step)

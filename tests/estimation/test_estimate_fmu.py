@@ -35,8 +35,10 @@ def record() -> Record:
     return record_from_columns(columns, "loop")
 
 
-def _started(record: Record) -> BacklashEstimator:
+def _started(record: Record, **parameters: float) -> BacklashEstimator:
     slave = BacklashEstimator(instance_name="test")
+    names = [variable.name for variable in slave.table]
+    slave.set_real([names.index(name) for name in parameters], list(parameters.values()))
     slave.set_real([SAMPLE_TIME], [record.step])
     settings = ekf.default_settings(record, default_model())
     slave.set_real([FIRST_SETTING + n for n in range(len(settings))], list(settings))
@@ -57,6 +59,15 @@ def _steps(slave: BacklashEstimator, record: Record, first: int, last: int) -> l
         assert slave.do_step(n * record.step, record.step), slave.log_queue[-1].msg
         rows.append(slave.get_real(OUTPUTS))
     return rows
+
+
+@pytest.mark.parametrize("share", [0.5, 0.7, 1.3, 2.0])
+def test_a_half_gap_to_start_from_is_said_and_corrected(share: float) -> None:
+    record = record_from_columns(make_record({"alpha": 0.03}, 51, 3.0, excitation="levels")[0], "loop")
+    slave = _started(record, alpha_start=0.03 * share, alpha_spread=0.2)
+    assert slave.get_real(OUTPUTS)[:2] == pytest.approx([0.03 * share, 0.006 * share], rel=0.1)
+    rows = _steps(slave, record, 0, record.size - 1)
+    assert rows[-1][0] == pytest.approx(0.03, rel=0.02)
 
 
 def test_interpreted_and_compiled_agree(record: Record) -> None:
@@ -109,7 +120,7 @@ def test_a_filter_that_diverges_is_dropped() -> None:
     from pyfmu_sources import backlash_estimator as source
 
     filters = [[0.0] * SIZE for _ in range(FILTERS)]
-    source.begin(filters, 0.0, 0.0, NoiseSettings())
+    source.begin(filters, 0.0, 1.0, 0.0, 0.0, NoiseSettings())
     filters[0][0] = float("nan")
     filters[3][covariance(0, 0)] = -1.0
     source.measure(filters, NoiseSettings(), 0.0, 0.0)

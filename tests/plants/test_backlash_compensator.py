@@ -65,12 +65,40 @@ def test_it_pushes_or_plans_where_the_teeth_have_parted():
     rng = np.random.default_rng(3)
     planned = 0
     for _ in range(300):
-        x, flank = draw_estimate(rng, way=rng.uniform(-0.015, 0.015)), rng.choice([-1, 1])
+        flank = rng.choice([-1, 1])
+        x = draw_estimate(rng, way=flank * rng.uniform(0.001, 0.015))
         gap = Gap(0.02, 1e-4)
         state, u = act(standing(HOLD, int(flank), 0.0), x[2] + 0.1 * flank, 0.0, x, gap, GAINS, TRAIN, TUNING)
         assert state.phase == CROSS or u * state.flank >= 0.0
         planned += state.phase == CROSS
     assert 20 < planned < 280
+
+
+def test_a_flank_that_is_lost_beyond_mid_gap_is_approached_anew():
+    for way, phase in ((0.01, HOLD), (-0.001, CROSS)):
+        x = (3.984 * way, 0.0, 0.0, 0.0, 0.0, 0.0)
+        state, _ = act(standing(HOLD, 1, 0.0), 0.1, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        assert (state.phase, state.flank) == (phase, 1)
+
+
+def test_teeth_that_may_not_touch_yet_are_approached_further():
+    """The way goes on to the upper end of the interval: the torque of the LQR would slam them."""
+    going = plan((-0.02, 0.0, 0.0), 0.019, 0.1, 255.0, TRAIN.tau, TRAIN.J_m * TRAIN.i)
+    for way, phase in ((0.0205, CROSS), (0.0245, HOLD)):
+        x = (3.984 * way, 0.4, 0.0, 0.0, 0.0, 0.0)
+        state = standing(CROSS, 1, 0.0, 60, going)
+        state, _ = act(state, 0.5, 0.0, x, Gap(0.02, 2e-3), GAINS, TRAIN, TUNING)
+        assert (state.phase, state.flank) == (phase, 1)
+
+
+def test_too_quick_for_a_plan_it_brakes_and_does_not_turn_round():
+    """Only the speed is to be had: a way at which to be would pull it back through the gap."""
+    state = standing(CROSS, 1, 0.0)
+    for n, speed in enumerate((3.0, 2.7, 2.4, 0.1)):
+        x = (3.984 * (0.012 + 0.001 * n), 3.984 * speed, 0.0, 0.0, 0.0, 0.0)
+        state, u = act(state, 0.5, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        assert state.phase == CROSS
+        assert u == -300.0 if speed > 1.0 else state.traversal.third > 0.0
 
 
 def test_a_crossing_begins_only_if_the_load_would_be_ahead_when_left_alone():
