@@ -23,7 +23,7 @@ Without a half-gap that is known, the request is that of the plain LQR.
 from math import exp, fabs, log, sqrt
 from typing import NamedTuple
 
-from .gap_traversal import Traversal, plan, point_at, request_at
+from .gap_traversal import Traversal, go_on, plan, point_at, request_at
 from .lqr import Estimate, Gains, control
 from .state_prediction import Train
 
@@ -151,7 +151,10 @@ def follow(state: CrossingState, duration: float, x: Estimate, d: Train, s: Tuni
     aim = point_at(t, time, d.tau, M)
     p = min(PER_SAMPLE / s.sample_time, PER_CROSSING / duration)
     u = request_at(t, time, time + s.sample_time) - extra
-    u += d.tau * M * p * p * (p * (aim[0] - side * (x[0] / d.i - x[2])) + 2.4 * (aim[1] - side * (x[1] / d.i - x[3])))
+    behind = aim[0] - side * (x[0] / d.i - x[2])
+    if t.third == 0.0:
+        behind = min(behind, s.margin)  # the teeth may touch: no push for the way that they bar
+    u += d.tau * M * p * p * (p * behind + 2.4 * (aim[1] - side * (x[1] / d.i - x[3])))
     u += (2.4 * p * d.tau - 1.0) * (aim[2] - side * x[5] - extra)
     return side * max(-s.u_max, min(s.u_max, u))
 
@@ -206,15 +209,22 @@ def act(
     shifted = (x[0] - flank * d.i * gap.alpha, x[1], x[2], x[3], x[4], x[5])
     held = hold(r, shifted, gains, d, s)
     way = flank * (x[0] / d.i - x[2])
-    unsure = DEVIATIONS * max(gap.deviation, 0.0) if phase == CROSS else 0.0
-    on_flank = way > gap.alpha + unsure or s.torque_share == 0.0
-    if on_flank or (phase == HOLD and way > 0.0 and held * flank >= 0.0):
+    time = samples * s.sample_time
+    line = point_at(traversal, time, d.tau, d.J_m * d.i)[0]
+    unsure = (DEVIATIONS * max(gap.deviation, 0.0) + s.margin) * traversal.end_speed / s.impact_speed
+    sure = phase == HOLD or (samples > 0 and line >= gap.alpha + unsure)
+    touching = way > gap.alpha and sure
+    if touching or s.torque_share == 0.0 or (phase == HOLD and way > 0.0 and held * flank >= 0.0):
         return (CrossingState(HOLD, flank, 0, lead, once, twice, traversal), held)
-    if phase == HOLD or samples == 0 or traversal.third == 0.0 or way < -gap.alpha - s.margin:
-        # Too near or too quick for a plan: speed is what is left to be had. Still on the other flank: the way begins
-        # where that is left.
+    if phase == HOLD or samples == 0 or way < -gap.alpha - s.margin:
+        # Still on the other flank: the way begins where that is left.
         samples = 0
         traversal = plan_crossing(flank, x, end, speed, d, s)
+    elif time >= traversal.first + traversal.second + traversal.third:
+        # Too quick for a plan that has not ended yet: no line shall pull it back.
+        samples = 0
+        ahead_of_line = way > line + s.margin
+        traversal = plan_crossing(flank, x, end, speed, d, s) if ahead_of_line else go_on(line, speed, traversal.level)
     state = CrossingState(CROSS, flank, samples, lead, once, twice, traversal)
     u = follow(state, duration, x, d, s)
     return (CrossingState(CROSS, flank, samples + 1, lead, once, twice, traversal), u)

@@ -94,6 +94,11 @@ def end_of_parts(
     return (True, second, third, end_of(start, first, second, third, level, tau, inertia)[0])
 
 
+def go_on(way: float, speed: float, level: float) -> Traversal:
+    """Return the even way on from ``way`` [rad] at ``speed`` [rad/s]: a traversal whose parts last no time."""
+    return Traversal(way, speed, 0.0, level, 0.0, 0.0, 0.0, way, speed)
+
+
 def plan(start: Point, end_way: float, end_speed: float, level: float, tau: float, inertia: float) -> Traversal:
     """Return the traversal from ``start`` that is at ``end_way`` [rad] with ``end_speed`` [rad/s] and without torque.
 
@@ -103,7 +108,7 @@ def plan(start: Point, end_way: float, end_speed: float, level: float, tau: floa
     """
     momentum = (end_speed - start[1]) * inertia - start[2] * tau
     ratio = exp(max(-LARGEST_EXPONENT, min(LARGEST_EXPONENT, momentum / level / tau)))
-    none = Traversal(start[0], end_speed, 0.0, level, 0.0, 0.0, 0.0, start[0], end_speed)
+    none = go_on(start[0], end_speed, level)
     has_low, second, third, way = end_of_parts(start, 0.0, ratio, level, tau, inertia)
     below = way - end_way
     if has_low and below > 0.0:

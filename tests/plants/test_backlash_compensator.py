@@ -18,7 +18,7 @@ from pyfmu_sources.backlash_compensator import (
     lead_after,
     start_state,
 )
-from pyfmu_sources.gap_traversal import Traversal, plan
+from pyfmu_sources.gap_traversal import Traversal, go_on, plan
 from pyfmu_sources.lqr import control
 
 GAINS = (-124.680427, 127.392214, 725.091101, 3.38145167, 1.72123183)
@@ -82,13 +82,21 @@ def test_a_flank_that_is_lost_beyond_mid_gap_is_approached_anew():
 
 
 def test_teeth_that_may_not_touch_yet_are_approached_further():
-    """The way goes on to the upper end of the interval: the torque of the LQR would slam them."""
-    going = plan((-0.02, 0.0, 0.0), 0.019, 0.1, 255.0, TRAIN.tau, TRAIN.J_m * TRAIN.i)
-    for way, phase in ((0.0205, CROSS), (0.0245, HOLD)):
-        x = (3.984 * way, 0.4, 0.0, 0.0, 0.0, 0.0)
-        state = standing(CROSS, 1, 0.0, 60, going)
-        state, _ = act(state, 0.5, 0.0, x, Gap(0.02, 2e-3), GAINS, TRAIN, TUNING)
+    """Until the aim is at the upper end of the interval: the torque of the LQR would slam them."""
+    for aim, phase in ((0.0230, CROSS), (0.0245, HOLD)):
+        x = (3.984 * 0.0205, 0.4, 0.0, 0.0, 0.0, 0.0)
+        state = standing(CROSS, 1, 0.0, 1, go_on(aim - 1e-4, 0.1, 255.0))
+        state, u = act(state, 0.5, 0.0, x, Gap(0.02, 2e-3), GAINS, TRAIN, TUNING)
         assert (state.phase, state.flank) == (phase, 1)
+        assert abs(u) < 20.0 or phase == HOLD
+
+
+def test_the_way_behind_a_plan_goes_on_at_the_speed_that_is_wanted_now():
+    """A crossing that began for a small error, at a fifth of the speed, does not stay so slow."""
+    x = (3.984 * 0.0150, 0.0, 0.0, 0.0, 0.0, 0.0)
+    state = standing(CROSS, 1, 0.0, 1, go_on(0.0150, 0.019, 255.0))
+    state, _ = act(state, 0.5, 0.0, x, Gap(0.02, 2e-3), GAINS, TRAIN, TUNING)
+    assert (state.traversal.way, state.traversal.end_speed) == pytest.approx((0.015019, 0.095))
 
 
 def test_too_quick_for_a_plan_it_brakes_and_does_not_turn_round():
