@@ -79,7 +79,7 @@ def foresee_late(x: Estimate, sent: Sent, delay: float, sample_time: float, alph
     """Return the state ``delay`` samples of ``sample_time`` [s] later: what is under way acts until then.
 
     Args:
-        x: present state.
+        x: as for ``foresee``.
         alpha: half-gap [rad].
     """
     share = oldest_share(delay)
