@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import orchestrator as oc
-from orchestrator.building.build import ensure_built
 from tests.support.example_record import copy_examples
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,12 +22,11 @@ SLOW = {"diagnose", "benchmark", "calibrate", "design"}
 
 
 @pytest.fixture
-def place(tmp_path, monkeypatch):
-    """A folder with the files that the docs speak of, as the current one."""
+def place(tmp_path, monkeypatch, fmus, build_native):
+    """A folder with the files that the docs speak of, as the current one; hundreds of runs of the axis are quick."""
     copy_examples(tmp_path)
-    built = ensure_built(["Drivetrain", "ServoAxis"])
-    shutil.copy(built["Drivetrain"], tmp_path / "other.fmu")
-    shutil.copy(built["ServoAxis"], tmp_path / "axis.fmu")
+    shutil.copy(fmus["Drivetrain"], tmp_path / "other.fmu")
+    shutil.copy(build_native(["ServoAxis"])["ServoAxis"], tmp_path / "axis.fmu")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
