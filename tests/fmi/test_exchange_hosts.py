@@ -29,7 +29,7 @@ from tests.support.exchange_fmu import exchange_only
 from tests.support.waiting import HANGS
 
 pytestmark = [
-    pytest.mark.slow("plants"),
+    pytest.mark.slow(shares="plants"),
     pytest.mark.skipif(not have_compiler(), reason="native FMUs are built with a C compiler"),
 ]
 VERSIONS = pytest.mark.parametrize("version", [2, 3])

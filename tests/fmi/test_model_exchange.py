@@ -1,7 +1,9 @@
 """FMUs for model exchange alone as slaves: against analytic solutions, and ours against their co-simulation."""
 
 import math
+import shutil
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,6 @@ import pytest
 import orchestrator.master.session as session_module
 from benchmarks.half_drivetrains import couple, solve
 from orchestrator.api.simulate import simulate
-from orchestrator.building.native_build import ensure_native
 from orchestrator.diagnosis.fmu.coupled_fmus import Batch, CoupledFmus, LoadRequest, Run
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.instances import fmu_instance, make_slave
@@ -33,6 +34,7 @@ pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compi
 G, RESTITUTION = 9.81, 0.7
 FIRST = math.sqrt(2.0 / G)
 BOUNCES = [FIRST, FIRST * (1.0 + 2.0 * RESTITUTION), FIRST * (1.0 + 2.0 * RESTITUTION + 2.0 * RESTITUTION**2)]
+BuildNative = Callable[..., dict[str, Path]]
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
 
 
@@ -298,8 +300,11 @@ def test_a_diagnosis_runs_it(tmp_path: Path, version: int) -> None:
 
 
 @VERSIONS
-def test_an_fmu_for_both_is_model_exchange_where_that_is_asked_for(tmp_path: Path, version: int) -> None:
-    ensure_native(["Drivetrain", "KalmanEstimator"], tmp_path, here=True, fmi=version)
+def test_an_fmu_for_both_is_model_exchange_where_that_is_asked_for(
+    tmp_path: Path, version: int, build_native: BuildNative
+) -> None:
+    for path in build_native(["Drivetrain", "KalmanEstimator"], fmi=version).values():
+        shutil.copy(path, tmp_path)
     text = (
         'stop = 0.5\nrecord = ["a.theta_l", "b.theta_l"]\n[master]\nstep = 0.01\nevents = false\n'
         '[instances.a]\nfmu = "Drivetrain.fmu"\n[instances.b]\nfmu = "Drivetrain.fmu"\ninterface = "model_exchange"\n'
@@ -345,9 +350,9 @@ def test_a_stiff_fmu_is_integrated_by_the_implicit_method(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("whole", [["MotorHalf"], []])
-def test_half_drivetrains_meet_as_model_exchange(tmp_path: Path, whole: list[str]) -> None:
+def test_half_drivetrains_meet_as_model_exchange(tmp_path: Path, whole: list[str], build_native: BuildNative) -> None:
     """Contacts between two FMUs under error control, against the solution of both as one system."""
-    paths = ensure_native(["MotorHalf", "LoadHalf"], tmp_path, here=True, fmi=3)
+    paths = build_native(["MotorHalf", "LoadHalf"], fmi=3)
     for name in {"MotorHalf", "LoadHalf"}.difference(whole):
         paths[name] = exchange_only(paths[name], tmp_path / f"{name}_exchange.fmu")
     with Session(
@@ -369,9 +374,9 @@ def test_half_drivetrains_meet_as_model_exchange(tmp_path: Path, whole: list[str
     ("name", "output", "start"), [("Drivetrain", "theta_l", {"alpha": 0.02}), ("ServoAxis", "theta_m", {})]
 )
 def test_model_exchange_of_ours_is_their_co_simulation(
-    tmp_path: Path, version: int, name: str, output: str, start: dict[str, float]
+    tmp_path: Path, version: int, name: str, output: str, start: dict[str, float], build_native: BuildNative
 ) -> None:
-    whole = ensure_native([name], tmp_path, here=True, fmi=version)[name]
+    whole = build_native([name], fmi=version)[name]
     path = exchange_only(whole, tmp_path / "exchange.fmu")
     found = []
     for fmu, events in ((whole, False), (path, True), (path, False)):

@@ -1,12 +1,13 @@
 """Clocks that one FMU triggers in another: plant, controller and supervisor, as co-simulation and model exchange."""
 
 import math
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orchestrator.building.native_build import ensure_native
 from orchestrator.errors import ConnectionMismatchError, ScenarioError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi
@@ -140,12 +141,14 @@ def test_clocks_trigger_across_processes(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found[1:, ::100], exact(1.0)[0][1:])
 
 
-def test_ssp_says_nothing_of_clocks_that_are_joined_or_have_other_times(fmus: dict[str, Path], tmp_path: Path) -> None:
+def test_ssp_says_nothing_of_clocks_that_are_joined_or_have_other_times(
+    fmus: dict[str, Path], tmp_path: Path, build_native: Callable[..., dict[str, Path]]
+) -> None:
     path = fmus["Plant"].parent / "ssp.toml"
     path.write_text(TEXT + JOINED)
     with pytest.raises(ScenarioError, match="clock_connections: must be left out to be written as SSP"):
         write_ssp(tmp_path / "a.ssp", load_scenario(path), "2.0")
-    ensure_native(["LqrController"], tmp_path, here=True, fmi=3)
+    shutil.copy(build_native(["LqrController"], fmi=3)["LqrController"], tmp_path)
     path = tmp_path / "times.toml"
     text = 'stop = 0.1\nrecord = ["a.u"]\n[master]\nstep = 0.01\n[instances.a]\nfmu = "LqrController.fmu"\n'
     path.write_text(text + "[instances.a.clocks.sample]\ninterval = 0.005\n")

@@ -1,13 +1,14 @@
 """Terminals of FMUs of FMI 3.0: joined in one line of a scenario, with what does not match named."""
 
+import shutil
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from orchestrator.building.compilers import find_compiler
-from orchestrator.building.native_build import ensure_native
 from orchestrator.errors import ConnectionMismatchError, FmuError, ScenarioError
 from orchestrator.fmi.terminals import FILE, Joint, Member, Terminal, TerminalEnd, join_terminals, read_terminals
 from orchestrator.master.protocol import ModelInterface, Unit, Variable
@@ -100,9 +101,10 @@ ONE_BY_ONE = "".join(
 
 
 @pytest.fixture(scope="module")
-def halves(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def halves(tmp_path_factory: pytest.TempPathFactory, build_native: Callable[..., dict[str, Path]]) -> Path:
     folder = tmp_path_factory.mktemp("halves")
-    ensure_native(["MotorHalf", "LoadHalf"], folder, here=True, fmi=3)
+    for path in build_native(["MotorHalf", "LoadHalf"], fmi=3).values():
+        shutil.copy(path, folder)
     return folder
 
 
