@@ -33,16 +33,19 @@ def run(words, folder):
     )
 
 
-COMMANDS = [
-    found[1]
-    for page in ("README.md", "docs/tour.md")
-    for body in blocks(page, "sh")
-    for found in re.finditer(r"(?:^|/)(python -m orchestrator .*)$", body, re.MULTILINE)
-]
+LINES = {
+    page: re.findall(r"(?:^ *|/)(python -m orchestrator .*)$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE)
+    for page in ("README.md", "docs/tour.md", "docs/your-machine.md")
+}
+COMMANDS = list(dict.fromkeys(line for lines in LINES.values() for line in lines))  # what stands twice is run once
+(DIAGNOSE,) = (line for line in COMMANDS if " diagnose " in line)
+CHECK = "python -m orchestrator check results/diagnose/Drivetrain_machine.fmu"
 
 
 def test_there_are_commands_to_test():
     assert len(COMMANDS) >= 6
+    assert len(LINES["docs/your-machine.md"]) == 5
+    assert LINES["docs/your-machine.md"][3:] == [DIAGNOSE, CHECK]
 
 
 def test_the_first_command_installs_what_it_needs():
@@ -54,22 +57,32 @@ def test_the_first_command_installs_what_it_needs():
 
 def done_in(folder, line, whole):
     """Run a command of the README where the examples are, with whole records or short ones; return what it found."""
-    words = shlex.split(line)
     copy_examples(folder / "docs" / "examples", whole)
+    return done_there(folder, line)
+
+
+def done_there(folder, line):
+    words = shlex.split(line)
     done = run([sys.executable, *words[1:]], folder)
     assert done.returncode == 0, done.stderr
     return json.loads((folder / "results" / words[3] / f"{words[3]}.json").read_text(encoding="utf-8"))["results"]
 
 
-@pytest.mark.parametrize("line", [line for line in COMMANDS if " diagnose " not in line])
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory, fmus):
+    """The folder in which the diagnosis of the README ran, and what it found."""
+    folder = tmp_path_factory.mktemp("diagnosed")
+    return folder, done_in(folder, DIAGNOSE, whole=True)
+
+
+@pytest.mark.parametrize("line", [line for line in COMMANDS if line not in (DIAGNOSE, CHECK)])
 def test_command_of_the_readme(line, tmp_path, fmus):
     assert done_in(tmp_path, line, whole=False)
 
 
-@pytest.mark.slow
-def test_the_diagnosis_finds_what_the_readme_says(tmp_path, fmus):
-    (line,) = (line for line in COMMANDS if " diagnose " in line)
-    found = done_in(tmp_path, line, whole=True)
+@pytest.mark.slow(shares="diagnosed")
+def test_the_diagnosis_finds_what_the_readme_says(diagnosed):
+    _, found = diagnosed
     gap, friction = (effect["parameters"] for effect in found["effects"])
     sizes = [(gap["alpha"], 5, HALF_GAP), (friction["torque"], 3, FRICTION)]
     rows = []
@@ -84,15 +97,10 @@ def test_the_diagnosis_finds_what_the_readme_says(tmp_path, fmus):
     assert [row for row in rows if row not in said] == []
 
 
-@pytest.mark.slow
-def test_the_five_steps_on_the_reader_s_own_machine(tmp_path, fmus):
-    page = (ROOT / "docs" / "your-machine.md").read_text(encoding="utf-8")
-    lines = re.findall(r"^ *(python -m orchestrator .*)$", page, re.MULTILINE)
-    assert len(lines) == 5
-    copy_examples(tmp_path / "docs" / "examples")
-    for line in lines:
-        done = run([sys.executable, *shlex.split(line)[1:]], tmp_path)
-        assert done.returncode == 0, done.stdout + done.stderr
+@pytest.mark.slow(shares="diagnosed")
+def test_the_fmu_of_the_diagnosis_passes_the_check(diagnosed):
+    folder, _ = diagnosed
+    assert done_there(folder, CHECK)
 
 
 def test_the_example_record_is_what_its_simulator_makes():
