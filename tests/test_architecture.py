@@ -3,13 +3,10 @@
 import ast
 import re
 from functools import cache
-from pathlib import Path
 
 from orchestrator.cli import COMMANDS, build_parser
+from tests.support.sources import ROOT, SOURCES, tree_of
 
-ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("orchestrator", "pyfmu_sources")
-SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 # Words without which a command line is refused.
 NEEDED = {
     "diagnose": ["a.csv"],
@@ -71,11 +68,6 @@ def layer_of(room):
 
 def words_of(path):
     return path.relative_to(ROOT / "orchestrator").with_suffix("").parts
-
-
-@cache
-def tree_of(path):
-    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def imports(path):

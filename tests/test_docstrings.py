@@ -2,17 +2,11 @@
 
 import ast
 import re
-from pathlib import Path
+from functools import cache
 
 import orchestrator
+from tests.support.sources import ROOT, SOURCES, tree_of
 
-ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("orchestrator", "pyfmu_sources")
-TREES = {
-    path.relative_to(ROOT).with_suffix("").as_posix().replace("/", "."): ast.parse(path.read_text(encoding="utf-8"))
-    for package in PACKAGES
-    for path in sorted((ROOT / package).rglob("*.py"))
-}
 # What others build on: base classes and protocols, beside all that `orchestrator` exports.
 PROTOCOLS = (
     "orchestrator.diagnosis.model.interface",
@@ -25,13 +19,22 @@ CONTENT = re.compile(r"\[[^\]]+\]|\(\w+,|\d|`|shape|\"|->")
 FEWEST_WORDS = 4
 
 
-CLASSES = {node.name: node for tree in TREES.values() for node in tree.body if isinstance(node, ast.ClassDef)}
+@cache
+def trees():
+    """The sources by the names of their modules."""
+    return {path.relative_to(ROOT).with_suffix("").as_posix().replace("/", "."): tree_of(path) for path in SOURCES}
+
+
+@cache
+def classes():
+    """All classes of the sources by name."""
+    return {node.name: node for tree in trees().values() for node in tree.body if isinstance(node, ast.ClassDef)}
 
 
 def inherited(name):
     """Names of the methods that the bases of a class document."""
-    bases = [base.id for base in CLASSES[name].bases if isinstance(base, ast.Name) and base.id in CLASSES]
-    known = {f.name for base in bases for f in CLASSES[base].body if isinstance(f, ast.FunctionDef)}
+    bases = [base.id for base in classes()[name].bases if isinstance(base, ast.Name) and base.id in classes()]
+    known = {f.name for base in bases for f in classes()[base].body if isinstance(f, ast.FunctionDef)}
     return known.union(*(inherited(base) for base in bases))
 
 
@@ -66,9 +69,9 @@ def lacking(node):
 def public_nodes():
     """Functions and classes that are exported, and those of the protocols, with their modules."""
     for name, module in {**vars(orchestrator)["_PUBLIC"], "Result": "orchestrator.api.shown"}.items():
-        yield from ((module, node) for node in TREES[module].body if getattr(node, "name", None) == name)
+        yield from ((module, node) for node in trees()[module].body if getattr(node, "name", None) == name)
     for module in PROTOCOLS:
-        public = [n for n in TREES[module].body if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+        public = [n for n in trees()[module].body if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
         yield from ((module, node) for node in public if not node.name.startswith("_"))
 
 
@@ -116,7 +119,7 @@ def empty_words(tree):
 
 
 def test_lines_on_arguments_say_more_than_the_name():
-    assert not [f"{module}: {line}" for module, tree in TREES.items() for line in empty_words(tree)]
+    assert not [f"{module}: {line}" for module, tree in trees().items() for line in empty_words(tree)]
 
 
 def test_lines_that_repeat_a_name_are_found():

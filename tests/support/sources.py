@@ -1,0 +1,14 @@
+"""The project's Python sources and what they parse to, which several tests read."""
+
+import ast
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = sorted(path for package in ("orchestrator", "pyfmu_sources") for path in (ROOT / package).rglob("*.py"))
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """Return what a file parses to."""
+    return ast.parse(path.read_text(encoding="utf-8"))
