@@ -105,7 +105,7 @@ def block_variance(fit: Fit[Any], column: int, blocks: int) -> float:
     rounding, errors of the model and of the log's times make errors that hang together within a block, which the
     Fisher information does not know. Student's distribution makes up for the number of blocks.
     """
-    from scipy.stats import chi2, t
+    from scipy.special import gammaincinv, stdtrit
 
     scores = fit.likelihood.scores(fit.point, fit.free)
     sums = np.array([block.sum(axis=0) for block in np.array_split(scores, blocks)])
@@ -117,9 +117,9 @@ def block_variance(fit: Fit[Any], column: int, blocks: int) -> float:
     weights = np.where(inside, fit.covariance[:, column], 0.0)  # what is held at its bound carries no error on
     variance = float(np.sum((sums @ weights) ** 2)) * blocks / (blocks - 1.0)
     ratio = variance / max(float(fit.covariance[column, column]), 1e-300)
-    if not ratio > float(chi2.ppf(0.975, blocks - 1)) / (blocks - 1.0):
+    if not ratio > 2.0 * float(gammaincinv(0.5 * (blocks - 1), 0.975)) / (blocks - 1.0):
         return 1.0
-    return ratio * (float(t.ppf(0.975, blocks - 1)) / NORMAL_95) ** 2
+    return ratio * (float(stdtrit(blocks - 1, 0.975)) / NORMAL_95) ** 2
 
 
 def _value(likelihood: Likelihood, fit: GapFit, name: str) -> float:
