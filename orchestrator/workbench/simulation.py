@@ -73,10 +73,11 @@ class SliderModel:
         sliders = []
         for name in self._names():
             entry, value = table[name], self._given.get(name, self._default(name))
-            high = min(3.0 * abs(value), entry.maximum) if value else 0.05
+            span = 3.0 * abs(value) or 0.05
+            low = value / 20.0 if name in self._plant.linear else -span if entry.minimum < 0.0 else 0.0
             sliders.append({
                 "name": name, "unit": entry.unit, "meaning": entry.description, "value": value,
-                "low": max(entry.minimum, value / 20.0 if name in self._plant.linear else 0.0), "high": high,
+                "low": max(entry.minimum, low), "high": min(span, entry.maximum),
             })  # fmt: skip
         measured = {name: _as_list(values) for name, values in self._measured.items()}
         return {"kind": self._kind, "sliders": sliders, "time": _as_list(self._time), "measured": measured}

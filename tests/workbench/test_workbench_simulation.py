@@ -12,7 +12,7 @@ from orchestrator.workbench.simulation import SliderModel, SliderModels
 
 STEP, ROWS = 0.002, 400
 STARTS = {"theta_m_start": 0.1, "omega_m_start": 0.0, "theta_l_start": 0.02, "omega_l_start": 0.0, "T_m_start": 0.0}
-VALUES = {"alpha": 0.01, "J_m": 0.3}
+VALUES = {"alpha": 0.01, "J_m": 0.3, "effects.load_torque.torque": -2.0}
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "torque.csv").write_text(
         "time,u\n" + "\n".join(f"{t:.3f},{u!r}" for t, u in zip(time, torque.tolist(), strict=True))
     )
-    given = ", ".join(f"{name} = {value}" for name, value in {**VALUES, **STARTS}.items())
+    given = ", ".join(f'"{name}" = {value}' for name, value in {**VALUES, **STARTS}.items())
     (folder / "loop.toml").write_text(f"""
 stop = {(ROWS - 1) * STEP}
 record = ["plant.theta_m", "plant.theta_l"]
