@@ -81,6 +81,8 @@ def test_a_model_file_is_read(tmp_path: Path) -> None:
         ('[columns.theta_m]\nunit = "lux"', "`columns.theta_m.unit` in {} must be one of rad, deg, rev, m"),
         ("a =", "{}: must be TOML, but is not: Invalid value"),
         ("a = " + 5000 * "[", "{}: must be TOML, but is nested too deeply"),
+        (".".join(200 * ["a"]) + " = 1", "{}: must be TOML, but is nested too deeply"),
+        ("[" + " . ".join(200 * ["'a'"]) + "]", "{}: must be TOML, but is nested too deeply"),
     ],
 )
 def test_mistakes_are_named(tmp_path: Path, text: str, expected: str) -> None:
