@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import math
 import re
 import secrets
 import socket
@@ -32,7 +33,7 @@ from orchestrator.workbench.model_fields import model_fields, model_text
 from orchestrator.workbench.scenario_text import scenario_text
 from orchestrator.workbench.session import SessionFolder
 from orchestrator.workbench.settings import WorkbenchSettings
-from orchestrator.workbench.simulation import SliderModels
+from orchestrator.workbench.simulation import SliderModel, SliderModels
 from orchestrator.workbench.uploads import UploadTooLargeError, save_upload
 
 # What a browser shows; all else is handed out as a download.
@@ -117,8 +118,7 @@ class Workbench:
             raise InputError(str(error).replace(str(draft), "the model")) from None
         finally:
             draft.unlink(missing_ok=True)
-        path = self.session.reserve_file(str(asked.get("name") or "machine.toml"))
-        write_whole(path, text)
+        path = self.session.write_file(str(asked.get("name") or "machine.toml"), text)
         return JSONResponse({"file": self.session.reference_of(path), "name": path.name}, 201)
 
     async def start(self, request: Request) -> Response:
@@ -154,14 +154,13 @@ class Workbench:
         """Write a scenario that was drawn; whether it fits, its run says."""
         asked = await self._asked(request)
         text = scenario_text(self.session, asked)
-        path = self.session.reserve_file(str(asked.get("name") or "scenario.toml"))
-        write_whole(path, text)
+        path = self.session.write_file(str(asked.get("name") or "scenario.toml"), text)
         return JSONResponse({"file": self.session.reference_of(path), "name": path.name, "text": text}, 201)
 
     async def sliders(self, request: Request) -> Response:
         """Return the sliders of a result's model, and what was measured."""
         folder = self._result(request.query_params.get("job", ""))
-        return JSONResponse(await run_in_threadpool(lambda: self.models.model(folder).describe()))
+        return JSONResponse(await run_in_threadpool(lambda: self.models.use(folder, SliderModel.describe)))
 
     async def simulate(self, request: Request) -> Response:
         """Run a result's model with the values of the sliders."""
@@ -169,7 +168,7 @@ class Workbench:
         folder, values = self._result(str(asked.get("job"))), asked.get("values", {})
         if not isinstance(values, Mapping):
             raise InputError("`values` must be numbers by name, but is none")
-        return JSONResponse(await run_in_threadpool(lambda: self.models.model(folder).run(values)))
+        return JSONResponse(await run_in_threadpool(lambda: self.models.use(folder, lambda model: model.run(values))))
 
     async def compare(self, request: Request) -> Response:
         """Return the page on two results of one command."""
@@ -193,9 +192,10 @@ class Workbench:
             if len(body) > self.settings.largest_request:
                 raise UploadTooLargeError(f"a request must have at most {self.settings.largest_request} bytes")
         try:
-            asked = json.loads(body)
+            asked = json.loads(body, parse_constant=_finite, parse_float=_finite, parse_int=_finite)
+            json.dumps(asked, ensure_ascii=False).encode("utf-8")  # half a character can be escaped, and be no text
         except (ValueError, RecursionError):
-            raise InputError("the request must be JSON, but is not") from None
+            raise InputError("the request must be JSON of finite numbers and Unicode text, but is not") from None
         if not isinstance(asked, dict):
             raise InputError("the request must be a JSON object, but is not")
         return asked
@@ -205,6 +205,14 @@ class Workbench:
         path = self.session.folder / f".look-{secrets.token_hex(8)}.toml"
         write_whole(path, text)
         return path
+
+
+def _finite(text: str) -> int | float:
+    """Return a number of JSON; NaN and what is too large are none."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return int(text) if text.removeprefix("-").isdigit() else value
 
 
 def _problem(text: str, status: int) -> JSONResponse:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from orchestrator.errors import InputError, OutputError
 from orchestrator.shared.operating_system import PLAIN_FILE
+from orchestrator.shared.output import write_whole
 
 FILES, RESULTS = "files", "results"
 LONGEST_NAME = 120
@@ -56,7 +57,10 @@ class SessionFolder:
             InputError: the name has a folder, or is none.
         """
         if not is_name(name):
-            raise InputError(f"`name` must be a file's name without folders, but is {name[:LONGEST_NAME]!r}")
+            raise InputError(
+                f"`name` must be a file's name of at most {LONGEST_NAME} bytes, without folders and not hidden, "
+                f"but is {name[:LONGEST_NAME]!r}"
+            )
         stem, dot, suffix = name.partition(".")
         for number in range(1, 10_000):
             path = self.files / (name if number == 1 else f"{stem}-{number}{dot}{suffix}")
@@ -68,6 +72,16 @@ class SessionFolder:
                 raise OutputError(f"cannot write {path}: {error.strerror}") from None
             return path
         raise InputError(f"`name` must be new, but there are 10,000 files called {name!r}")
+
+    def write_file(self, name: str, text: str) -> Path:
+        """Write a text among the uploads, whole or not at all, and return its path."""
+        path = self.reserve_file(name)
+        try:
+            write_whole(path, text)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
+        return path
 
     def reserve_result(self, command: str) -> Path:
         """Return a new, empty folder for the results of a command: ``results/COMMAND-N``."""

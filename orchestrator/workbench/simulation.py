@@ -9,7 +9,7 @@ import json
 import math
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ NAME = "plant"
 
 
 class SliderModel:
-    """A fitted or corrected model that runs under sliders; close it after use.
+    """A fitted or corrected model that runs under sliders, for one thread at a time; close it after use.
 
     Args:
         folder: results of ``diagnose`` or ``estimate``, which say the model and where its runs begin.
@@ -53,7 +53,7 @@ class SliderModel:
         builds = ensure_fastest([live.fmu])
         self._kind = builds.kind
         instance = fmu_instance(NAME, builds.paths[live.fmu], {**self._given, **live.starts[0]})
-        step, self._lock = live.step, threading.Lock()
+        step = live.step
         asked = Samples(self._requests, step)
         system = System((instance,), (), (SignalSource(f"{NAME}.u", asked),))
         self._start = {**{name: self._given.get(name, self._default(name)) for name in self._names()}, **live.starts[0]}
@@ -64,8 +64,7 @@ class SliderModel:
 
     def close(self) -> None:
         """Free the FMU."""
-        with self._lock:
-            self._session.__exit__(None, None, None)
+        self._session.__exit__(None, None, None)
 
     def describe(self) -> dict[str, Any]:
         """Return the sliders, and what was measured."""
@@ -104,9 +103,8 @@ class SliderModel:
                 raise InputError(f"`{name}` must be in [{entry.minimum:g}, {entry.maximum:g}], but is {value:g}")
             given[name] = float(value)
         begun = time.perf_counter()
-        with self._lock:
-            result = self._session.run({f"{NAME}.{name}": value for name, value in given.items()})
-            curves = {name: _as_list(result[f"{NAME}.{name}"]) for name in self._measured}
+        result = self._session.run({f"{NAME}.{name}": value for name, value in given.items()})
+        curves = {name: _as_list(result[f"{NAME}.{name}"]) for name in self._measured}
         return {"curves": curves, "seconds": time.perf_counter() - begun}
 
     def _names(self) -> list[str]:
@@ -125,14 +123,17 @@ class SliderModels:
         self._most, self._lock = most, threading.Lock()
         self._models: dict[str, SliderModel] = {}
 
-    def model(self, folder: Path) -> SliderModel:
-        """Return the model of a result, opened when it is first asked for."""
+    def use(self, folder: Path, act: Callable[[SliderModel], dict[str, Any]]) -> dict[str, Any]:
+        """Return what an act gives of the model of a result, which is opened when it is first asked for.
+
+        One act at a time: no model is closed, or run anew, while another thread runs it.
+        """
         with self._lock:
             model = self._models.pop(folder.name, None) or SliderModel(folder)
             self._models[folder.name] = model
             while len(self._models) > self._most:
                 self._models.pop(next(iter(self._models))).close()
-            return model
+            return act(model)
 
     def close(self) -> None:
         """Free all of them."""

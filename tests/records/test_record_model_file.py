@@ -94,3 +94,8 @@ def test_mistakes_are_named(tmp_path: Path, text: str, expected: str) -> None:
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match="cannot be read"):
         read_model(tmp_path / "absent.toml")
+
+
+def test_a_file_of_an_editor_that_marks_its_encoding_is_read(tmp_path: Path) -> None:
+    (tmp_path / "model.toml").write_bytes(b"\xef\xbb\xbf[parameters.J_m]\r\nvalue = 0.3\r\n")
+    assert read_model(tmp_path / "model.toml").parameters["J_m"].value == 0.3

@@ -241,8 +241,19 @@ def test_commands_that_are_not_offered_are_refused(served: Served, asked: object
 
 def test_bodies_that_are_no_requests_are_refused(served: Served) -> None:
     header = {"content-type": "application/json"}
-    for body in (b"", b"{", b"[" * 100_000, b"\xff\xfe", b"NaN", b'"x"'):
+    whole = '{"command": "inspect", "inputs": ["files/log.csv"], "options": {"rate": %s}}'
+    numbers = [(whole % text).encode() for text in ("NaN", "1e999", "-Infinity", "1" + 400 * "0")]
+    for body in (b"", b"{", b"[" * 100_000, b"\xff\xfe", b"NaN", b'"x"', *numbers):
         assert served.ask("POST", "jobs", body, header)[0] == 400
+    before = files(served)
+    for place, body in (
+        ("columns", b'{"file": "files/log.csv", "columns": {"u": {"name": "\\ud800"}}}'),
+        ("models", b'{"name": "\\ud800.toml"}'),
+        ("scenarios", b'{"stop": 1, "instances": {"\\ud800": {"fmu": "files/log.csv"}}}'),
+    ):
+        status, said = served.ask("POST", place, body, header)
+        assert (status, "Unicode" in said["error"]) == (400, True)
+    assert files(served) == before
     assert served.ask("POST", "jobs", b" " * 1_200_000, header)[0] == 413
     assert served.ask("DELETE", "state")[0] == 405
     assert served.ask("POST", "jobs/none/stop", {})[0] == 400

@@ -1,14 +1,18 @@
 """Sliders of a result: at home its curves are those of the result, and nothing goes out of its range."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
 
 from orchestrator.api.simulate import simulate
 from orchestrator.errors import InputError
+from orchestrator.workbench import simulation
 from orchestrator.workbench.simulation import SliderModel, SliderModels
+from tests.support.workbench import HANGS
 
 STEP, ROWS = 0.002, 400
 STARTS = {"theta_m_start": 0.1, "omega_m_start": 0.0, "theta_l_start": 0.02, "omega_l_start": 0.0, "T_m_start": 0.0}
@@ -99,8 +103,31 @@ def test_results_without_a_model_are_refused(tmp_path: Path) -> None:
         SliderModel(tmp_path / "check-1")
 
 
-def test_only_the_latest_models_stay_open(result: Path) -> None:
+def test_only_the_latest_models_stay_open(result: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No model is closed while another thread runs it: the FMU's memory would be gone."""
+    open_models, told, go_on = set(), Event(), Event()
+
+    class Model:
+        def __init__(self, folder: Path) -> None:
+            open_models.add(self)
+
+        def close(self) -> None:
+            open_models.remove(self)
+
+    monkeypatch.setattr(simulation, "SliderModel", Model)
     models = SliderModels(1)
-    first = models.model(result)
-    assert models.model(result) is first
+
+    def run(model: Model) -> dict:
+        told.set()
+        assert go_on.wait(HANGS)
+        return {"open": model in open_models}
+
+    with ThreadPoolExecutor(2) as threads:
+        first = threads.submit(models.use, result, run)
+        assert told.wait(HANGS)
+        second = threads.submit(models.use, result.with_name("diagnose-2"), lambda model: {"all": len(open_models)})
+        assert not wait([second], 0.2).done
+        go_on.set()
+        assert (first.result(), second.result()) == ({"open": True}, {"all": 1})
     models.close()
+    assert not open_models
