@@ -1,5 +1,6 @@
 """Jobs of the workbench: the command itself, its numbers, its Ctrl-C, and what is left when the server dies."""
 
+import asyncio
 import json
 import re
 import shutil
@@ -10,6 +11,9 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.shared.isolation.walls import support
+from orchestrator.workbench import jobs
+from orchestrator.workbench.session import open_session
+from orchestrator.workbench.settings import WorkbenchSettings
 from tests.support.broken_archives import ARCHIVES
 from tests.support.c_fmu import have_compiler
 from tests.support.engine_process import children, wait_until_gone
@@ -182,3 +186,29 @@ def test_the_end_of_the_server_stops_its_jobs(tmp_path: Path, log: Path) -> None
         first.process.wait(HANGS)
         wait_until_gone(running)
     assert json.loads((folder / "results" / name / "job.json").read_text())["state"] == "stopped"
+
+
+def test_looks_at_files_wait_for_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever clicks faster than a file is read does not start a process for each click at once."""
+    under_way, most = 0, 0
+
+    class Process:
+        returncode = 0
+
+        async def communicate(self) -> tuple[bytes, bytes]:
+            nonlocal under_way, most
+            most = max(most, under_way := under_way + 1)
+            await asyncio.sleep(0)
+            under_way -= 1
+            return b"{}", b""
+
+    async def spawn(*given: object) -> Process:
+        return Process()
+
+    async def look(count: int) -> list[tuple[int, str, str]]:
+        found = jobs.Jobs(open_session(tmp_path / "session"), WorkbenchSettings(jobs_at_once=3))
+        return await asyncio.gather(*(found.answer(["inspect"]) for _ in range(count)))
+
+    monkeypatch.setattr(jobs, "_spawn", spawn)
+    assert asyncio.run(look(20)) == 20 * [(0, "{}", "")]
+    assert most == 3
