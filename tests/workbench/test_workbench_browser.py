@@ -210,6 +210,54 @@ def test_a_log_chosen_in_another_tab_is_looked_at(inspected: Any, served: Served
     assert inspected.find_elements("css selector", "#panel-log iframe") == []
 
 
+def test_arrow_keys_take_nothing_from_other_channels_on_their_way(inspected: Any, served: Served) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    lines = (served.folder / "files" / "drive.csv").read_text().splitlines()
+    lines[2] = "Time [ms];Wert 1;Wert 2;Wert 3"
+    (served.folder / "third.csv").write_text("\n".join(lines) + "\n")
+    third = served.upload(served.folder / "third.csv")
+    choose_tab(inspected, "log")
+    find(inspected, f"#panel-log option[value='{third}']")
+    pick(inspected, "#panel-log select", "third.csv")
+    chosen = "const one = document.activeElement; return [one.ariaLabel, one.selectedOptions?.[0].textContent]"
+    titles = {"Wert 1": "Torque asked for", "Wert 2": "Motor angle", "Wert 3": "Load angle"}
+    for channel, title in titles.items():
+        label = f"Use {channel} as"
+        inspected.execute_script("arguments[0].focus()", find(inspected, f"select[aria-label='{label}']"))
+        for _ in range(8):
+            if inspected.execute_script(chosen) == [label, title]:
+                break
+            ActionChains(inspected).send_keys(Keys.ARROW_DOWN).perform()
+        assert inspected.execute_script(chosen) == [label, title]
+
+    def uses(driver: Any) -> list[str]:
+        script = "return [...document.querySelectorAll('[data-key^=use-]')].map((one) => one.value)"
+        return driver.execute_script(script)
+
+    wait(inspected, lambda d: "Every channel is used." in d.find_element("id", "panel-log").text)
+    assert uses(inspected) == ["time", "u", "theta_m", "theta_l"]
+    # What was said of a log's columns stands there again when one comes back to it.
+    pick(inspected, "#panel-log select", "drive.csv")
+    wait(inspected, lambda d: "Achse B [deg]: " in d.find_element("id", "panel-log").text)
+    pick(inspected, "#panel-log select", "third.csv")
+    wait(inspected, lambda d: "Wert 1: " in d.find_element("id", "panel-log").text)
+    assert uses(inspected) == ["time", "u", "theta_m", "theta_l"]
+
+
+def test_what_a_line_advises_is_done_by_a_click(inspected: Any, served: Served) -> None:
+    rows = "\n".join(f"{n / 100},{(n % 40 - 20) / 10},{(n * n) % 65536}" for n in range(420))
+    (served.folder / "counter.csv").write_text(f"time,u,theta_m\n{rows}\n")
+    counter = served.upload(served.folder / "counter.csv")
+    choose_tab(inspected, "log")
+    find(inspected, f"#panel-log option[value='{counter}']")
+    pick(inspected, "#panel-log select", "counter.csv")
+    press(inspected, "Set “the counter starts again at” of “Motor angle” to 65536")
+    wait(inspected, lambda d: "can be read" in d.find_element("id", "panel-log").text)
+    assert find(inspected, "[data-key=modulo-theta_m]").get_attribute("value") == "65536"
+
+
 def test_a_drawn_curve_and_its_scenario_outlast_a_reload(inspected: Any, served: Served) -> None:
     choose_tab(inspected, "fmus")
     inspected.refresh()

@@ -2,10 +2,10 @@
 import { post } from "./api.js";
 import { check, digits, field, make, numberIn, numberInput, plain } from "./dom.js";
 import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
-import { choices, choose, start } from "./state.js";
+import { choices, choose, chooseLog, start } from "./state.js";
 
 export const inputs = () => make("div", { class: "row" },
-  fileChoice("Log", isLog, () => choices.log, (log) => choose({ log, columns: {}, header: null })),
+  fileChoice("Log", isLog, () => choices.log, chooseLog),
   fileChoice("Model file", isModel, () => choices.model, (model) => choose({ model }), "the default machine"));
 
 // Options that all commands have for reading a log; `reading()` gives what the user has filled in.

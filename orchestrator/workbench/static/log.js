@@ -1,7 +1,7 @@
 import { post } from "./api.js";
 import { choice, digits, field, fill, make, numberInput, plain } from "./dom.js";
-import { action, dropZone, fileChoice, isLog, jobView, message } from "./parts.js";
-import { choices, choose, jobOf, start, watch } from "./state.js";
+import { action, dropZone, fileChoice, isLog, jobView, message, resultOf } from "./parts.js";
+import { choices, choose, chooseLog, jobOf, start, watch } from "./state.js";
 
 const TITLES = { time: "Time", u: "Torque asked for", theta_m: "Motor angle", theta_l: "Load angle" };
 const UNITS = {
@@ -15,21 +15,26 @@ const NUMBERS = {
   torque_constant: "torque constant [N.m/A]", rated_value: "what 100 % is [N.m]", counts_per_rev: "counts per revolution",
   resistance: "resistance of the winding [ohm]", back_emf_constant: "back-EMF constant [V.s/rad]", inductance: "inductance [H]",
   rate: "samples per second", factor: "factor (-1 turns the sign)", modulo: "the counter starts again at",
+  sign_bit: "one bit is the sign; its value",
 };
 const OF_COLUMN = {
-  time: ["rate"], u: ["torque_constant", "rated_value", "resistance", "back_emf_constant", "factor"],
-  theta_m: ["counts_per_rev", "modulo", "factor"], theta_l: ["counts_per_rev", "modulo", "factor"],
+  time: ["rate"], u: ["torque_constant", "rated_value", "resistance", "back_emf_constant", "sign_bit", "factor"],
+  theta_m: ["counts_per_rev", "modulo", "sign_bit", "factor"], theta_l: ["counts_per_rev", "modulo", "sign_bit", "factor"],
 };
 
 export function build(panel, go) {
   const said = message(), changes = make("p", { class: "message calm", role: "status" });
   const body = make("div", {});
-  let seen = null, turn = 0, looked = choices.log;
-  const view = jobView("log", (job) => (job.state === "done" ? make("p", {}, action("Go on to the machine", said, () => go("machine"))) : []));
+  let seen = null, turn = 0, looked = choices.log, came = null;
+  const view = jobView("log", (job) => {
+    const place = make("div", {});
+    resultOf(job).then((found) => fill(place, follow((found?.verdict ?? job.messages).join(" "))));
+    return job.state === "done" ? [place, make("p", {}, action("Go on to the machine", said, () => go("machine")))] : place;
+  });
   watch(() => {  // whichever tab has chosen another log
     if (choices.log === looked) return;
     looked = choices.log;
-    seen = null;
+    seen = came = null;
     view.show("");
     look();
   });
@@ -55,21 +60,26 @@ export function build(panel, go) {
   }
 
   function pick(log) {
-    if (log !== choices.log) choose({ log, columns: {}, header: null, model: "" });
+    chooseLog(log, { model: "" });
   }
 
   function state(column, changed) {
     const entry = { ...choices.columns[column], ...changed };
     for (const key of Object.keys(entry)) if (entry[key] === "" || entry[key] === null || Number.isNaN(entry[key])) delete entry[key];
+    came = null;
     const columns = { ...choices.columns, [column]: entry };
     if (!Object.keys(entry).length) delete columns[column];
     choose({ columns });
     look();
   }
 
-  // Give a channel to a column; whoever had it before is asked for another one.
-  function assign(column, place) {
-    const columns = structuredClone(choices.columns);
+  // Give a channel to a column; whoever had it before is asked for another one. Arrow keys pass other options on the way
+  // to one: what a control does, it does to what stood there when one came to it.
+  function assign(key, column, place, taken = "") {
+    if (came?.key !== key) came = { key, columns: choices.columns, taken };
+    column ||= came.taken;
+    const columns = structuredClone(came.columns);
+    if (!column) { choose({ columns }); look(); return; }
     const label = place === "" ? "" : nameOf(seen.channels[Number(place)]);
     for (const [other, entry] of Object.entries(columns)) if (label && other !== column && entry.name === label) delete entry.name;
     const entry = label ? { name: label } : {};
@@ -90,12 +100,13 @@ export function build(panel, go) {
     const stated = choices.columns[one.column] ?? {};
     const options = [["", one.how === "absent" ? "none" : one.how === "named" && !stated.name ? "by its own name" : "as recognised"],
       ...seen.channels.map((channel) => [String(channel.place), channel.label])];
-    const pickChannel = choice(options, stated.name && one.place !== null ? String(one.place) : "", (place) => assign(one.column, place));
+    const pickChannel = choice(options, stated.name && one.place !== null ? String(one.place) : "", (place) => assign(`channel-${one.column}`, one.column, place));
     pickChannel.dataset.key = `channel-${one.column}`;
     const list = `units-${one.column}`;
     const unit = make("input", { value: stated.unit ?? "", placeholder: one.unit || "SI", list, "data-key": `unit-${one.column}`,
       onchange: () => state(one.column, { unit: unit.value.trim() }) });
-    const needed = new Set(one.needs);
+    const needed = new Set(one.needs), told = adviceOf(seen.problem);
+    if (told?.column === one.column) needed.add(told.key);
     const numbers = OF_COLUMN[one.column].map((key) => numberField(one.column, key, stated[key], needed.has(key)));
     const asked = numbers.filter(({ open }) => open).map(({ element }) => element);
     const rest = numbers.filter(({ open }) => !open).map(({ element }) => element);
@@ -121,6 +132,7 @@ export function build(panel, go) {
     fill(body,
       make("p", { class: "note" }, plain(seen.dialect)),
       seen.problem ? make("p", { class: "message", role: "alert" }, problemOf(seen)) : make("p", {}, make("span", { class: "tag good" }, "can be read")),
+      follow(seen.problem),
       make("div", { class: "cards" }, seen.columns.map(card)),
       changes,
       make("p", {}, action("Look at this log", said, inspect, "main")),
@@ -133,16 +145,23 @@ export function build(panel, go) {
       seen.lines.length ? lines() : null);
   }
 
+  // A button that does what a line advises, where it says all of it.
+  function follow(line) {
+    const told = adviceOf(line);
+    if (told?.value === undefined) return null;
+    return action(`Set “${NUMBERS[told.key] ?? told.key}” of “${TITLES[told.column]}” to ${told.value}`, said, async () => state(told.column, { [told.key]: told.value }));
+  }
+
   function useOf(channel) {
     const made = choice([["", "not used"], ...Object.entries(TITLES)], channel.taken_as,
-      (column) => (column ? assign(column, String(channel.place)) : assign(channel.taken_as, "")));
+      (column) => assign(`use-${channel.place}`, column, column ? String(channel.place) : "", channel.taken_as));
     made.setAttribute("aria-label", `Use ${channel.label} as`);
     made.dataset.key = `use-${channel.place}`;
     return made;
   }
 
   function lines() {
-    const set = (line) => { seen = null; choose({ header: line, columns: {} }); look(); };
+    const set = (line) => { seen = came = null; choose({ header: line, columns: {} }); look(); };
     return make("details", { open: seen.names_line === null || choices.header !== null },
       make("summary", {}, seen.names_line ? `The names are in line ${seen.names_line}; choose another line` : "Which line holds the names?"),
       make("fieldset", { class: "raw" }, make("legend", { class: "visually-hidden" }, "Line of the names"),
@@ -167,6 +186,14 @@ export function build(panel, go) {
     make("div", { class: "row" }, fileChoice("Log of this session", isLog, () => choices.log, pick)),
     said.element, body, view.element);
   if (choices.log) look();
+}
+
+// What a line of the commands advises to say of a column: which, and of what; `value` where it names one.
+function adviceOf(line) {
+  const [, column, key, text] = /`\[columns\.(\w+)\] (\w+) = ([^`]+)`/.exec(line ?? "") ?? [];
+  if (!(column in TITLES) || !(key in NUMBERS || key === "unit")) return null;
+  if (key === "unit") return { column, key, value: text.replace(/^"(.*)"$/, "$1") };
+  return { column, key, value: Number.isFinite(Number(text)) ? Number(text) : undefined };
 }
 
 function problemOf(seen) {

@@ -16,6 +16,13 @@ export function choose(changes) {
 
 function tell() { watchers.forEach((act) => act()); }
 
+// Another log: what was said of its columns is kept, should one come back to it.
+export function chooseLog(log, changes = {}) {
+  if (log === choices.log) return;
+  const kept = { ...choices.kept, [choices.log]: { columns: choices.columns, header: choices.header } };
+  choose({ columns: {}, header: null, ...kept[log], ...changes, log, kept });
+}
+
 let timer = 0;
 
 export async function refresh() {
