@@ -195,4 +195,4 @@ def _torque_table(diagnosis: DiagnosisResult) -> Iterator[Block]:
     torque = [(test.source, test.torque) for test in tests if test.torque]
     if torque:
         rows = [[source, *(f"{100.0 * share:.2f} %" for share in shares)] for source, shares in torque]
-        yield table("Torque that is left", ("record", "as given", "re-fitted", "with effects"), rows)
+        yield table("Torque that is left of all of it (rms)", ("record", "as given", "re-fitted", "with effects"), rows)

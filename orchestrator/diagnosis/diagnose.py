@@ -139,9 +139,10 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
         workings.balances, result.problem.record_points(result.final.point), metric=in_metres(model)
     )
     remaining = find_dependences(result, arguments, settings.selection)
+    left = torque_shares(result.problem, result.final.point)
+    record = replace(record, left=float(left.max()))  # that of the model as it is reported
     verdict = form_verdict(result, graded, remaining, record, settings)
     trust = judge_trust(verdict, graded, searched.searched, record, test, parameters, model.uncertain, settings)
-    left = torque_shares(result.problem, result.final.point)
     return Diagnosis(
         verdict=verdict, effects=effects, nuisances=_nuisances(result, graded, parameters, model, settings),
         parameters=parameters, left=dict(zip(workings.balances[0].channels, map(float, left), strict=True)),

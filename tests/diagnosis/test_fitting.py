@@ -54,6 +54,15 @@ def test_errors_of_values_are_those_of_repeated_records():
     assert np.median(jackknifed) == pytest.approx(np.std(sizes), rel=0.4)
 
 
+def test_of_a_value_that_changes_nothing_nothing_is_known(fitted, monkeypatch):
+    problem, model = fitted
+    whole = type(problem).jacobian
+    monkeypatch.setattr(type(problem), "jacobian", lambda *given: whole(*given) * [1.0, 0.0])
+    idle = fit_model(problem, model.point)
+    assert idle.covariance[1, 1] > 1e3 * model.covariance[1, 1]
+    assert idle.covariance[0, 0] == pytest.approx(1.0 / np.sum(model.jacobian[:, 0] ** 2), rel=0.2)
+
+
 def test_a_true_effect_gains_and_chance_does_not():
     problem = linear_problem({LABEL: 0.1, "nothing@motor": 0.0})
     base = fit_model(problem, problem.start)

@@ -7,7 +7,9 @@ import pytest
 
 from orchestrator.diagnosis.report.judgement import judge_trust
 from orchestrator.diagnosis.report.summary import headline, words_on_test_data
-from orchestrator.diagnosis.selection.outcome import Dependence, RecordEvidence
+from orchestrator.diagnosis.report.summary import next_steps as experiments
+from orchestrator.diagnosis.result import ParameterEstimate
+from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.effects.words import number_words
 from orchestrator.reporting.pages.diagnosis_answer import in_words, next_steps
@@ -69,6 +71,34 @@ def test_an_inertia_that_is_not_shown_is_no_number_to_ask_for() -> None:
 
     assert "asks for at most 0.28 times" in reason(0.04, 0.12)
     assert "asks for 0.15 times" in reason(0.15, 0.02)
+
+
+def test_a_value_far_below_what_is_stated_is_outside_as_one_above_is() -> None:
+    known: Any = SimpleNamespace(name="tau", uncertainty=1e-4)
+
+    def reasons(value: float) -> tuple[str, ...]:
+        estimate = ParameterEstimate(value, 0.01 * value, (0.98 * value, 1.02 * value), "s", 2e-4)
+        record = RecordEvidence(0.0, 1.0, 0.01, 0.6)
+        return judge_trust("effects", (), True, record, (), {"tau": estimate}, (known,), DiagnosisSettings()).reasons
+
+    assert [len(reasons(value)) for value in (1e-6, 1.5e-4, 3e-4, 1e-3)] == [1, 0, 0, 1]
+    assert "`tau` lies outside the range" in reasons(1e-6)[0]
+
+
+@pytest.mark.parametrize(
+    ("grades", "asked"), [((Grade.LIKELY, Grade.POSSIBLE), "friction"), ((Grade.POSSIBLE,), "wave")]
+)
+def test_hints_ask_for_a_record_only_where_nothing_is_named(grades: tuple[Grade, ...], asked: str) -> None:
+    kinds = {Grade.LIKELY: "friction", Grade.POSSIBLE: "wave"}
+    effects = [
+        SimpleNamespace(label=kinds[one], grade=one, evidence=SimpleNamespace(family=(), kind=kinds[one]))
+        for one in grades
+    ]
+    said: Any = SimpleNamespace(
+        effects=effects, verdict="effects", misses_test_data=False,
+        graded=lambda least: [one for one in effects if one.grade >= least],
+    )  # fmt: skip
+    assert [line.split(":")[0] for line in experiments(said)] == [f"Next, to settle {asked}"]
 
 
 def test_what_test_data_say_of_a_torque_is_said_with_its_uncertainty() -> None:

@@ -150,6 +150,16 @@ def test_sizes_count_as_they_are_in_what_remains():
     assert evidence[1].size_t == size_over_error(left.problem, left.final, other.label) < 1e6
 
 
+def test_values_are_possible_as_they_are_in_what_remains(monkeypatch):
+    found = search_effects(linear_problem({"a@motor": 0.4, "b@motor": 0.4}), SETTINGS)
+    one, other = (replace(each, share=1.0, possible=True) for each in effect_evidence(found))
+    monkeypatch.setattr(FitProblem, "is_possible", lambda self, label, point: one.label in point.effects)
+    record = RecordEvidence(0.0, 1.0, 0.0, np.inf)
+    left, evidence = leave_out_possible(found, [replace(one, possible=False), other], record, DiagnosisSettings())
+    assert not any(each.possible for each in evidence)
+    assert left.final.labels == ()
+
+
 def test_several_records_share_sizes():
     rng = np.random.default_rng(2)
     models = []

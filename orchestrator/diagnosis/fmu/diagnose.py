@@ -147,9 +147,10 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
         graded.append(report_effect(source, one, effect.values_by_name, units, record, settings, in_model))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection)
+    left = torque_shares(found.problem, found.final.point)
+    record = replace(record, left=float(left.max()))  # that of the model as it is reported
     verdict = form_verdict(found, graded, remaining, record, settings)
     trust = judge_trust(verdict, graded, searched.searched, record, test, parameters, problem.map.uncertain, settings)
-    left = torque_shares(found.problem, found.final.point)
     notes = [*notes, *problem.runner.remarks]
     if not found.complete:
         notes.append("the time limit ended the search: effects that were not tried may be missing")

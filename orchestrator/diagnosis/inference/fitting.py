@@ -15,6 +15,7 @@ from orchestrator.diagnosis.inference.problem import Coordinate, FitProblem
 from orchestrator.diagnosis.model.interface import ModelPoint
 
 Array = NDArray[np.float64]
+UNKNOWN = 1e3  # standard error of a value that changes nothing, in small changes of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +126,8 @@ def _score(
         residual, jacobian[:, moving], normal[np.ix_(moving, moving)], gradient[moving], problem.blocks
     )
     covariance = np.asarray(np.linalg.pinv(normal, hermitian=True))
+    idle = np.flatnonzero(np.diag(normal) == 0.0)
+    covariance[idle, idle] = UNKNOWN**2  # of what changes no residual nothing is known
     return FittedModel(
         point, tuple(coordinates), residual, jacobian, cost, covariance, held_out, problem.blocks, shifts
     )

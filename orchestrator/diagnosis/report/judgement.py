@@ -74,7 +74,7 @@ def judge_trust(
     if likely := [effect.label for effect in effects if effect.grade is Grade.LIKELY]:
         amber.append(f"likely, not certain: {list_effects(likely)}")
     if record.left > UNEXPLAINED:
-        amber.append(f"{100.0 * record.left:.0f} % of the torque's power is left unexplained")
+        amber.append(f"{100.0 * np.sqrt(record.left):.2g} % (rms) is left unexplained where the model was fitted")
     for known in uncertain:
         if known.name in parameters and _is_far(parameters[known.name], known.uncertainty):
             amber.append(
@@ -90,6 +90,9 @@ def _of_motion(signal: SignalMisfit) -> str:
 
 
 def _is_far(estimate: ParameterEstimate, uncertainty: float) -> bool:
+    """Tell whether a parameter is twice its stated share off, up or down: a tenth is as far as ten times."""
     low, high = estimate.interval
     nearest = float(np.clip(estimate.nominal, low, high))
-    return abs(nearest - estimate.nominal) > 2.0 * uncertainty
+    if nearest * estimate.nominal <= 0.0:
+        return abs(nearest - estimate.nominal) > 2.0 * uncertainty
+    return abs(np.log(nearest / estimate.nominal)) > 2.0 * np.log1p(uncertainty / abs(estimate.nominal))

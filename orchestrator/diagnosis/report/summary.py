@@ -224,7 +224,7 @@ def _remainder_text(diagnosis: Diagnosis) -> str:
     if not diagnosis.left:
         return "What is left is noise."
     parts = [
-        f"{remainder_percent(share)} of the torque at {BODIES.get(name, name)}"
+        f"{remainder_percent(share)} of what the torque at {BODIES.get(name, name)} varies by"
         for name, share in diagnosis.left.items()
     ]
     text = f"What is left (rms, where the model was fitted): {' and '.join(parts)}"
@@ -255,7 +255,7 @@ def next_steps(diagnosis: DiagnosisOutcome) -> Iterator[str]:
         A sentence each; one at least.
     """
     open_questions: dict[str, list[str]] = {}
-    for effect in diagnosis.effects:
+    for effect in diagnosis.graded(Grade.LIKELY) or diagnosis.effects:  # hints alone only where nothing is named
         if effect.grade is not Grade.CERTAIN or effect.evidence.family:
             experiment = EXPERIMENTS.get(effect.evidence.kind, REPEAT)
             open_questions.setdefault(experiment, []).append(effect.label)

@@ -196,6 +196,14 @@ def leave_out_possible(
         one.label for one in possible_effects(evidence, record, settings) if one.label in result.final.labels
     ]:
         result = leave_out(result, labels)
-        sizes = {label: size_over_error(result.problem, result.final, label) for label in result.final.labels}
-        evidence = [replace(one, size_t=min(one.size_t, sizes.get(one.label, np.inf))) for one in evidence]
+        evidence = [_as_fitted(one, result) for one in evidence]
     return result, list(evidence)
+
+
+def _as_fitted(effect: EffectEvidence, result: SearchResult) -> EffectEvidence:
+    """Return the evidence for an effect with the values that it has in what remains."""
+    problem, final = result.problem, result.final
+    if effect.label not in final.labels:
+        return effect
+    size = min(effect.size_t, size_over_error(problem, final, effect.label))
+    return replace(effect, size_t=size, possible=effect.possible and problem.is_possible(effect.label, final.point))
