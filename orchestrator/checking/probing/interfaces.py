@@ -6,6 +6,7 @@ from typing import Any
 
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.movement import Movement
+from orchestrator.checking.probing.variables import ProbedVariable
 
 _TOLERANCE = 0.1  # of the range of a signal: an importer's solver and that of the FMU differ by less
 _FEWEST = 10
@@ -30,7 +31,7 @@ class InterfaceRun:
 
 
 def compare_interfaces(a: InterfaceRun, b: InterfaceRun, report: Callable[..., None]) -> str:
-    """Report continuous outputs that are far from each other at most points of a run, also of a driven one.
+    """Report outputs that are far from each other at most points of a run, also of a driven one.
 
     Returns:
         Why they were not compared; empty when they were.
@@ -53,14 +54,22 @@ def _report_far(
     position = 0
     wrong = False
     for v in a.job.outputs():
-        if v.real and v.causality == "output" and v.size == 1 and v.variability == "continuous" and not v.clocks:
+        if v.causality == "output" and v.size == 1 and not v.clocks:
             p, q = [row[position] for row, _ in pairs], [row[position] for _, row in pairs]
-            size = max(max(p) - min(p), max(q) - min(q), 0.01 * max(map(abs, p)), 1e-6 * (v.nominal or 1.0))
-            far = sum(abs(x - y) > _TOLERANCE * size for x, y in zip(p, q, strict=True))
+            far = _count_far(v, p, q)
             if far > _MOST * len(p):
                 kinds = f"{a.job.interface} and {b.job.interface}"
-                text = f"is off by more than {_TOLERANCE:.0%} of its range at {far} of {len(p)} points"
+                by = f"off by more than {_TOLERANCE:.0%} of its range" if v.real else "another one"
+                text = f"is {by} at {far} of {len(p)} points"
                 report("interfaces.differ", f"`{v.name}` must be the same in {kinds}, but {text}", v.name)
                 wrong = True
         position += v.size
     return wrong
+
+
+def _count_far(v: ProbedVariable, p: list[Any], q: list[Any]) -> int:
+    """At how many points a signal differs by more than solvers do, or at all where it is no floating point number."""
+    if not v.real:
+        return sum(x != y for x, y in zip(p, q, strict=True))
+    size = max(max(p) - min(p), max(q) - min(q), 0.01 * max(map(abs, p)), 1e-6 * (v.nominal or 1.0))
+    return sum(abs(x - y) > _TOLERANCE * size for x, y in zip(p, q, strict=True))

@@ -14,7 +14,7 @@ from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import DISCARD, StatusError, TerminatedError
-from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.probing.variables import ProbedVariable, finite, shown
 
 _TOLERANCE = 1e-3
 _MOST_STEPS = 300
@@ -25,7 +25,13 @@ _DERIVATIVES = {"2.0": "GetDerivatives", "3.0": "GetContinuousStateDerivatives"}
 
 
 class ModelExchange(EventDriver):
-    """Model exchange of FMI 2.0 and 3.0."""
+    """Model exchange of FMI 2.0 and 3.0.
+
+    Attributes:
+        watched: discrete variables that are to be looked at between events; most runs have none.
+    """
+
+    watched: Sequence[ProbedVariable] = ()
 
     @classmethod
     def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
@@ -56,7 +62,7 @@ class ModelExchange(EventDriver):
             shown = ", ".join(f"{x:g}" for x in nominals[:5])
             self.report("states.nominal", f"nominal values of states must be positive, but are {shown}")
         self.memory["nominals"] = [x if math.isfinite(x) and x > 0.0 else 1.0 for x in nominals]
-        self.memory["signs"] = self._signs("after initialisation")
+        self.memory["signs"] = self.signs("after initialisation")
 
     def _count(self, what: str, described: int | None, rule: str) -> int:
         """How many there are; what the FMU says must be what the description says."""
@@ -92,7 +98,8 @@ class ModelExchange(EventDriver):
         """The nominal values of the states, as the FMU says."""
         return self._values("GetNominalsOfContinuousStates", "states", "")
 
-    def _signs(self, when: str) -> list[bool]:
+    def signs(self, when: str = "") -> list[bool]:
+        """Which event indicators are positive."""
         return [z > 0.0 for z in self._values("GetEventIndicators", "indicators", when)]
 
     def _place(self, t: float, x: list[float], when: str) -> tuple[list[float], list[bool]]:
@@ -130,6 +137,8 @@ class ModelExchange(EventDriver):
                 if terminate:
                     raise TerminatedError
                 crossed = signs != self.memory["signs"]
+                if self.watched and not (entered or crossed):
+                    self._judge_quiet_step(x, when)
             else:
                 t, entered, crossed = goal, False, False
             if entered or crossed or self.next_instant(end + size) <= t + slack:
@@ -194,6 +203,24 @@ class ModelExchange(EventDriver):
         _, signs = self._place(t + high * h, found, when)
         return found, high * h, signs
 
+    def _judge_quiet_step(self, x: Sequence[float], when: str) -> None:
+        """Without an event, discrete variables stay, and so do the states when a step is completed."""
+        found = self.continuous_states()
+        for i, (a, b, n) in enumerate(zip(x, found, self.memory["nominals"], strict=True)):
+            if abs(a - b) > _JUMP * max(abs(a), n):
+                text = f"states must change in event mode only, but number {i + 1} is {b:.6g} instead of {a:.6g}"
+                self.report("event.states-changed", f"{text} once a step is completed", when=when)
+                self.watched = ()
+                return
+        values = self.read(self.watched, when)
+        before, self.memory["quiet"] = self.memory.get("quiet"), values
+        for v, a, b in zip(self.watched, before or values, values, strict=True):
+            if a != b and finite(a) and finite(b):
+                text = f"`{v.name}` is discrete, so it must change in event mode only, but goes from {shown(a)}"
+                self.report("event.outside", f"{text} to {shown(b)} in continuous time", v.name, when)
+                self.watched = ()
+                return
+
     def _event(self, t: float, when: str) -> list[float]:
         """Handle an event; the states after it."""
         self.call("EnterEventMode", when=when)
@@ -204,7 +231,8 @@ class ModelExchange(EventDriver):
         before = self._values("GetContinuousStates", "states", when)
         outcomes = self.settle(t, when)
         self.call("EnterContinuousTimeMode", when=when)
-        self.memory["signs"] = self._signs(when)
+        self.memory["signs"] = self.signs(when)
+        self.memory.pop("quiet", None)
         after = self._values("GetContinuousStates", "states", when)
         self._judge_event(before, after, any(o.states_changed for o in outcomes), when)
         return after

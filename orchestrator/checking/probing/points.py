@@ -10,8 +10,11 @@ from orchestrator.checking.probing.statuses import TerminatedError
 from orchestrator.checking.probing.trajectory import Bench
 from orchestrator.checking.probing.variables import ProbedVariable
 
-_SHARES = (0.1, 0.45, 0.75)
-"""Shares of a run at which it is looked at: away from its start, and at different phases of the inputs."""
+_SHARES = (0.1, 0.45, 0.62)
+"""Shares of a run at which it is looked at: away from its start, and at different phases of the inputs.
+
+At the last of them switches are as in the file (``trajectory``), before it they are not.
+"""
 _PUSH = (0.5, -0.9, 1.3)
 """By how many of their scales continuous states are pushed there in model exchange."""
 

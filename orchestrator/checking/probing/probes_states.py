@@ -1,12 +1,16 @@
 """Probes of states and their derivatives: their order, their variables and their nominal values."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
+from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.model_exchange import ModelExchange
+from orchestrator.checking.probing.movement import distinct
 from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.probes_exchange import judge_completed_step, judge_following
 from orchestrator.checking.probing.slopes import is_far
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.probing.watched import slopes
@@ -37,22 +41,40 @@ def _exchange(context: Context) -> None:
         if driver.memory["states"] != sum(v.size for v in variables):
             raise SkippedError("the number of states is not that of the description")
         _nominals(context, driver, variables)
-        for point in points(bench, driver):
-            if not _vector(context, point, driver, variables):
+        driver.watched = _discrete(job)
+        last = None
+        for last in points(bench, driver):
+            if not _vector(context, last, driver, variables):
                 bench.job = replace(job, state_variables=None)  # their variables are not known then
                 return
+            if not judge_following(context, last, _others(driver, variables)):
+                return
+        if last is not None:
+            judge_completed_step(context, last)
+
+
+def _discrete(job: ProbeJob) -> list[ProbedVariable]:
+    """What events alone may change, as far as it can be read."""
+    found = [v for v in distinct(job.event_variables()) if v.variability == "discrete" and v.base != "Binary"]
+    return [v for v in found if not v.extents][:_MOST]
+
+
+def _others(driver: ModelExchange, variables: Sequence[ProbedVariable]) -> list[float]:
+    """States beside the present ones, within their bounds."""
+    x = driver.continuous_states()
+    wanted = [a + 1e-3 * n * (1.0 + 0.37 * i) for i, (a, n) in enumerate(zip(x, driver.memory["nominals"], strict=True))]
+    owners = [v for v in variables for _ in range(v.size)]
+    return [
+        a if (v.minimum is not None and w < v.minimum) or (v.maximum is not None and w > v.maximum) else w
+        for a, w, v in zip(x, wanted, owners, strict=True)
+    ]
 
 
 def _vector(context: Context, point: RestPoint, driver: ModelExchange, variables: tuple[ProbedVariable, ...]) -> bool:
     """States that were set are there, in the vector and by their variables; and so are the derivatives."""
     x = driver.continuous_states()
-    nominals = driver.memory["nominals"]
-    wanted = [a + 1e-3 * n * (1.0 + 0.37 * i) for i, (a, n) in enumerate(zip(x, nominals, strict=True))]
+    wanted = _others(driver, variables)
     owners = [v for v in variables for _ in range(v.size)]
-    wanted = [
-        a if (v.minimum is not None and w < v.minimum) or (v.maximum is not None and w > v.maximum) else w
-        for a, w, v in zip(x, wanted, owners, strict=True)
-    ]
     driver.set_continuous_states(wanted)
     found = driver.continuous_states()
     rates = driver.rates()

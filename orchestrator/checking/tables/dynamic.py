@@ -102,6 +102,8 @@ dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are listed are se
 states.order | E | 3.2.1 | 3.2.1 | states stand in the order of ModelStructure, by the attribute derivative | correct the order, or the attribute derivative
 states.rates | E | 3.2.2 | 3.2.1 | derivatives of states are those of their variables, in the order of ModelStructure | compute both from one place
 states.nominal-differs | W | 3.2.2 | 3.2.1 | nominal values of states are those of the description | generate both from one source
+states.history | W | 3.2.1 | 3.2.1 | between events, derivatives follow time, states and inputs alone | compute them from what was set last; change what is remembered in event mode
+event.outside | W | 2.2.7 | 2.4.7.4 | in model exchange, discrete variables change in event mode only | change them in event mode; ask for it by an event indicator, nextEventTime or enterEventMode
 states.slope | I | 2.2.7 | 2.4.7.5 | a variable with the attribute derivative is the derivative of that state | correct the variable, or the attribute derivative
 
 [derivatives]
