@@ -91,7 +91,13 @@ def _states(d: Description, by_index: Mapping[int, ProbedVariable]) -> tuple[Pro
 
 
 def _unknowns(d: Description, by_index: Mapping[int, ProbedVariable]) -> Iterator[ProbedUnknown]:
-    for section, entries in (("output", d.outputs), ("rate", d.derivatives), ("initial", d.initial_unknowns)):
+    lists = (
+        ("output", d.outputs),
+        ("rate", d.derivatives),
+        ("indicator", d.event_indicators),
+        ("initial", d.initial_unknowns),
+    )
+    for section, entries in lists:
         for entry in entries:
             v = _probed(d, entry.variable, by_index)
             if v is None or v.clocks or v.base == "Clock":

@@ -36,7 +36,7 @@ class ProbedUnknown:
     """An entry of ModelStructure.
 
     Attributes:
-        section: "output", "rate" or "initial".
+        section: "output", "rate", "indicator" or "initial".
         knowns: the variables that it depends on as the description says; None where it depends on all.
         kinds: how it depends on each of them; empty where that is not said.
     """

@@ -34,31 +34,32 @@ class RestPoint:
 
     @property
     def states(self) -> tuple[ProbedVariable, ...]:
-        """The scalar variables of the continuous states that can be set here; none in co-simulation."""
+        """The variables of the continuous states that can be set here; none in co-simulation."""
         return state_vector(self.driver)
 
-    def get(self, v: ProbedVariable) -> float:
-        """A number at this point."""
-        return float(self.driver.get([v])[0])
+    def get(self, v: ProbedVariable) -> tuple[float, ...]:
+        """The values of a variable at this point."""
+        return tuple(map(float, self.driver.get([v])))
 
-    def put(self, v: ProbedVariable, value: float) -> None:
+    def put(self, v: ProbedVariable, values: Sequence[float]) -> None:
         """Set an input, or a state by the whole vector of states."""
         states = self.states
         if v not in states:
-            self.driver.set([v], [value])
+            self.driver.set([v], values)
             return
         assert isinstance(self.driver, ModelExchange)
         x = self.driver.continuous_states()
-        x[states.index(v)] = value
+        first = sum(w.size for w in states[: states.index(v)])
+        x[first : first + v.size] = values
         self.driver.set_continuous_states(x)
 
 
 def state_vector(driver: Driver) -> tuple[ProbedVariable, ...]:
-    """The variables of the vector of states, where each is a scalar of its own."""
+    """The variables of the vector of states, where each is there once."""
     variables = driver.job.state_variables
-    if not isinstance(driver, ModelExchange) or not variables or any(v.size != 1 for v in variables):
+    if not isinstance(driver, ModelExchange) or not variables or len(distinct(variables)) < len(variables):
         return ()
-    return variables if len(distinct(variables)) == len(variables) == driver.memory["states"] else ()
+    return variables if sum(v.size for v in variables) == driver.memory["states"] else ()
 
 
 def points(bench: Bench, driver: Driver) -> Iterator[RestPoint]:
@@ -89,10 +90,10 @@ def points(bench: Bench, driver: Driver) -> Iterator[RestPoint]:
 
 def _pushed(driver: ModelExchange, x: Sequence[float], number: int) -> list[float]:
     """States off their path, different ones by different amounts."""
-    variables = state_vector(driver)
+    owners = [v for v in state_vector(driver) for _ in range(v.size)]
     found = []
     for i, value in enumerate(x):
-        v = variables[i] if variables else None
+        v = owners[i] if owners else None
         size = 0.1 * float(driver.memory["nominals"][i]) if v is None else scale_of(v, value)
         pushed = value + _PUSH[number % len(_PUSH)] * size * (1.0 + 0.1 * (i % 7))
         low = -float("inf") if v is None or v.minimum is None else v.minimum

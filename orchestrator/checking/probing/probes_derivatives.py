@@ -225,16 +225,16 @@ def _by_changes(point: RestPoint, unknowns: list[ProbedVariable], knowns: list[P
     """
     columns = []
     for v in knowns:
-        base = point.get(v)
+        (base,) = point.get(v)
         size = width * _CHANGE * (v.nominal or max(abs(base), 1.0))
         low, high = base - size, base + size
         low = low if v.minimum is None else max(low, v.minimum)
         high = high if v.maximum is None else min(high, v.maximum)
         ends = []
         for value in (low, high):
-            point.put(v, value)
+            point.put(v, (value,))
             ends.append(point.driver.read(unknowns))
-        point.put(v, base)
+        point.put(v, (base,))
         span = high - low
         columns.append([(b - a) / span if span else math.nan for a, b in zip(*ends, strict=True)])
     return [list(row) for row in zip(*columns, strict=True)]

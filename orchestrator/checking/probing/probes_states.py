@@ -62,7 +62,8 @@ def _discrete(job: ProbeJob) -> list[ProbedVariable]:
 def _others(driver: ModelExchange, variables: Sequence[ProbedVariable]) -> list[float]:
     """States beside the present ones, within their bounds."""
     x = driver.continuous_states()
-    wanted = [a + 1e-3 * n * (1.0 + 0.37 * i) for i, (a, n) in enumerate(zip(x, driver.memory["nominals"], strict=True))]
+    pairs = zip(x, driver.memory["nominals"], strict=True)
+    wanted = [a + 1e-3 * n * (1.0 + 0.37 * i) for i, (a, n) in enumerate(pairs)]
     owners = [v for v in variables for _ in range(v.size)]
     return [
         a if (v.minimum is not None and w < v.minimum) or (v.maximum is not None and w > v.maximum) else w

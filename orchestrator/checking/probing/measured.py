@@ -1,0 +1,173 @@
+"""What was seen of how unknowns react to knowns, and what the description makes of it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from orchestrator.checking.probing.job import ProbedUnknown
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.statuses import StatusError, TerminatedError
+from orchestrator.checking.probing.variables import ProbedVariable
+
+_SEEN = 1e-6  # of the size of a value: less is what an algebraic loop leaves
+_SPREAD = 0.01  # of a quotient: more is no constant
+_ALWAYS, _AT_A_POINT = ("constant", "fixed", "tunable"), ("discrete",)
+"""Kinds of factors that are the same in a whole run, and between two events."""
+_FEW_LISTED = 12  # more are taken for the list of all knowns, which tools write where they know nothing
+_OFTEN = 3
+_MOST_SILENT = 8
+_MOST_PAIRS = 5
+_PIECE = 10  # steps
+_WHERE = {
+    "output": "Outputs", "rate": "Derivatives", "indicator": "EventIndicators", "initial": "InitialUnknowns",
+}  # fmt: skip
+
+
+class Measured:
+    """What was seen of each pair of an unknown and a known."""
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        self.missing: dict[tuple[str, str], tuple[str, str]] = {}
+        self.tried: dict[tuple[str, str, str], int] = {}
+        self.reacted: set[tuple[str, str, str]] = set()
+        self.quotients: dict[tuple[str, str, str], list[tuple[float, float, str]]] = {}
+
+    def look(
+        self, unknowns: Sequence[ProbedUnknown], v: ProbedVariable, rows: list[list[Any]], change: float | None, at: str
+    ) -> None:
+        """Take the values of unknowns before and while a known has another value.
+
+        Args:
+            change: of the known; None where it is no number.
+        """
+        position = 0
+        for u in unknowns:
+            before, during = (row[position : position + u.variable.size] for row in rows)
+            position += u.variable.size
+            if u.variable.key == v.key:
+                continue
+            name = (u.section, u.variable.name, v.name)
+            self.tried[name] = self.tried.get(name, 0) + 1
+            listed = u.knowns is None or v.key in {k.key for k in u.knowns}
+            if any(_reacts(u.variable, a, b) for a, b in zip(before, during, strict=True)):
+                self.reacted.add(name)
+                if not listed:
+                    self.missing.setdefault((u.variable.name, v.name), (u.section, f"({_WHERE[u.section]}, {at})"))
+            if listed and change and u.variable.real and u.variable.size == 1 and math.isfinite(during[0]):
+                noise = 1e-12 * max(abs(before[0]), abs(during[0])) / abs(change)
+                self.quotients.setdefault(name, []).append(((during[0] - before[0]) / change, noise, at))
+
+    def report(self) -> None:
+        """Hold what was seen against the description."""
+        for (unknown, of), (section, where) in self.missing.items():
+            text = f"`{unknown}` reacts to `{of}` at once, so its dependencies must list it, but do not"
+            rule = "dependency.initial" if section == "initial" else "dependency.missing"
+            self.context.report(rule, text, unknown, where)
+        for u in self.context.bench.job.unknowns:
+            for known, kind in zip(u.knowns or (), u.kinds, strict=False):
+                self._judge_kind(u, known.name, kind)
+        self._report_silent()
+        self._report_idle()
+
+    def _judge_kind(self, u: ProbedUnknown, known: str, kind: str) -> None:
+        """A factor is as constant as its kind says: in the whole run, or at one point."""
+        name = u.variable.name
+        found = self.quotients.get((u.section, name, known), [])
+        groups = [found] if kind in _ALWAYS else []
+        if kind in _AT_A_POINT:
+            groups = [[q for q in found if q[2] == at] for at in dict.fromkeys(at for _, _, at in found)]
+        for group in groups:
+            if _spread(group):
+                low, high = min(q for q, _, _ in group), max(q for q, _, _ in group)
+                text = f"`{name}` must follow `{known}` by a {kind} factor, as dependenciesKind says"
+                self.context.report("dependency.kind", f"{text}, but by {low:.4g} to {high:.4g}", name)
+                return
+
+    def _report_idle(self) -> None:
+        """Name what is listed for an unknown of model exchange, and moves others but not that one, at any point."""
+        heard = {known for _, _, known in self.reacted}
+        pairs = [
+            f"`{k.name}` for `{u.variable.name}`"
+            for u in self.listing()
+            for k in u.knowns or ()
+            if u.section in ("output", "rate")
+            and self.context.bench.job.interface == "ModelExchange"
+            and self.tried.get((u.section, u.variable.name, k.name), 0) >= _OFTEN
+            and (u.section, u.variable.name, k.name) not in self.reacted
+            and k.name in heard
+        ]
+        if pairs:
+            more = f", and {len(pairs) - _MOST_PAIRS} more" if len(pairs) > _MOST_PAIRS else ""
+            text = "what is listed as a dependency must have an effect, but none was seen of"
+            where = "at three points of a run"
+            self.context.report("dependency.superfluous", f"{text} {', '.join(pairs[:_MOST_PAIRS])}{more}, {where}")
+
+    def _report_silent(self) -> None:
+        """Name knowns that are listed and change nothing: at no point, and in no run."""
+        bench, trace = self.context.bench, self.context.trace
+        calculated = {v.name for v in bench.job.variables if v.causality == "calculatedParameter"}
+        heard = {known for _, unknown, known in self.reacted if unknown not in calculated}
+        often = {known for (_, _, known), count in self.tried.items() if count >= _OFTEN}
+        listed = {k.key for u in self.listing() if u.variable.name not in calculated for k in u.knowns or ()}
+        listed |= self._listed_by_silence()
+        movement = bench.movement
+        states = {v.key for v in bench.job.state_variables or ()}
+        silent: list[str] = []
+        for v in movement.values:
+            if v.name in heard or v.name not in often or v.key not in listed or v.key in states or not v.real:
+                continue
+            if trace is None or len(silent) >= _MOST_SILENT:
+                return
+            bench.movement = replace(movement, values={w: x for w, x in movement.values.items() if w is not v})
+            bench.held = frozenset({v.key})
+            try:
+                if self._runs_as(trace):
+                    silent.append(f"`{v.name}`")
+            except (StatusError, TerminatedError):
+                continue
+            finally:
+                bench.movement, bench.held = movement, frozenset()
+        if silent:
+            names = ", ".join(silent)
+            text = f"what is listed as a dependency must have an effect, but none was seen of {names}"
+            self.context.report("dependency.superfluous", f"{text}, at three points and in a run")
+
+    def _listed_by_silence(self) -> set[tuple[str, int]]:
+        """The parameters of a small FMU whose initial unknowns list nothing: they depend on all of them then."""
+        job = self.context.bench.job
+        found = {v.key for v in self.context.bench.movement.values if v.causality == "parameter"}
+        everything = any(u.section == "initial" and u.knowns is None for u in job.unknowns)
+        return found if everything and len(found) <= _FEW_LISTED else set()
+
+    def _runs_as(self, trace: list[list[Any]]) -> bool:
+        """Whether a run is as another one, looked at piece by piece, for most that differ do so soon."""
+        bench = self.context.bench
+        with bench.instance() as driver:
+            for first in range(0, bench.job.steps, _PIECE):
+                last = min(first + _PIECE, bench.job.steps)
+                if self.context.compare(trace[first:last], bench.run(driver, first, last)) is not None:
+                    return False
+        return True
+
+    def listing(self) -> list[ProbedUnknown]:
+        """The unknowns that name what they depend on, without those that name everything."""
+        unknowns = self.context.bench.job.unknowns
+        return [u for u in unknowns if u.knowns is not None and len(u.knowns) <= _FEW_LISTED]
+
+
+def _reacts(v: ProbedVariable, a: Any, b: Any) -> bool:
+    if isinstance(a, float) and isinstance(b, float):
+        size = max(abs(a), abs(b), 1e-6 * (v.nominal or 1.0))
+        return math.isfinite(a) and math.isfinite(b) and abs(a - b) > _SEEN * size
+    return bool(a != b)
+
+
+def _spread(quotients: Sequence[tuple[float, float, str]]) -> bool:
+    """Whether quotients differ by more than their noise."""
+    if len(quotients) < 2:
+        return False
+    low, high = min(quotients), max(quotients)
+    size = max(abs(low[0]), abs(high[0]))
+    return high[0] - low[0] > _SPREAD * size + 10.0 * max(noise for _, noise, _ in quotients)
