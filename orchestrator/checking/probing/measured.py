@@ -18,6 +18,7 @@ _FEW_LISTED = 12  # more are taken for the list of all knowns, which tools write
 _OFTEN = 3
 _MOST_SILENT = 8
 _MOST_PAIRS = 5
+_MOST_NAMED = 10
 _PIECE = 10  # steps
 _WHERE = {
     "output": "Outputs", "rate": "Derivatives", "indicator": "EventIndicators", "initial": "InitialUnknowns",
@@ -29,7 +30,7 @@ class Measured:
 
     def __init__(self, context: Context) -> None:
         self.context = context
-        self.missing: dict[tuple[str, str], tuple[str, str]] = {}
+        self.missing: dict[tuple[str, str], dict[str, str]] = {}
         self.tried: dict[tuple[str, str, str], int] = {}
         self.reacted: set[tuple[str, str, str]] = set()
         self.quotients: dict[tuple[str, str, str], list[tuple[float, float, str]]] = {}
@@ -54,17 +55,20 @@ class Measured:
             if any(_reacts(u.variable, a, b) for a, b in zip(before, during, strict=True)):
                 self.reacted.add(name)
                 if not listed:
-                    self.missing.setdefault((u.variable.name, v.name), (u.section, f"({_WHERE[u.section]}, {at})"))
+                    self.missing.setdefault((u.section, u.variable.name), {}).setdefault(v.name, at)
             if listed and change and u.variable.real and u.variable.size == 1 and math.isfinite(during[0]):
                 noise = 1e-12 * max(abs(before[0]), abs(during[0])) / abs(change)
                 self.quotients.setdefault(name, []).append(((during[0] - before[0]) / change, noise, at))
 
     def report(self) -> None:
         """Hold what was seen against the description."""
-        for (unknown, of), (section, where) in self.missing.items():
-            text = f"`{unknown}` reacts to `{of}` at once, so its dependencies must list it, but do not"
+        for (section, unknown), found in self.missing.items():
+            names = ", ".join(f"`{name}`" for name in [*found][:_MOST_NAMED])
+            more = f" and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
+            pronoun = "it" if len(found) == 1 else "them"
+            text = f"`{unknown}` reacts to {names}{more} at once, so its dependencies must list {pronoun}, but do not"
             rule = "dependency.initial" if section == "initial" else "dependency.missing"
-            self.context.report(rule, text, unknown, where)
+            self.context.report(rule, text, unknown, f"({_WHERE[section]}, {next(iter(found.values()))})")
         for u in self.context.bench.job.unknowns:
             for known, kind in zip(u.knowns or (), u.kinds, strict=False):
                 self._judge_kind(u, known.name, kind)

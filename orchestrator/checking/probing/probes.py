@@ -34,6 +34,7 @@ class Context:
         trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
             cannot be repeated, so that nothing can be compared with it.
         plain: the same with parameters and start values as in the file, likewise.
+        tunable: whether tunable parameters can be set at communication points, as far as is known.
         single: whether a second instance is known not to work.
         quiet: what was watched after each step of the life cycle, [step][value].
         resets: whether a reset has worked so far.
@@ -46,6 +47,7 @@ class Context:
     trace: list[list[Any]] | None = None
     plain: list[list[Any]] | None = None
     single: bool = False
+    tunable: bool = True
     quiet: list[list[Any]] = field(default_factory=list)
     resets: bool = True
     remarked: set[str] = field(default_factory=set)

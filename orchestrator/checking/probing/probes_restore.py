@@ -211,7 +211,8 @@ class _Restoring:
             return
         t = job.start + job.steps * job.step
         movement = self.context.bench.movement.values
-        chosen = [v for v in movement if v.causality == "input" or v.variability == "tunable"]
+        tunable = self.context.tunable
+        chosen = [v for v in movement if v.causality == "input" or (tunable and v.variability == "tunable")]
         now = {v: self.driver.read([v]) for v in chosen if v.causality in ("input", "parameter")}
         others = {v: x for v, value in now.items() if None not in value and (x := moved(v, value, 1)) is not None}
         if others:

@@ -3,16 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.movement import Values, distinct, moved
 from orchestrator.checking.probing.probes import Context, SkippedError, look
+from orchestrator.checking.probing.probes_limits import judge_batches, judge_late_setting, judge_limits
 from orchestrator.checking.probing.statuses import StatusError
-from orchestrator.checking.probing.variables import ProbedVariable, shown
+from orchestrator.checking.probing.values import by_variable, equal, values_text
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.probing.watched import narrow
 
 _FEW_STEPS = 2
-_EQUAL = 1e-9
 _SAME = 1e-6  # what two solutions of one algebraic loop may differ by, relative
-_SINGLE = 1e-6
 _MOST = 500
 _MOST_SHOWN = 5
 
@@ -26,8 +27,11 @@ def values(context: Context) -> None:
         raise SkippedError("the FMU has nothing that can be set to other values, or takes none")
     if job.interface == "ScheduledExecution":
         raise SkippedError("the interface has no communication points")
+    judge_batches(context)
     if not _kept_before(context, movement):
         return
+    judge_limits(context, movement)
+    judge_late_setting(context, movement)
     try:
         _kept_between(context, movement)
         _kept_at_limits(context)
@@ -63,42 +67,69 @@ def _kept_before(context: Context, movement: Mapping[ProbedVariable, Values]) ->
     states = {v.key for v in job.state_variables or ()}
     stays = [v for v in movement if v.causality in ("input", "parameter") or v.key in states]
     with bench.instance(moved=False) as driver:
-        plain = _by_variable(stays, driver.read(stays, "after initialisation"))
+        plain = by_variable(stays, driver.read(stays, "after initialisation"))
     with bench.instance(initialised=False) as driver:
         bench.place(driver, inputs=False)
         driver.enter_initialisation(job.start, job.stop)
         bench.place(driver, inputs=True)
-        found = _by_variable(stays, driver.read(stays, "in initialisation mode"))
+        found = by_variable(stays, driver.read(stays, "in initialisation mode"))
         lost = _judge(context, {v: movement[v] for v in stays}, found, "before initialisation")
         driver.exit_initialisation()
-        later = _by_variable(stays, driver.read(stays, "after initialisation"))
+        later = by_variable(stays, driver.read(stays, "after initialisation"))
     # A state that an event at the start changes is no start value any more.
-    kept = {v: movement[v] for v in stays if v not in lost and _equal(v, plain[v], v.start or ())}
+    kept = {v: movement[v] for v in stays if v not in lost and equal(v, plain[v], v.start or ())}
     return not (lost or _judge(context, kept, later, "before initialisation, when that is over"))
 
 
 def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
-    """Inputs and tunable parameters that are set at a communication point are there."""
+    """Inputs and tunable parameters that are set at a communication point, early or late, are there."""
     bench, job = context.bench, context.bench.job
-    inputs = [v for v in movement if v.causality == "input"]
-    chosen = inputs + [v for v in movement if v.causality == "parameter" and v.variability == "tunable"]
+    chosen = [v for v in movement if v.causality == "input" or _is_tunable(v)]
     if not chosen:
         return
-    steps = min(_FEW_STEPS, job.steps - 1)
-    t = job.start + steps * job.step
+    done = 0
     with bench.instance() as driver:
-        bench.run(driver, 0, steps, read=False)
-        now = _by_variable(chosen, driver.read(chosen))
-        wanted = {v: x for v, value in now.items() if (x := moved(v, value, 1)) is not None}
-        driver.set_discrete(wanted, t)
-        found = _by_variable(list(wanted), driver.read(list(wanted)))
-        lost = _judge(context, wanted, found, "at a communication point", "value.lags")
-        followers = [v for v in job.variables if v.causality == "calculatedParameter" and v.variability == "tunable"]
-        followers = [v for v in followers if not v.clocks][:_MOST]
-        later = _by_variable(followers, driver.read(followers, "after a tunable parameter was set"))
+        for steps in dict.fromkeys((max(min(_FEW_STEPS, job.steps - 1), 0), job.steps)):
+            bench.run(driver, done, steps, read=False)
+            done = steps
+            t = job.start + steps * job.step
+            now = by_variable(chosen, driver.read(chosen))
+            wanted = {v: x for v, value in now.items() if (x := moved(v, value, 1)) is not None}
+            if not (_takes(context, driver, wanted, t) and _follows_between(context, driver, wanted, steps)):
+                return
+            driver.set_discrete(now, t)
+
+
+def _is_tunable(v: ProbedVariable) -> bool:
+    return v.causality == "parameter" and v.variability == "tunable"
+
+
+def _takes(context: Context, driver: Driver, wanted: Mapping[ProbedVariable, Values], t: float) -> bool:
+    """Set values at a communication point; a tunable parameter that is refused then is reported."""
+    driver.set_discrete({v: x for v, x in wanted.items() if not _is_tunable(v)}, t)
+    for v in filter(_is_tunable, wanted):
+        try:
+            driver.set_discrete({v: wanted[v]}, t)
+        except StatusError as error:
+            context.report("value.lags", f"{error}, for `{v.name}` is tunable", v.name)
+            context.tunable = False
+            return False
+    return True
+
+
+def _follows_between(context: Context, driver: Driver, wanted: Mapping[ProbedVariable, Values], steps: int) -> bool:
+    """Whether what was set is there, and early in the run what is calculated from it."""
+    job = context.bench.job
+    found = by_variable(list(wanted), driver.read(list(wanted)))
+    if _judge(context, wanted, found, "at a communication point", "value.lags"):
+        return False
+    followers = [v for v in job.variables if v.causality == "calculatedParameter" and v.variability == "tunable"]
+    followers = [v for v in followers if not v.clocks][:_MOST]
     parameters = {v: x for v, x in wanted.items() if v.causality == "parameter"}
-    if followers and parameters and not lost:
+    if followers and parameters and steps <= _FEW_STEPS:
+        later = by_variable(followers, driver.read(followers, "after a tunable parameter was set"))
         _follow_tunable(context, parameters, later)
+    return True
 
 
 def _kept_at_limits(context: Context) -> None:
@@ -113,7 +144,7 @@ def _kept_at_limits(context: Context) -> None:
             wanted = {v: (float(getattr(v, limit)),) * v.size for v in chosen}
             for v, x in wanted.items():
                 driver.set([v], x)
-            found = _by_variable(chosen, driver.read(chosen))
+            found = by_variable(chosen, driver.read(chosen))
             if _judge(context, wanted, found, f"at their {limit}, between steps", "value.lags"):
                 return
 
@@ -133,7 +164,7 @@ def _follow_tunable(
         other.enter_initialisation(job.start, job.stop)
         bench.place(other, inputs=True)
         other.exit_initialisation()
-        wanted = _by_variable(followers, other.read(followers))
+        wanted = by_variable(followers, other.read(followers))
     _report_stale(context, wanted, now, "when a tunable parameter is set at a communication point")
 
 
@@ -154,7 +185,7 @@ def _follow_inputs(context: Context, movement: Mapping[ProbedVariable, Values]) 
             if first:
                 driver.read(followers, "in initialisation mode")
             bench.place(driver, inputs=True)
-            rows.append(_by_variable(followers, driver.read(followers, "in initialisation mode")))
+            rows.append(by_variable(followers, driver.read(followers, "in initialisation mode")))
     _report_stale(context, rows[1], rows[0], "when an input is set after it was read in initialisation mode")
 
 
@@ -165,8 +196,8 @@ def _report_stale(
     when: str,
 ) -> None:
     for v, expected in wanted.items():
-        if not _equal(v, now[v], expected, _SAME):
-            values_shown = f"is {_shown(now[v])} instead of {_shown(expected)}"
+        if not equal(v, now[v], expected, _SAME):
+            values_shown = f"is {values_text(now[v])} instead of {values_text(expected)}"
             context.report("value.stale", f"`{v.name}` must follow {when}, but {values_shown}", v.name)
 
 
@@ -187,8 +218,8 @@ def _calculated(context: Context, movement: Mapping[ProbedVariable, Values]) -> 
     rows = []
     for is_moved in (False, True):
         with bench.instance(moved=is_moved) as driver:
-            rows.append(_by_variable(chosen, driver.read(chosen)))
-    still = [v.name for v in chosen if _equal(v, rows[1][v], rows[0][v], 0.0)]
+            rows.append(by_variable(chosen, driver.read(chosen)))
+    still = [v.name for v in chosen if equal(v, rows[1][v], rows[0][v], 0.0)]
     if still:
         names = ", ".join(f"`{name}`" for name in still[:10])
         message = f"calculated parameters must follow the parameters that they depend on, but {names} stay the same"
@@ -203,36 +234,12 @@ def _judge(
     rule: str = "value.kept",
 ) -> list[ProbedVariable]:
     """Report what is not there any more, as one finding. Return the variables."""
-    lost = [v for v, value in wanted.items() if not _equal(v, now[v], value)]
+    lost = [v for v, value in wanted.items() if not equal(v, now[v], value)]
     if lost:
-        shown_values = [f"`{v.name}` is {_shown(now[v])} instead of {_shown(wanted[v])}" for v in lost[:_MOST_SHOWN]]
+        shown_values = [
+            f"`{v.name}` is {values_text(now[v])} instead of {values_text(wanted[v])}" for v in lost[:_MOST_SHOWN]
+        ]
         more = f", and {len(lost) - _MOST_SHOWN} more are not what was set" if len(lost) > _MOST_SHOWN else ""
         text = f"values must stay as they were set {when}, but {'; '.join(shown_values)}{more}"
         context.report(rule, text, lost[0].name)
     return lost
-
-
-def _equal(v: ProbedVariable, a: Sequence[Any], b: Sequence[Any], tolerance: float = _EQUAL) -> bool:
-    if v.base == "Float32":
-        tolerance = max(tolerance, _SINGLE)
-    for x, y in zip(a, b, strict=True):
-        if isinstance(x, float) and isinstance(y, float):
-            if x == x and y == y and abs(x - y) > tolerance * max(abs(x), abs(y)):  # noqa: PLR0124 (NaN is none)
-                return False
-        elif x != y and x is not None:  # a text that is null is a finding already
-            return False
-    return True
-
-
-def _by_variable(variables: Sequence[ProbedVariable], row: Sequence[Any]) -> dict[ProbedVariable, tuple[Any, ...]]:
-    found = {}
-    at = 0
-    for v in variables:
-        found[v] = tuple(row[at : at + v.size])
-        at += v.size
-    return found
-
-
-def _shown(values_read: Sequence[Any]) -> str:
-    text = ", ".join(map(shown, values_read[:4]))
-    return text if len(values_read) <= 4 else f"{text}, …"

@@ -65,6 +65,7 @@ value.set-initial | W | 2.1.7 | 2.3.2 | variables with initial exact accept thei
 
 [values]
 value.kept | E | 2.1.7 | 2.2.7.2 | a value that is set is there | store the value, every element of it, where it is used and read
+value.batch | E | 2.1.7 | 2.2.7.2 | values that are read in one call are those that are read one by one | go through all value references, and keep each text in a place of its own
 value.lags | W | 2.1.7 | 2.2.7.2 | inputs and tunable parameters that are set at a communication point are there | store the value when it is set, not with the next step
 value.stale | W | 2.2.7 | 2.3.3 | what is read follows what was set before | compute values when they are read, or when something is set
 value.calculated | W | 2.2.7 | 2.4.7.4 | calculated parameters follow the parameters that they depend on | compute them when initialisation mode is left
