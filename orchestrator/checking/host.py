@@ -21,6 +21,8 @@ _MESSAGES = 4
 _ERRORS = (3, 4)  # Error and Fatal
 _MOST_UPDATES = 10_000
 _LONGEST_TEXT = 1 << 20
+_GUARD = b"\xa5" * 4096
+"""Behind what an FMU may write to: it stays as it is."""
 _LOG = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 _UPDATE = ctypes.CFUNCTYPE(
     None, c_void_p, c_double, c_bool, c_bool, c_bool, c_bool, POINTER(c_bool), POINTER(c_double)
@@ -318,9 +320,12 @@ class Host:
             case "new state":
                 fresh = c_void_p()
                 return (ctypes.byref(fresh),), lambda: self._keep(fresh)
+            case "new state in place":
+                used = self._states[value[0]]
+                return (ctypes.byref(used),), lambda: value[0]
             case "out bytes":
-                data = (ctypes.c_char * value[0])()
-                return (data,), lambda: data.raw
+                data = ctypes.create_string_buffer(bytes(value[0]) + _GUARD, value[0] + len(_GUARD))
+                return (data,), lambda: data.raw[: value[0]] if data.raw[value[0] :] == _GUARD else None
             case "event info":
                 info = _EventInfo()
                 return (ctypes.byref(info),), lambda: [*(bool(getattr(info, f"flag{i}")) for i in range(5)), info.next]

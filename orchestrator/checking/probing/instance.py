@@ -96,6 +96,11 @@ class FmuInstance:
         self._memories[state] = dict(self.memory)
         return state
 
+    def get_state_again(self, state: int) -> None:
+        """Take the present state into one that was made before."""
+        self.call(self.library.names.get_state, ("new state in place", state))
+        self._memories[state] = dict(self.memory)
+
     def set_state(self, state: int) -> None:
         """Restore a state."""
         self.call(self.library.names.set_state, ("state", state))
@@ -116,7 +121,9 @@ class FmuInstance:
             raise StatusError(names.prefix + names.state_size, OK, text)
         data = self.call(names.serialise, ("state", state), ("out bytes", size), ("size", size))[0]
         if not isinstance(data, bytes):
-            raise odd(names.serialise)
+            function = names.prefix + names.serialise
+            text = f"{function} must write the {size} bytes that it asked for, but writes more"
+            raise StatusError(function, OK, text, "state.serialise")
         return data
 
     def deserialise(self, data: bytes, memory: dict[str, Any]) -> int:

@@ -20,6 +20,7 @@ _LEAK_PER_INSTANCE = 256 * 1024
 _LEAK_PER_STEP = 8 * 1024
 _LEAK_AT_LEAST = 512 * 1024
 _FEWEST_STEPS = 10
+_RESETS = 16
 _SMALL = 1e-3
 _BEGINNING = "in initialisation mode"
 _MOST_ITEMS = 10
@@ -263,6 +264,7 @@ def memory(context: Context) -> None:
         context.report(
             "resources.instance-leak", f"an instance must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
         )
+    _reset_memory(context, budget)
     with bench.instance(moved=False) as driver:
         quarter = max(job.steps // 4, 1)
         bench.run(driver, 0, quarter, excited=False, read=False)
@@ -272,3 +274,28 @@ def memory(context: Context) -> None:
     if growth > _LEAK_AT_LEAST and growth / max(job.steps - quarter, 1) > _LEAK_PER_STEP:
         per_step = growth / max(job.steps - quarter, 1) / 1024
         context.report("resources.step-leak", f"memory must not grow with steps, but grows by {per_step:.0f} KiB each")
+
+
+def _reset_memory(context: Context, budget: Stopwatch) -> None:
+    """Resident memory over resets of one instance."""
+    bench = context.bench
+    process = bench.library.process
+    if not context.resets or budget.over:
+        return
+    before = cycles = 0
+    with bench.instance(moved=False) as driver:
+        for n in range(_RESETS):
+            try:
+                driver.reset()
+                bench.begin(driver, moved=False)
+            except StatusError:
+                return  # the probes of resets say so
+            if n == _RESETS // 2:
+                before, cycles = process.jail.resident(), 0
+            cycles += 1
+            if budget.over:
+                return
+    growth = (process.jail.resident() - before) / cycles
+    if growth > _LEAK_PER_INSTANCE:
+        text = f"a reset must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
+        context.report("resources.instance-leak", text)

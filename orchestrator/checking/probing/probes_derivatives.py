@@ -1,20 +1,20 @@
-"""The probe of derivatives: of outputs over time, and partial ones, directional and adjoint.
+"""The probe of derivatives: partial ones, directional and adjoint, and those of outputs over time.
 
-A derivative is held against small changes: of time for outputs, of an input for partial ones. The latter needs model
-exchange, where outputs and state derivatives follow an input without a step.
+A partial derivative is held against small changes of inputs and states. That needs model exchange, where outputs and
+state derivatives follow them without a step. The matrices have a row or column for each element of an array.
 """
 
 import math
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context, SkippedError
-from orchestrator.checking.probing.slopes import TOLERANCE as _TOLERANCE
-from orchestrator.checking.probing.slopes import count_far
+from orchestrator.checking.probing.probes_slopes import judge_outputs
 from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.values import by_variable
 from orchestrator.checking.probing.variables import ProbedVariable
 
 _MOST = 20  # unknowns, and knowns
@@ -24,7 +24,6 @@ _LINEAR = 1e-6
 _PARTIAL = 0.01  # of an entry
 _SMALL = 1e-4  # of the largest entry of a row
 _SMOOTH = 0.002
-_FUNCTIONS = {"2.0": "GetRealOutputDerivatives", "3.0": "GetOutputDerivatives"}
 Matrix = list[list[float]]
 
 
@@ -35,13 +34,13 @@ def derivatives(context: Context) -> None:
     adjoint = "providesAdjointDerivatives" in job.flags
     if job.interface == "ScheduledExecution" or not (job.output_order or directional or adjoint):
         raise SkippedError("the flags promise no derivatives")
-    outputs = [v for v in job.outputs() if v.causality == "output" and _smooth(v)][:_MOST]
+    outputs = [v for v in job.outputs() if v.causality == "output" and _smooth(v)]
     rates = [v for v in job.rate_variables if _smooth(v)] if _follows(context) else []
-    unknowns = [*outputs, *rates][:_MOST]
-    knowns = [v for v in job.inputs() if _smooth(v)][:_MOST] if context.bench.excited else []
+    unknowns = _first_few([*outputs, *rates])
+    knowns = [v for v in job.inputs() if _smooth(v)] if context.bench.excited else []
     try:
         if job.output_order and outputs:
-            _outputs(context, outputs)
+            judge_outputs(context, outputs)
         if (directional or adjoint) and unknowns:
             _partial(context, unknowns, knowns, directional, adjoint)
     except StatusError as error:
@@ -51,49 +50,22 @@ def derivatives(context: Context) -> None:
 
 
 def _smooth(v: ProbedVariable) -> bool:
-    return v.base in ("Real", "Float64") and v.size == 1 and v.variability == "continuous" and not v.clocks
+    return v.base in ("Real", "Float64") and v.variability == "continuous" and not v.clocks
+
+
+def _first_few(variables: Sequence[ProbedVariable]) -> list[ProbedVariable]:
+    """The first variables, as many as have a limited number of elements together."""
+    sizes = accumulate(v.size for v in variables)
+    return [v for v, size in zip(variables, sizes, strict=True) if size <= _MOST]
+
+
+def _labels(variables: Sequence[ProbedVariable]) -> list[str]:
+    return [label for v in variables for label in v.labels]
 
 
 def _follows(context: Context) -> bool:
     """Whether what the FMU computes follows an input without a step."""
     return context.bench.job.interface == "ModelExchange"
-
-
-def _outputs(context: Context, outputs: list[ProbedVariable]) -> None:
-    """First derivatives of outputs, between or near the slopes of the steps before and after."""
-    bench, job = context.bench, context.bench.job
-    count = len(outputs)
-    arguments = [
-        ("in", "uint32", [v.reference for v in outputs]), ("size", count), ("in", "int32", [1] * count),
-        ("out", "double", count), *((("size", count),) if job.version == "3.0" else ()),
-    ]  # fmt: skip
-    rows: Matrix = []
-    found: Matrix = []
-    with bench.instance() as driver:
-        for n in range(job.steps):
-            t = job.start + n * job.step
-            driver.advance(t, job.step, f"at t = {t:g} (step {n + 1})")
-            rows.append(driver.read(outputs))
-            found.append(driver.call(_FUNCTIONS[job.version], *arguments, when=f"at t = {t + job.step:g}")[0])
-    for i, v in enumerate(outputs):
-        if not all(_within(row[i], v) for row in rows):
-            continue  # a finding already
-        slopes = [(b[i] - a[i]) / job.step for a, b in pairwise(rows)]
-        far = count_far([x[i] for x in found], slopes)
-        absent = sum(not math.isfinite(x[i]) for x in found)
-        if absent:
-            message = f"the first derivative of `{v.name}` must be finite, but {absent} of {len(found)} are not"
-            context.report("derivative.value", message, v.name)
-        elif far > (len(slopes) - 1) / 2:
-            text = f"is off by more than {_TOLERANCE:.0%} of its largest slope at {far} of {len(slopes) - 1} points"
-            message = f"the first derivative of `{v.name}` must be that of the output, but {text}"
-            context.report("derivative.value", message, v.name)
-
-
-def _within(value: float, v: ProbedVariable) -> bool:
-    low = -math.inf if v.minimum is None else v.minimum
-    high = math.inf if v.maximum is None else v.maximum
-    return math.isfinite(value) and low <= value <= high
 
 
 def _partial(
@@ -103,7 +75,7 @@ def _partial(
     bench = context.bench
     with bench.instance() as driver:
         for point in points(bench, driver):
-            knowns = [*inputs, *(v for v in point.states if _smooth(v))][:_MOST]
+            knowns = _first_few([*inputs, *(v for v in point.states if _smooth(v))])
             if not knowns:
                 return
             matrices = {}
@@ -133,7 +105,8 @@ def _judge(
     changes, wider = _by_changes(point, *variables, 1.0), _by_changes(point, *variables, 3.0)
     # How an output that is a state depends on that state itself is nothing that tools agree on. And between steps
     # only what reacts at once can be seen: a derivative may be that over the next step.
-    own = [[u.key == k.key for k in variables[1]] for u in variables[0]]
+    keys = [[v.key for v in group for _ in range(v.size)] for group in variables]
+    own = [[u == k for k in keys[1]] for u in keys[0]]
     counts = [
         [not o and _agree(b, c) and (b != 0.0 or _follows(context)) for o, b, c in zip(p, r, w, strict=True)]
         for p, r, w in zip(own, changes, wider, strict=True)
@@ -158,25 +131,35 @@ def _columns(
     context: Context, point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]
 ) -> Matrix:
     """The matrix by directional derivatives."""
-    units = [[float(k == at) for k in range(len(knowns))] for at in range(len(knowns))]
+    units = _unit_seeds(len(_labels(knowns)))
     columns = [_sensitivities(point.driver, "Directional", unknowns, knowns, seed) for seed in units]
     matrix = [list(row) for row in zip(*columns, strict=True)]
-    seed = _mix_seed(len(knowns))
+    seed = _mix_seed(len(units))
     found = _sensitivities(point.driver, "Directional", unknowns, knowns, seed)
     wanted = [sum(a * b for a, b in zip(row, seed, strict=True)) for row in matrix]
     _judge_mixed(context, "directional", found, wanted, unknowns)
+    for order in (unknowns[::-1], unknowns[-1:]):
+        again = _sensitivities(point.driver, "Directional", order, knowns, seed)
+        _judge_order(context, "directional", by_variable(order, again), by_variable(unknowns, found))
     return matrix
 
 
 def _rows(context: Context, point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]) -> Matrix:
     """The matrix by adjoint derivatives."""
-    units = [[float(k == at) for k in range(len(unknowns))] for at in range(len(unknowns))]
+    units = _unit_seeds(len(_labels(unknowns)))
     matrix = [_sensitivities(point.driver, "Adjoint", unknowns, knowns, seed) for seed in units]
-    seed = _mix_seed(len(unknowns))
+    seed = _mix_seed(len(units))
     found = _sensitivities(point.driver, "Adjoint", unknowns, knowns, seed)
     wanted = [sum(a * b for a, b in zip(column, seed, strict=True)) for column in zip(*matrix, strict=True)]
     _judge_mixed(context, "adjoint", found, wanted, knowns)
+    for order in (knowns[::-1], knowns[-1:]):
+        again = _sensitivities(point.driver, "Adjoint", unknowns, order, seed)
+        _judge_order(context, "adjoint", by_variable(order, again), by_variable(knowns, found))
     return matrix
+
+
+def _unit_seeds(count: int) -> list[list[float]]:
+    return [[float(k == at) for k in range(count)] for at in range(count)]
 
 
 def _mix_seed(count: int) -> list[float]:
@@ -189,25 +172,40 @@ def _judge_mixed(
 ) -> None:
     """What comes for a mixed seed is the sum of what comes for its parts."""
     size = max((abs(x) for x in wanted if math.isfinite(x)), default=0.0)
-    for v, a, b in zip(variables, product, wanted, strict=True):
+    for label, a, b in zip(_labels(variables), product, wanted, strict=True):
         if math.isfinite(b) and not abs(a - b) <= _LINEAR * size:
-            text = f"{kind} derivatives must be linear in the seed, but that of `{v.name}` is not"
-            context.report(
-                "derivative.value", text, v.name, f"({a:.6g} instead of {b:.6g} for a seed of several values)"
-            )
+            text = f"{kind} derivatives must be linear in the seed, but that of `{label}` is not"
+            context.report("derivative.value", text, "", f"({a:.6g} instead of {b:.6g} for a seed of several values)")
             return
+
+
+def _judge_order(
+    context: Context,
+    kind: str,
+    found: Mapping[ProbedVariable, tuple[Any, ...]],
+    wanted: Mapping[ProbedVariable, tuple[Any, ...]],
+) -> None:
+    """What comes is that of the variables that are asked for, in whatever order and number."""
+    size = max((abs(x) for row in wanted.values() for x in row if math.isfinite(x)), default=0.0)
+    for v, row in found.items():
+        for a, b in zip(row, wanted[v], strict=True):
+            if math.isfinite(b) and not abs(a - b) <= _LINEAR * size:
+                text = f"{kind} derivatives must be those of the variables that are asked for, but that of `{v.name}`"
+                when = f"is {a:.6g} instead of {b:.6g} when variables are left out or stand in another order"
+                context.report("derivative.value", text, v.name, when)
+                return
 
 
 def _sensitivities(
     driver: Driver, kind: str, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], seed: list[float]
 ) -> list[float]:
     """The product of the matrix with a seed of the knowns (directional), or of a seed of the unknowns with it."""
-    asked = unknowns if kind == "Directional" else knowns
+    asked = sum(v.size for v in (unknowns if kind == "Directional" else knowns))
     lists = [x for group in (unknowns, knowns) for x in (_references(group), ("size", len(group)))]
     if driver.job.version == "2.0":
-        tail: list[Any] = [("in", "double", seed), ("out", "double", len(asked))]
+        tail: list[Any] = [("in", "double", seed), ("out", "double", asked)]
     else:
-        out = [("out", "double", len(asked)), ("size", len(asked))]
+        out = [("out", "double", asked), ("size", asked)]
         tail = [("in", "double", seed), ("size", len(seed)), *out]
     (values,) = driver.call(f"Get{kind}Derivative", *lists, *tail)
     return list(values)
@@ -225,18 +223,19 @@ def _by_changes(point: RestPoint, unknowns: list[ProbedVariable], knowns: list[P
     """
     columns = []
     for v in knowns:
-        (base,) = point.get(v)
-        size = width * _CHANGE * (v.nominal or max(abs(base), 1.0))
-        low, high = base - size, base + size
-        low = low if v.minimum is None else max(low, v.minimum)
-        high = high if v.maximum is None else min(high, v.maximum)
-        ends = []
-        for value in (low, high):
-            point.put(v, (value,))
-            ends.append(point.driver.read(unknowns))
-        point.put(v, (base,))
-        span = high - low
-        columns.append([(b - a) / span if span else math.nan for a, b in zip(*ends, strict=True)])
+        base = point.get(v)
+        for at, x in enumerate(base):
+            size = width * _CHANGE * (v.nominal or max(abs(x), 1.0))
+            low, high = x - size, x + size
+            low = low if v.minimum is None else max(low, v.minimum)
+            high = high if v.maximum is None else min(high, v.maximum)
+            ends = []
+            for value in (low, high):
+                point.put(v, (*base[:at], value, *base[at + 1 :]))
+                ends.append(point.driver.read(unknowns))
+            point.put(v, base)
+            span = high - low
+            columns.append([(b - a) / span if span else math.nan for a, b in zip(*ends, strict=True)])
     return [list(row) for row in zip(*columns, strict=True)]
 
 
@@ -264,7 +263,8 @@ def _where(a: Matrix, b: Matrix, unknowns: list[ProbedVariable], knowns: list[Pr
     """The entry that is off most, in words."""
     entries = [(abs(x - y), i, k) for i, (r, s) in enumerate(zip(a, b, strict=True)) for k, (x, y) in _pairs(r, s)]
     _, i, k = max(entries)
-    return f"that of `{unknowns[i].name}` by `{knowns[k].name}` is {a[i][k]:.6g} instead of {b[i][k]:.6g}"
+    names = _labels(unknowns)[i], _labels(knowns)[k]
+    return f"that of `{names[0]}` by `{names[1]}` is {a[i][k]:.6g} instead of {b[i][k]:.6g}"
 
 
 def _pairs(r: list[float], s: list[float]) -> list[tuple[int, tuple[float, float]]]:

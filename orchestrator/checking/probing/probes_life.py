@@ -5,6 +5,7 @@ from dataclasses import replace
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
+from orchestrator.errors import ChildError
 
 _FEW_STEPS = 3
 _LATER = 10  # steps
@@ -36,6 +37,29 @@ def ending(context: Context) -> None:
             _steps(context, driver)
         except StatusError as error:
             context.report("run.reset", f"{error}, after Terminate and Reset")
+            return
+    _reset_early(context)
+
+
+def _reset_early(context: Context) -> None:
+    """An instance can be reset before and in initialisation mode too, and then lives on."""
+    bench, job = context.bench, context.bench.job
+    for entered, moment in ((False, "of a new instance"), (True, "in initialisation mode")):
+        try:
+            with bench.instance(initialised=False) as driver:
+                if entered:
+                    driver.enter_initialisation(job.start, job.stop)
+                driver.reset()
+                bench.begin(driver)
+                _steps(context, driver)
+        except StatusError as error:
+            context.report("run.reset", f"{error}, after a Reset {moment}")
+            return
+        except ChildError as error:
+            text = f"a Reset {moment} must lead to a new life, but {error} during {bench.library.current or 'a step'}"
+            context.report("run.reset", text)
+            bench.library.renew()
+            return
 
 
 def _steps(context: Context, driver: Driver) -> None:

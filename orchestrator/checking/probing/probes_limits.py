@@ -105,9 +105,10 @@ def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Value
         off += [v for v, a, b in _pairs(recorded, first, second) if not equal(v, b, a, _SAME) and v not in off]
     if off:
         names = ", ".join(f"`{v.name}`" for v in off[:_MOST_NAMED]) + (" and others" if off[_MOST_NAMED:] else "")
-        text = f"parameters must have the same effect when they are set in initialisation mode, but {names} are others"
+        verb = "differs" if len(off) == 1 else "differ"
         rule = "value.kept" if any(v in chosen for v in off) else "value.stale"
-        context.report(rule, f"{text} than when they are set before it", off[0].name)
+        text = "parameters that are set in initialisation mode must act as those that are set before it"
+        context.report(rule, f"{text}, but {names} {verb}", off[0].name)
 
 
 def _pairs(

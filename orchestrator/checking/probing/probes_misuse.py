@@ -83,19 +83,25 @@ def _get(driver: Driver, base: str, references: list[int], size: int) -> int:
 
 def _steps(context: Context) -> None:
     bench, job = context.bench, context.bench.job
-    name = f"{bench.library.names.prefix}DoStep"
+    prefix = bench.library.names.prefix
+    name = f"{prefix}DoStep"
     with bench.instance(initialised=False) as driver:
         if _try_step(driver, job.step) in _NOT_REFUSED:
             context.report("misuse.step-before-init", f"{name} must be refused before initialisation, but is not")
     with bench.instance() as driver:
         if _try_step(driver, -job.step) in _NOT_REFUSED:
             context.report("misuse.negative-step", f"{name} must refuse a negative step, but does not")
+    with bench.instance() as driver:
+        bench.run(driver, 0, 1)
+        driver.terminate()
+        if _try_step(driver, job.step, job.start + job.step) in _NOT_REFUSED:
+            context.report("misuse.step-after-end", f"{name} must be refused after {prefix}Terminate, but is not")
 
 
-def _try_step(driver: Driver, size: float) -> int:
-    """The status of a step that is to be refused, which takes no time."""
+def _try_step(driver: Driver, size: float, t: float | None = None) -> int:
+    """The status of a step that is to be refused, from the start or from ``t`` [s], which takes no time."""
     with driver.library.limit_calls(_SOON):
-        return driver.raw("DoStep", *_step(driver.job.version, driver.job.start, size))[0]
+        return driver.raw("DoStep", *_step(driver.job.version, driver.job.start if t is None else t, size))[0]
 
 
 def _step(version: str, t: float, size: float) -> list[tuple[Any, ...]]:

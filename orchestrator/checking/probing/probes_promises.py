@@ -185,6 +185,12 @@ def _interpolation(context: Context) -> None:
     if held == sloped and held != other:
         text = "derivatives of inputs must change what comes out, as canInterpolateInputs says, but they change nothing"
         context.report("promise.ignored", text)
+        return
+    effects = [(c - a, b - a, 1e-6 * max(abs(a), abs(b))) for a, b, c in zip(held, other, sloped, strict=True)]
+    seen = [slope * whole for slope, whole, noise in effects if abs(whole) > noise and abs(slope) > noise]
+    if seen and max(seen) < 0.0:
+        text = "an input with a positive derivative must act like one that grows, but all outputs go the other way"
+        context.report("promise.ignored", text)
 
 
 def _change(v: ProbedVariable, step: float) -> float:

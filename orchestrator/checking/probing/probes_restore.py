@@ -10,6 +10,7 @@ from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, Skippe
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.trajectory import same
 from orchestrator.checking.probing.variables import ProbedVariable, shown
+from orchestrator.errors import ChildError
 
 _AMPLIFIED = 100.0
 _SMALL, _MOST_INEXACT = 1e-3, 1e-2
@@ -17,9 +18,9 @@ _MOST_READ = 1000
 _EQUAL = 1e-9
 
 
-def readable(job: ProbeJob, locals_too: bool = True) -> list[ProbedVariable]:
+def readable(job: ProbeJob) -> list[ProbedVariable]:
     """Variables that can be read at any time and belong to the state of an instance, a limited number of them."""
-    kinds = ("input", "parameter", "calculatedParameter", "output") + (("local",) if locals_too else ())
+    kinds = ("input", "parameter", "calculatedParameter", "output", "local")
     found = [v for v in job.variables if v.causality in kinds and not v.clocks and v.base != "Clock" and not v.extents]
     found = [v for v in found if v.variability != "constant"]
     found += [v for v in job.variables if v.causality == "parameter" and v.extents]
@@ -137,6 +138,7 @@ def state(context: Context) -> None:
     if not job.saves:
         raise SkippedError("states cannot be saved, as the flags say")
     half = max(job.steps // 2, 1) if job.steps > 1 else 0
+    data, memory = b"", {}
     with bench.instance() as driver:
         try:
             first = _Restoring(context, driver, 0)
@@ -145,6 +147,8 @@ def state(context: Context) -> None:
             try:
                 if later.restore():
                     first.restore_values()
+                    later.take_again()
+                    data, memory = later.to_bytes()
             finally:
                 driver.free_state(first.saved)
                 nulled = driver.free_state(later.saved)
@@ -153,7 +157,9 @@ def state(context: Context) -> None:
                 function = names.prefix + names.free_state
                 context.report("state.free", f"{function} must set the state to null, but does not")
         except StatusError as error:
-            context.report("state.status", str(error))
+            context.report(error.rule or "state.status", str(error))
+    if data:
+        later.restore_elsewhere(data, memory)
 
 
 class _Restoring:
@@ -163,7 +169,7 @@ class _Restoring:
         self.context, self.driver, self.half = context, driver, half
         self.saved = driver.get_state()
         job = context.bench.job
-        self.watch = readable(job, locals_too=False)
+        self.watch = readable(job)
         clock = job.time_variable
         self.watch += [clock] if clock is not None and job.interface == "CoSimulation" else []
         self.values = driver.read(self.watch, "beside the saved state")
@@ -194,15 +200,39 @@ class _Restoring:
             if not self._continues(self.driver, "state.restore", "a restored state must continue as before", last):
                 return False
             self.driver.set_state(self.saved)
-        if not bench.job.serialises:
-            return True
-        data, memory = self.driver.serialise(self.saved), dict(self.driver.memory)
-        if self.context.single:
-            self._deserialise(self.driver, data, memory)
-            return True
-        with bench.instance(name="restored", moved=False) as other:
-            self._deserialise(other, data, memory)
         return True
+
+    def take_again(self) -> None:
+        """A state can be taken into one that was made before, which is another one then."""
+        bench = self.context.bench
+        self.driver.set_state(self.saved)
+        last = min(self.half + 1, bench.job.steps)
+        bench.run(self.driver, self.half, last, read=False)
+        now = self.driver.read(self.watch)
+        self.driver.get_state_again(self.saved)
+        bench.run(self.driver, last, bench.job.steps, read=False)
+        self.driver.set_state(self.saved)
+        self.half, self.values = last, now
+        self._is_back(self.driver, "state.restore", "a state that was taken into one that was made before")
+
+    def to_bytes(self) -> tuple[bytes, dict[str, Any]]:
+        """The state in bytes, and what its driver keeps; no bytes where it cannot be serialised."""
+        if not self.context.bench.job.serialises:
+            return b"", {}
+        return self.driver.serialise(self.saved), dict(self.driver.memory)
+
+    def restore_elsewhere(self, data: bytes, memory: dict[str, Any]) -> None:
+        """In another process, where pointers into the memory of this one lead nowhere."""
+        bench = self.context.bench
+        bench.library.renew()
+        try:
+            with bench.instance(name="restored", moved=False) as other:
+                self._deserialise(other, data, memory)
+        except StatusError as error:
+            self.context.report("state.serialise", f"a serialised state must be usable in another process, but {error}")
+        except ChildError as error:
+            self.context.report("state.serialise", f"a serialised state must be usable in another process, but {error}")
+            bench.library.renew()
 
     def _change(self) -> None:
         """Give inputs and tunable parameters other values after the state was saved."""

@@ -134,7 +134,7 @@ reference.result | E | * | * | the reference result is reproduced | correct the 
 reference.not-run | I | * | * | the reference result can be reproduced in reasonable time | shorten the result
 
 [memory]
-resources.instance-leak | W | * | * | memory does not grow with instances made and freed | free what is allocated at instantiation
+resources.instance-leak | W | * | * | memory does not grow with instances made and freed, or reset | free what is allocated at instantiation, in the reset too
 resources.step-leak | W | * | * | memory does not grow with steps | free what is allocated in a step
 
 [promises]
@@ -157,6 +157,7 @@ misuse.guid | W | 2.1.5 | 2.3.1 | a wrong guid or token is refused | compare it 
 misuse.crash | W | * | * | misuse neither ends the process nor hangs it | check the arguments and the state of the instance
 misuse.step-before-init | W | 4.2.4 | 4.2 | a step before initialisation is refused | return an error
 misuse.negative-step | W | 4.2.4 | 4.2.1 | a negative step is refused | return an error
+misuse.step-after-end | W | 4.2.4 | 4.2 | a step after the end is refused | return an error
 misuse.value-reference | W | 2.1.7 | 2.2.7.2 | unknown value references are refused | return an error
 misuse.set-fixed | I | 2.2.7 | 2.4.7.4 | fixed parameters and constants are not set between steps | return an error
 misuse.value-count | W | - | 2.2.7.2 | a number of values that is not that of the variables is refused | compare nValues with the sizes of the variables

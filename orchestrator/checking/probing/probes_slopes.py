@@ -1,0 +1,78 @@
+"""Derivatives of outputs over time: each order is held against the slopes of the one below it."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.slopes import TOLERANCE, count_far
+from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.variables import ProbedVariable
+
+_FUNCTIONS = {"2.0": "GetRealOutputDerivatives", "3.0": "GetOutputDerivatives"}
+_MOST = 20
+_ORDERS = ("the first", "the second")
+Rows = list[list[float]]
+
+
+def judge_outputs(context: Context, outputs: Sequence[ProbedVariable]) -> None:
+    """The first and the second derivatives, as far as they are promised."""
+    bench, job = context.bench, context.bench.job
+    chosen = [v for v in outputs if v.size == 1][:_MOST]
+    if not chosen:
+        return
+    orders = range(1, min(job.output_order, len(_ORDERS)) + 1)
+    rows: Rows = []
+    found: dict[int, Rows] = {order: [] for order in orders}
+    with bench.instance() as driver:
+        for n in range(job.steps):
+            t = job.start + n * job.step
+            driver.advance(t, job.step, f"at t = {t:g} (step {n + 1})")
+            rows.append(driver.read(chosen))
+            for order in list(found):
+                try:
+                    found[order].append(_ask(driver, chosen, order, f"at t = {t + job.step:g}"))
+                except StatusError:
+                    if order == 1:
+                        raise
+                    found.pop(order)  # the probe of promises says so
+    for i, v in enumerate(chosen):
+        right = all(_within(row[i], v) for row in rows)  # else a finding already
+        for order, derivatives in found.items():
+            below = rows if order == 1 else found[order - 1]
+            right = right and _judge(context, v, order, ([row[i] for row in below], [row[i] for row in derivatives]))
+
+
+def _ask(driver: Driver, variables: Sequence[ProbedVariable], order: int, when: str) -> list[float]:
+    count = len(variables)
+    arguments = [
+        ("in", "uint32", [v.reference for v in variables]), ("size", count), ("in", "int32", [order] * count),
+        ("out", "double", count), *((("size", count),) if driver.job.version == "3.0" else ()),
+    ]  # fmt: skip
+    return list(driver.call(_FUNCTIONS[driver.job.version], *arguments, when=when)[0])
+
+
+def _judge(context: Context, v: ProbedVariable, order: int, values: tuple[list[float], list[float]]) -> bool:
+    """Whether a derivative, the second of ``values``, is near the slopes of the first."""
+    below, derivative = values
+    what = f"{_ORDERS[order - 1]} derivative of `{v.name}`"
+    absent = sum(not math.isfinite(x) for x in derivative)
+    if absent:
+        message = f"{what} must be finite, but {absent} of {len(derivative)} are not"
+        context.report("derivative.value", message, v.name)
+        return False
+    slopes = [(b - a) / context.bench.job.step for a, b in pairwise(below)]
+    far = count_far(derivative, slopes)
+    if far > (len(slopes) - 1) / 2:
+        text = f"is off by more than {TOLERANCE:.0%} of the largest slope at {far} of {len(slopes) - 1} points"
+        of = "the output" if order == 1 else "the first derivative"
+        context.report("derivative.value", f"{what} must be the slope of {of}, but {text}", v.name)
+        return False
+    return True
+
+
+def _within(value: float, v: ProbedVariable) -> bool:
+    low = -math.inf if v.minimum is None else v.minimum
+    high = math.inf if v.maximum is None else v.maximum
+    return math.isfinite(value) and low <= value <= high
