@@ -13,6 +13,7 @@ from orchestrator.shared.isolation.limits import Limits
 
 _STEPS = 100
 _MOST_VALUES = 1 << 20
+_ANY_BYTES = "application/octet-stream"
 _BUDGET = 0.5  # s of a run; there are about fifteen
 _FLAGS = (
     "canGetAndSetFMUstate", "canSerializeFMUstate", "canGetAndSetFMUState", "canSerializeFMUState",
@@ -146,6 +147,7 @@ def _variable_of_job(d: Description, v: DescribedVariable) -> ProbedVariable:
         intermediate=v.flag("intermediateUpdate"),
         items=_items(d, v) if v.kind == "Enumeration" else (),
         most_bytes=int(number(v.attributes.get("maxSize"), "Integer") or 0) or None,
+        has_format=v.attributes.get("mimeType", _ANY_BYTES) != _ANY_BYTES,
         extents=tuple(-1 - e.reference if e.reference is not None else e.size or 0 for e in v.dimensions),
     )
 

@@ -96,7 +96,7 @@ class Measured:
             f"`{k.name}` for `{u.variable.name}`"
             for u in self.listing()
             for k in u.knowns or ()
-            if u.section in ("output", "rate")
+            if u.section != "initial"
             and self.context.bench.job.interface == "ModelExchange"
             and self.tried.get((u.section, u.variable.name, k.name), 0) >= _OFTEN
             and (u.section, u.variable.name, k.name) not in self.reacted

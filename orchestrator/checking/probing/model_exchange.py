@@ -130,6 +130,7 @@ class ModelExchange(EventDriver):
             h = min(h, goal - t) if x else goal - t
             if h > slack:
                 x, t, h, signs = self._try(t, x, h, when)
+                before = self.read(self.watched, when)
                 entered, terminate = (v[0] for v in self.call(
                     "CompletedIntegratorStep", (self._truth, True), ("out", self._truth, 1), ("out", self._truth, 1),
                     when=when,
@@ -138,7 +139,7 @@ class ModelExchange(EventDriver):
                     raise TerminatedError
                 crossed = signs != self.memory["signs"]
                 if self.watched and not (entered or crossed):
-                    self._judge_quiet_step(x, when)
+                    self._judge_quiet_step(x, before, when)
             else:
                 t, entered, crossed = goal, False, False
             if entered or crossed or self.next_instant(end + size) <= t + slack:
@@ -203,23 +204,23 @@ class ModelExchange(EventDriver):
         _, signs = self._place(t + high * h, found, when)
         return found, high * h, signs
 
-    def _judge_quiet_step(self, x: Sequence[float], when: str) -> None:
-        """Without an event, discrete variables stay, and so do the states when a step is completed."""
-        found = self.continuous_states()
-        for i, (a, b, n) in enumerate(zip(x, found, self.memory["nominals"], strict=True)):
+    def _judge_quiet_step(self, x: Sequence[float], before: Sequence[Any], when: str) -> None:
+        """A completed step that leads to no event leaves states and discrete variables as they are."""
+        function = f"{self.library.names.prefix}CompletedIntegratorStep"
+        text = ""
+        for i, (a, b, n) in enumerate(zip(x, self.continuous_states(), self.memory["nominals"], strict=True)):
             if abs(a - b) > _JUMP * max(abs(a), n):
-                text = f"states must change in event mode only, but number {i + 1} is {b:.6g} instead of {a:.6g}"
-                self.report("event.states-changed", f"{text} once a step is completed", when=when)
-                self.watched = ()
-                return
-        values = self.read(self.watched, when)
-        before, self.memory["quiet"] = self.memory.get("quiet"), values
-        for v, a, b in zip(self.watched, before or values, values, strict=True):
+                text = f"but {function} changes number {i + 1} from {a:.6g} to {b:.6g}"
+                self.report("event.states-changed", f"states must change in event mode only, {text}", when=when)
+        for v, a, b in zip(self.watched, before, self.read(self.watched, when), strict=True):
             if a != b and finite(a) and finite(b):
-                text = f"`{v.name}` is discrete, so it must change in event mode only, but goes from {shown(a)}"
-                self.report("event.outside", f"{text} to {shown(b)} in continuous time", v.name, when)
-                self.watched = ()
-                return
+                text = f"but {function} changes it from {shown(a)} to {shown(b)}"
+                self.report(
+                    "event.outside", f"`{v.name}` is discrete and must change in event mode only, {text}", v.name
+                )
+                break
+        if text:
+            self.watched = ()
 
     def _event(self, t: float, when: str) -> list[float]:
         """Handle an event; the states after it."""
@@ -232,7 +233,6 @@ class ModelExchange(EventDriver):
         outcomes = self.settle(t, when)
         self.call("EnterContinuousTimeMode", when=when)
         self.memory["signs"] = self.signs(when)
-        self.memory.pop("quiet", None)
         after = self._values("GetContinuousStates", "states", when)
         self._judge_event(before, after, any(o.states_changed for o in outcomes), when)
         return after

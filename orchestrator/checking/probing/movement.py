@@ -66,7 +66,9 @@ def _other(v: ProbedVariable, value: Any, which: int, element: int) -> Any:
         return int(not value)
     if v.base == "String":
         return None if any(part in value.decode("utf-8", "replace") for part in _PATHS) else value + b"_%d" % which
-    if v.base == "Binary" or v.base == "Clock":
+    if v.base == "Binary":
+        return _bytes(v, value, which)
+    if v.base == "Clock":
         return None
     if v.items:
         others = [item for item in v.items if item != value]
@@ -74,6 +76,15 @@ def _other(v: ProbedVariable, value: Any, which: int, element: int) -> Any:
     if v.base in _BITS or v.base == "Integer":
         return _whole(v, int(value), which)
     return _number(v, float(value), which, element)
+
+
+def _bytes(v: ProbedVariable, value: bytes, which: int) -> bytes | None:
+    """A byte more, or another last one; none where a type says what bytes mean."""
+    if v.has_format:
+        return None
+    if v.most_bytes is None or len(value) < v.most_bytes:
+        return value + bytes([1 + which])
+    return value[:-1] + bytes([value[-1] ^ (1 + which)]) if value else None
 
 
 def _limits(v: ProbedVariable) -> tuple[float, float]:

@@ -18,8 +18,8 @@ _MOST_ITEMS = 8
 _MOST_NAMED = 5
 _SAME = 1e-6  # what two solutions of one algebraic loop may differ by, relative
 _FEW_STEPS = 2
-_TEXT = " \N{LATIN SMALL LETTER E WITH ACUTE}\N{EURO SIGN} second\nline".encode() + 80 * b"-"
-"""A text of several lines, with letters beyond ASCII, longer than many a buffer."""
+_TEXT = " \N{LATIN SMALL LETTER E WITH ACUTE}\N{EURO SIGN}\nline".encode()
+"""A second line, and letters beyond ASCII; short, for many FMUs have room for so many letters alone."""
 
 
 def judge_limits(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:

@@ -15,15 +15,15 @@ from orchestrator.errors import ChildError
 _AMPLIFIED = 100.0
 _SMALL, _MOST_INEXACT = 1e-3, 1e-2
 _MOST_READ = 1000
+_LARGEST = 1000  # elements of an array
 _EQUAL = 1e-9
 
 
 def readable(job: ProbeJob) -> list[ProbedVariable]:
     """Variables that can be read at any time and belong to the state of an instance, a limited number of them."""
     kinds = ("input", "parameter", "calculatedParameter", "output", "local")
-    found = [v for v in job.variables if v.causality in kinds and not v.clocks and v.base != "Clock" and not v.extents]
-    found = [v for v in found if v.variability != "constant"]
-    found += [v for v in job.variables if v.causality == "parameter" and v.extents]
+    found = [v for v in job.variables if v.causality in kinds and not v.clocks and v.base != "Clock"]
+    found = [v for v in found if v.variability != "constant" and v.size <= _LARGEST]
     return sorted(distinct(found), key=lambda v: v.causality == "local")[:_MOST_READ]
 
 

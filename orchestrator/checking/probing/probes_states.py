@@ -56,7 +56,7 @@ def _exchange(context: Context) -> None:
 def _discrete(job: ProbeJob) -> list[ProbedVariable]:
     """What events alone may change, as far as it can be read."""
     found = [v for v in distinct(job.event_variables()) if v.variability == "discrete" and v.base != "Binary"]
-    return [v for v in found if not v.extents][:_MOST]
+    return [v for v in found if v.size == 1][:_MOST]
 
 
 def _others(driver: ModelExchange, variables: Sequence[ProbedVariable]) -> list[float]:

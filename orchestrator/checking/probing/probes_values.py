@@ -106,7 +106,10 @@ def _is_tunable(v: ProbedVariable) -> bool:
 
 def _takes(context: Context, driver: Driver, wanted: Mapping[ProbedVariable, Values], t: float) -> bool:
     """Set values at a communication point; a tunable parameter that is refused then is reported."""
-    driver.set_discrete({v: x for v, x in wanted.items() if not _is_tunable(v)}, t)
+    smooth = [v for v in wanted if v.causality == "input" and v.variability == "continuous"]
+    for v in smooth:
+        driver.set([v], wanted[v])
+    driver.set_discrete({v: x for v, x in wanted.items() if v not in smooth and not _is_tunable(v)}, t)
     for v in filter(_is_tunable, wanted):
         try:
             driver.set_discrete({v: wanted[v]}, t)

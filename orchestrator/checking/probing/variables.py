@@ -21,6 +21,7 @@ class ProbedVariable:
         extents: its dimensions: a size, or minus one less the value reference of the parameter that has it.
         items: the values of an enumeration; empty for other types.
         most_bytes: of a binary, None where the description does not say.
+        has_format: whether a binary has a type that says what its bytes mean.
     """
 
     name: str
@@ -39,6 +40,7 @@ class ProbedVariable:
     extents: tuple[int, ...] = ()
     items: tuple[int, ...] = ()
     most_bytes: int | None = None
+    has_format: bool = False
 
     def resize(self, sizes: Mapping[int, int]) -> "ProbedVariable":
         """The variable after structural parameters have changed."""
