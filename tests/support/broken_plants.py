@@ -45,6 +45,13 @@ _TABLE = """
 2 3 | CS | truth_sticks      | value.lags
 2 3 | CS | inputs_cleared    | value.kept
 2 3 | CS | start_blended     | value.kept
+2 3 | CS | early_only        | value.kept
+2 3 | ME | derived_early     | value.stale
+2 3 | CS | clipped_far       | value.kept
+2 3 | CS | text_plain        | value.kept
+2 3 | CS | tunable_late      | value.lags
+2 3 | CS | tunable_refused   | value.lags
+2 3 | CS | dead_parameter    | dependency.superfluous | Initial der(v)=-
 
 [reset after nothing was changed]
 2 3 | CS | keep_parameter    | run.reset
@@ -67,6 +74,8 @@ _TABLE = """
 2 3 | CS | reset_once        | run.reset
 2 3 | CS | keep_speed        | run.reset
 2 3 | ME | keep_when_switched | run.reset
+2 3 | CS | reset_initialising | run.reset
+2 3 | CS | reset_leaks       | resources.instance-leak
 
 [state restored, not looked at]
 2 3 | CS | restored_output   | state.restore
@@ -89,6 +98,10 @@ _TABLE = """
 2 3 | ME | lose_speed        | state.restore
 2 3 | CS | add_count         | state.restore
 2 3 | CS | start_anew        | state.restore
+2 3 | CS | restored_local    | state.restore
+2 3 | CS | state_in_place    | state.status
+2 3 | CS | bytes_pointer     | state.serialise
+2 3 | CS | bytes_overrun     | state.serialise
 
 [dependencies declared, never perturbed]
 2 3 | CS | -                 | dependency.missing | Output y=x
@@ -112,6 +125,11 @@ _TABLE = """
 2 3 | ME | feeds_at_times    | dependency.missing
 2 3 | CS | feeds_switched    | dependency.missing
 2 3 | ME | rate_of_integral  | dependency.missing
+2 3 | ME | feeds_unswitched  | dependency.missing
+2 3 | ME | -                 | dependency.kind    | Output kinds y=dependent tunable
+2 3 | ME | -                 | dependency.kind    | Output kinds y=dependent discrete
+2 3 | ME | -                 | dependency.superfluous | Output z=v x w
+3   | ME | -                 | dependency.missing | Indicator z1=v
 
 [derivatives]
 2 3 | ME | at_start          | derivative.value | directional
@@ -129,6 +147,9 @@ _TABLE = """
 3   | ME | at_start          | derivative.value | adjoint
 3   | ME | second_seed       | derivative.value | adjoint
 3   | ME | adjoint_state     | derivative.adjoint | both
+2 3 | ME | asked_alone       | derivative.value | directional
+3   | ME | asked_alone       | derivative.value | adjoint
+2 3 | CS | -                 | derivative.value | step flags=maxOutputDerivativeOrder="2"
 
 [model exchange]
 2 3 | ME | -                 | states.order    | attributes der(x)=derivative="v";attributes der(v)=derivative="x"
@@ -148,6 +169,11 @@ _TABLE = """
 2 3 | CS ME | interfaces     | interfaces.differ
 2 3 | ME | small_ignored     | states.order
 2 3 | ME | rates_late        | states.rates
+2 3 | ME | output_cached     | value.stale
+2 3 | ME | rates_by_steps    | states.history
+2 3 | ME | quiet_count       | event.outside
+2 3 | ME | quiet_jump        | event.states-changed
+2 3 | CS ME | count_in_steps | interfaces.differ
 
 [promised, never called]
 2   | CS | interpolation_refused | promise.refused | step flags=canInterpolateInputs="true"
@@ -168,6 +194,7 @@ _TABLE = """
 3   | ME | evaluate_refused      | promise.refused | evaluate
 3   | CS | fraction_refused      | promise.refused | clock=fraction
 3   | CS | fraction_wrong        | clock.interval-value | clock=fraction
+2   | CS | interpolation_sign | promise.ignored | step flags=canInterpolateInputs="true"
 
 [values]
 2 3 | CS | item_zero         | value.item
@@ -185,6 +212,7 @@ _TABLE = """
 2 3 | CS | text_latin        | value.text
 2 3 | CS | text_later        | value.text
 2 3 | CS | truth_minus       | value.boolean
+2 3 | CS | text_shared       | value.batch
 
 [life cycle]
 2 3 | CS | ended_get         | ended.get
@@ -211,6 +239,7 @@ _TABLE = """
 2 3 | CS | start_refused     | start.time
 2 3 | CS | start_negative    | start.time
 2 3 | CS | clock_at_zero     | start.time
+2 3 | CS | step_after_end    | misuse.step-after-end
 
 [own step inside]
 2 3 | CS | own_step          | steps.internal | step=0.015

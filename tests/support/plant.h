@@ -25,12 +25,13 @@ typedef struct {
     int i, m, j, o, b, on, sw, n, cc, steps;
     char label[64];
     double cu;
+    const char *owner;
 } State;
 
 typedef struct {
     State s;
     int phase, exchange, logging, events, held, tick, before;
-    double shown[2], dead, dead_w, param, tuned, last[3];
+    double shown[2], dead, dead_w, param, tuned, last[3], early_k;
     int dead_b;
     char text[64];
     void *environment, *log;
@@ -45,7 +46,8 @@ static double common;
 
 static double force(const Plant *self, const State *s, double x, double v) {
     double k = IS(dead_parameter) ? 4.0 : IS(shared_value) && common != 0.0 ? common : s->k, d = IS(interfaces) && !self->exchange ? 3.0 * s->d : s->d, w = IS(dead_input) ? 0.0 : s->w;
-    double more = IS(rate_of_integral) && s->q > 0.02 ? s->q : 0.0;
+    double more = IS(rate_of_integral) && s->q > 0.02 ? s->q : IS(rates_by_steps) ? 0.01 * s->steps : 0.0;
+    if (IS(derived_early)) k = self->early_k;
     return more + s->u + w * x - k * x - d * v - 0.1 * v * v * v + 0.2 * s->sw + 0.1 * s->j + 0.3 * s->on + 0.05 * s->i
         + 0.02 * s->m - (s->b ? 0.0 : 0.4);
 }
@@ -69,7 +71,7 @@ static bool number(Plant *self, unsigned r, double *out) {
         case C: *out = IS(calculated_default) ? 16.0 : s->k * s->k; return true;
         case E: *out = IS(calculated_late) && s->start > 0.0 ? 2.0 * self->tuned : 2.0 * s->d; return true;
         case X: *out = s->x; return true;
-        case V: *out = IS(state_variable_stale) && self->phase == CONTINUOUS ? 0.0 : s->v; return true;
+        case V: *out = IS(restored_local) && self->phase == STEP ? self->dead_w : IS(state_variable_stale) && self->phase == CONTINUOUS ? 0.0 : s->v; return true;
         case Q: *out = s->q; return true;
         case DX: *out = s->v; return true;
         case DV: *out = IS(rate_named) ? s->v : force(self, s, s->x, s->v); return true;
@@ -78,6 +80,8 @@ static bool number(Plant *self, unsigned r, double *out) {
             *out = s->x + 0.3 * s->u * s->u;
             if (IS(feeds_at_times) && s->u > 0.05) *out += 0.4 * s->w;
             if (IS(feeds_switched) && s->on) *out += 0.4 * s->w;
+            if (IS(feeds_unswitched) && !s->on) *out += 0.4 * s->w;
+            if (IS(output_cached) && self->phase == CONTINUOUS) *out = self->shown[1];
             if (IS(output_stale) && self->phase == INITIALISATION) {
                 if (!self->held) self->shown[0] = *out;
                 self->held = 1;
@@ -107,7 +111,7 @@ static double *place(Plant *self, unsigned r) {
     switch (r) {
         case U: return &s->u;
         case W: return &s->w;
-        case D: return &s->d;
+        case D: return IS(tunable_refused) && !early ? NULL : &s->d;
         case K: return early || IS(fixed_accepted) ? &s->k : NULL;
         case X: return early ? &s->x : NULL;
         case V: return early ? &s->v : NULL;
@@ -125,6 +129,9 @@ static bool put(Plant *self, unsigned r, double value) {
     if (IS(drop_start) && r == X) return true;
     if (IS(drop_input) && r == W) return true;
     if (IS(tunable_ignored) && r == D && self->phase == STEP) return true;
+    if (IS(tunable_late) && r == D && self->s.steps > 30) return true;
+    if (IS(early_only) && r == K && self->phase == INITIALISATION) return true;
+    if (r == K && self->phase == INSTANTIATED) self->early_k = value;
     if (IS(rounded) && r == K) value = floor(value);
     if (IS(single) && r == K) value = (float)value;
     if (IS(saturated) && r == U) value = fmax(-1.0, fmin(1.0, value));
@@ -143,7 +150,7 @@ static bool put_whole(Plant *self, unsigned r, int value) {
     if (r == J && !(IS(drop_whole_input) && self->phase == STEP)) s->j = value;
     else if (r == J) return true;
     else if (!early && !IS(fixed_whole_accepted)) return false;
-    else if (r == I) s->i = IS(drop_whole) ? s->i : IS(clipped) && value > 2 ? 2 : value;
+    else if (r == I) s->i = IS(drop_whole) ? s->i : IS(clipped) && value > 2 ? 2 : IS(clipped_far) && value > 5 ? 5 : value;
     else if (r == M) s->m = IS(drop_item) ? s->m : value;
     else return false;
     return true;
@@ -190,8 +197,9 @@ static bool truth(Plant *self, unsigned r, int *out) {
 static void discrete(Plant *self) {
     State *s = &self->s;
     if (s->x <= WALL + 1e-9 && s->v < 0.0) { s->x = WALL; s->v *= -0.7; }
-    if (!s->sw && s->x < -0.1) { s->sw = 1; s->o++; }
-    if (s->sw && s->x > 0.35) { s->sw = 0; s->o++; }
+    int count = !(IS(count_in_steps) && self->exchange);
+    if (!s->sw && s->x < -0.1) { s->sw = 1; s->o += count; }
+    if (s->sw && s->x > 0.35) { s->sw = 0; s->o += count; }
 }
 
 static void show(Plant *self) {
@@ -200,6 +208,7 @@ static void show(Plant *self) {
     self->shown[0] = s->v * s->x;
     self->shown[1] = s->x + 0.3 * s->u * s->u;
     self->dead_b = s->sw;
+    self->dead_w = s->v;
 }
 
 static void integrate(Plant *self, double duration) {
@@ -243,6 +252,8 @@ static void begin(Plant *self) {
     self->phase = INSTANTIATED;
     self->held = 0;
     self->tuned = self->s.d;
+    self->early_k = self->s.k;
+    self->s.owner = self->text;
 }
 
 static void reset(Plant *self) {
@@ -250,6 +261,7 @@ static void reset(Plant *self) {
     if (IS(reset_once) && self->before++) { self->phase = INSTANTIATED; self->s.time = 0.0; return; }
     begin(self);
     State *s = &self->s;
+    if (IS(reset_leaks)) { volatile char *lost = malloc(2 << 20); for (int a = 0; a < 2 << 20; a += 512) lost[a] = 1; }
     if (IS(keep_parameter)) s->k = old.k;
     if (IS(keep_tunable)) s->d = old.d;
     if (IS(keep_text)) memcpy(s->label, old.label, sizeof s->label);
@@ -300,7 +312,7 @@ static void restore(Plant *self, const State *saved) {
     if (IS(lose_time)) s->time = now.time;
     if (IS(lose_ticks)) s->cc = now.cc;
     if (IS(lose_array)) memcpy(s->p, now.p, sizeof s->p);
-    if (!IS(restored_output) && !IS(restored_other) && !IS(restored_switch)) show(self);
+    if (!IS(restored_local) && !IS(restored_output) && !IS(restored_other) && !IS(restored_switch)) show(self);
 }
 
 static void lose_in_bytes(State *s) {
@@ -308,6 +320,7 @@ static void lose_in_bytes(State *s) {
     if (IS(bytes_text)) strcpy(s->label, "plant");
     if (IS(bytes_whole)) s->j = 0;
     if (IS(bytes_parameter)) s->k = 4.0;
+    if (IS(bytes_pointer) && s->owner[0] == 'p') s->k = 4.0;
 }
 
 static double partial(Plant *self, unsigned a, unsigned b) {
@@ -325,6 +338,8 @@ static double partial(Plant *self, unsigned a, unsigned b) {
 }
 
 static bool sensitivity(Plant *self, const unsigned unknowns[], size_t nu, const unsigned knowns[], size_t nk, const double seed[], double out[], bool adjoint) {
+    static const unsigned first[] = {X};
+    if (IS(asked_alone) && (adjoint ? nk : nu) == 1) { if (adjoint) knowns = first; else unknowns = first; }
     for (size_t a = 0; a < (adjoint ? nk : nu); a++) {
         out[a] = 0.0;
         for (size_t b = 0; b < (adjoint ? nu : nk); b++) {
@@ -348,6 +363,7 @@ static void set_states(Plant *self, const double in[]) {
     if (!IS(state_not_set)) self->s.q = in[2];
 }
 static void rates(Plant *self, double out[]) {
+    if (IS(output_cached)) show(self);
     if (IS(rates_late)) {
         double now[3] = {self->s.v, force(self, &self->s, self->s.x, self->s.v), self->s.u};
         memcpy(out, self->last, sizeof now); memcpy(self->last, now, sizeof now);
@@ -365,6 +381,12 @@ static void indicators(const Plant *self, double out[]) {
     out[0] = s->x <= WALL + 1e-12 && s->v >= 0.0 ? 1e-12 : s->x - WALL;
     out[1] = s->x + 0.1;
     out[2] = s->x - 0.35;
+}
+static void complete(Plant *self) {
+    State *s = &self->s;
+    s->steps++;
+    if (IS(quiet_count) && s->steps % 7 == 0) s->o++;
+    if (IS(quiet_jump) && s->steps % 7 == 0) s->q += 0.01;
 }
 /* Whether states have changed, as the FMU says. */
 static bool event(Plant *self) {

@@ -177,7 +177,10 @@ def _structure(version: str, number: Mapping[str, str], changes: Changes) -> str
         tag = {"Output": "Outputs", "Derivative": "Derivatives", "Initial": "InitialUnknowns"}[section]
         parts.append(f"<{tag}>{''.join(found)}</{tag}>" if version == "2.0" else "\n".join(found))
     if version == "3.0":
-        parts += [f'<EventIndicator valueReference="{number[z]}"/>' for z in ("z0", "z1", "z2")]
+        for z in ("z0", "z1", "z2"):
+            knowns = changes.get(f"Indicator {z}")
+            listed = "" if knowns is None else f'dependencies="{" ".join(number[k] for k in knowns.split())}"'
+            parts.append(f'<EventIndicator valueReference="{number[z]}" {listed}/>')
     return "\n".join(parts)
 
 

@@ -66,6 +66,7 @@ fmi2Status fmi2Terminate(fmi2Component c) { ((Plant *)c)->phase = TERMINATED; re
 fmi2Status fmi2Reset(fmi2Component c) {
     Plant *self = c;
     if (IS(reset_ended) && self->phase == TERMINATED) REFUSE("it has ended");
+    if (IS(reset_initialising) && self->phase == INITIALISATION) REFUSE("it is being initialised");
     reset(self);
     return fmi2OK;
 }
@@ -84,12 +85,18 @@ fmi2Status fmi2Reset(fmi2Component c) {
         return fmi2OK; \
     }
 static bool text(Plant *self, unsigned r, const char **out) {
+    if (IS(text_shared)) {
+        snprintf(self->text, sizeof self->text, r == T ? "<%.60s>" : "%.60s", self->s.label);
+        *out = self->text;
+        return true;
+    }
     *out = IS(text_latin) && r == T ? "pl\xe4ne" : r == T && IS(text_later) && self->s.steps > 30 ? "a\xff" : self->s.label;
     return r == L || r == T;
 }
 static bool put_text(Plant *self, unsigned r, const char *value) {
     if (r != L || self->phase >= EVENT) return false;
     if (!IS(drop_text)) snprintf(self->s.label, IS(short_text) ? 6 : sizeof self->s.label, "%s", value);
+    for (char *a = self->s.label; IS(text_plain) && *a; a++) if (*a & 0x80) *a = '?';
     return true;
 }
 GET(Real, fmi2Real, number, real)
@@ -102,6 +109,7 @@ SET(Boolean, fmi2Boolean, put_truth)
 SET(String, fmi2String, put_text)
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    if (*state && IS(state_in_place)) return fmi2Error;
     if (!*state) *state = malloc(sizeof(State));
     memcpy(*state, &((Plant *)c)->s, sizeof(State));
     return fmi2OK;
@@ -113,8 +121,8 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     return fmi2OK;
 }
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) { free(*state); *state = NULL; return fmi2OK; }
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) { *size = sizeof(State); return fmi2OK; }
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte out[], size_t size) { memcpy(out, state, size); return fmi2OK; }
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) { *size = sizeof(State) - (IS(bytes_overrun) ? 64 : 0); return fmi2OK; }
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte out[], size_t size) { memcpy(out, state, IS(bytes_overrun) ? sizeof(State) : size); return fmi2OK; }
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte in[], size_t size, fmi2FMUstate *state) {
     *state = malloc(sizeof(State));
     memcpy(*state, in, sizeof(State));
@@ -129,7 +137,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
     Plant *self = c;
     if (IS(interpolation_refused)) REFUSE("not supported");
     if (IS(interpolation_second) && n && r[0] == W) REFUSE("only the first input");
-    for (size_t a = 0; a < n; a++) if (r[a] == U && !IS(interpolation_ignored)) self->s.slope = in[a];
+    for (size_t a = 0; a < n; a++) if (r[a] == U && !IS(interpolation_ignored)) self->s.slope = IS(interpolation_sign) ? -in[a] : in[a];
     return fmi2OK;
 }
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer order[], fmi2Real out[]) {
@@ -144,6 +152,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 }
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean keep) {
     Plant *self = c;
+    if (IS(step_after_end) && self->phase == TERMINATED) return fmi2OK;
     if (self->phase != STEP || !(h > 0.0)) REFUSE("not now");
     if ((IS(clock_at_zero) || IS(start_ignored_steps)) && self->s.steps == 0 && fabs(t) > 1e-9) REFUSE("the first step must be at 0");
     if ((self->logging || IS(chatty)) && self->s.steps % 10 == 0) say(self, fmi2OK, "logAll", "a step");
@@ -168,7 +177,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { ((Plant *)c)->phase = CONTINUOUS; return fmi2OK; }
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean keep, fmi2Boolean *enter, fmi2Boolean *end) {
     *enter = *end = 0;
-    ((Plant *)c)->s.steps++;
+    complete(c);
     return fmi2OK;
 }
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t) { ((Plant *)c)->s.time = t; return fmi2OK; }

@@ -89,6 +89,7 @@ API fmi3Status fmi3Terminate(fmi3Instance i) { ((Plant *)i)->phase = TERMINATED;
 API fmi3Status fmi3Reset(fmi3Instance i) {
     Plant *self = i;
     if (IS(reset_ended) && self->phase == TERMINATED) REFUSE("it has ended");
+    if (IS(reset_initialising) && self->phase == INITIALISATION) REFUSE("it is being initialised");
     reset(self);
     return fmi3OK;
 }
@@ -140,12 +141,18 @@ API fmi3Status fmi3SetFloat64(fmi3Instance i, const Reference r[], size_t n, con
         return fmi3OK; \
     }
 static bool text(Plant *self, unsigned r, const char **out) {
+    if (IS(text_shared)) {
+        snprintf(self->text, sizeof self->text, r == T ? "<%.60s>" : "%.60s", self->s.label);
+        *out = self->text;
+        return true;
+    }
     *out = IS(text_latin) && r == T ? "pl\xe4ne" : r == T && IS(text_later) && self->s.steps > 30 ? "a\xff" : self->s.label;
     return r == L || r == T;
 }
 static bool put_text(Plant *self, unsigned r, const char *value) {
     if (r != L || self->phase >= EVENT) return false;
     if (!IS(drop_text)) snprintf(self->s.label, IS(short_text) ? 6 : sizeof self->s.label, "%s", value);
+    for (char *a = self->s.label; IS(text_plain) && *a; a++) if (*a & 0x80) *a = '?';
     return true;
 }
 static bool size_of(Plant *self, unsigned r, uint64_t *out) { *out = self->s.n; return r == N; }
@@ -231,6 +238,7 @@ API fmi3Status fmi3UpdateDiscreteStates(fmi3Instance i, fmi3Boolean *again, fmi3
 }
 
 API fmi3Status fmi3GetFMUState(fmi3Instance i, fmi3FMUState *state) {
+    if (*state && IS(state_in_place)) return fmi3Error;
     if (!*state) *state = malloc(sizeof(State));
     memcpy(*state, &((Plant *)i)->s, sizeof(State));
     return fmi3OK;
@@ -242,8 +250,8 @@ API fmi3Status fmi3SetFMUState(fmi3Instance i, fmi3FMUState state) {
     return fmi3OK;
 }
 API fmi3Status fmi3FreeFMUState(fmi3Instance i, fmi3FMUState *state) { free(*state); *state = NULL; return fmi3OK; }
-API fmi3Status fmi3SerializedFMUStateSize(fmi3Instance i, fmi3FMUState state, size_t *size) { *size = sizeof(State); return fmi3OK; }
-API fmi3Status fmi3SerializeFMUState(fmi3Instance i, fmi3FMUState state, fmi3Byte out[], size_t size) { memcpy(out, state, size); return fmi3OK; }
+API fmi3Status fmi3SerializedFMUStateSize(fmi3Instance i, fmi3FMUState state, size_t *size) { *size = sizeof(State) - (IS(bytes_overrun) ? 64 : 0); return fmi3OK; }
+API fmi3Status fmi3SerializeFMUState(fmi3Instance i, fmi3FMUState state, fmi3Byte out[], size_t size) { memcpy(out, state, IS(bytes_overrun) ? sizeof(State) : size); return fmi3OK; }
 API fmi3Status fmi3DeserializeFMUState(fmi3Instance i, const fmi3Byte in[], size_t size, fmi3FMUState *state) {
     *state = malloc(sizeof(State));
     memcpy(*state, in, sizeof(State));
@@ -298,6 +306,7 @@ API fmi3Status fmi3GetOutputDerivatives(fmi3Instance i, const Reference r[], siz
 
 API fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 t, fmi3Float64 h, fmi3Boolean keep, fmi3Boolean *event, fmi3Boolean *end, fmi3Boolean *early, fmi3Float64 *last) {
     Plant *self = i;
+    if (IS(step_after_end) && self->phase == TERMINATED) return fmi3OK;
     if (self->phase != STEP || !(h > 0.0)) REFUSE("not now");
     if (IS(clock_at_zero) && self->s.steps == 0 && fabs(t) > 1e-9) REFUSE("the first step must be at 0");
     if ((self->logging || IS(chatty)) && self->s.steps % 10 == 0) say(self, fmi3OK, "logAll", "a step");
@@ -309,8 +318,8 @@ API fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 t, fmi3Float64 h, fmi3Bool
 }
 API fmi3Status fmi3ActivateModelPartition(fmi3Instance self, Reference clock, fmi3Float64 t) { REFUSE("not supported"); }
 API fmi3Status fmi3CompletedIntegratorStep(fmi3Instance i, fmi3Boolean keep, fmi3Boolean *enter, fmi3Boolean *end) {
-    *enter = *end = false;
-    ((Plant *)i)->s.steps++;
+    *enter = *end = 0;
+    complete(i);
     return fmi3OK;
 }
 API fmi3Status fmi3SetTime(fmi3Instance i, fmi3Float64 t) { ((Plant *)i)->s.time = t; return fmi3OK; }

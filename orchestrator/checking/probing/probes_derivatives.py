@@ -182,12 +182,12 @@ def _judge_mixed(
 def _judge_order(
     context: Context,
     kind: str,
-    found: Mapping[ProbedVariable, tuple[Any, ...]],
+    answer: Mapping[ProbedVariable, tuple[Any, ...]],
     wanted: Mapping[ProbedVariable, tuple[Any, ...]],
 ) -> None:
     """What comes is that of the variables that are asked for, in whatever order and number."""
     size = max((abs(x) for row in wanted.values() for x in row if math.isfinite(x)), default=0.0)
-    for v, row in found.items():
+    for v, row in answer.items():
         for a, b in zip(row, wanted[v], strict=True):
             if math.isfinite(b) and not abs(a - b) <= _LINEAR * size:
                 text = f"{kind} derivatives must be those of the variables that are asked for, but that of `{v.name}`"

@@ -121,6 +121,8 @@ def _pairs(
 def judge_batches(context: Context) -> None:
     """Values that are read in one call are those that are read one by one, in any order."""
     bench, job = context.bench, context.bench.job
+    if context.trace is None:
+        return
     variables = [v for v in readable(job) if v.base != "Binary"]
     with bench.instance() as driver:
         bench.run(driver, 0, min(_FEW_STEPS, job.steps), read=False)

@@ -138,7 +138,7 @@ def state(context: Context) -> None:
     if not job.saves:
         raise SkippedError("states cannot be saved, as the flags say")
     half = max(job.steps // 2, 1) if job.steps > 1 else 0
-    data, memory = b"", {}
+    data, memory = b"", dict[str, Any]()
     with bench.instance() as driver:
         try:
             first = _Restoring(context, driver, 0)
@@ -229,7 +229,7 @@ class _Restoring:
             with bench.instance(name="restored", moved=False) as other:
                 self._deserialise(other, data, memory)
         except StatusError as error:
-            self.context.report("state.serialise", f"a serialised state must be usable in another process, but {error}")
+            self.context.report(error.rule or "state.status", str(error), when="in another process")
         except ChildError as error:
             self.context.report("state.serialise", f"a serialised state must be usable in another process, but {error}")
             bench.library.renew()
