@@ -93,7 +93,7 @@ def _of_values(
         if off <= stated.uncertainty + settings.beyond * entry["standard_error"]:
             continue
         level = Level.RED if off > settings.far_beyond * stated.uncertainty else Level.AMBER
-        text = f"{name} is fitted as {entry['value']:.4g}, but stated as {stated.value:.4g} to within"
+        text = f"`{name}` is fitted as {entry['value']:.4g}, but stated as {stated.value:.4g} to within"
         yield Reason(level, f"{text} {stated.uncertainty:.2g}")
 
 

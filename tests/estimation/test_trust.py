@@ -71,7 +71,7 @@ def test_what_keeps_a_fit_from_green(estimate: Estimate, level: Level) -> None:
 
 def test_a_value_outside_its_stated_range_is_named_with_both() -> None:
     (reason,) = trust_of_estimates([fitted("J_l", 1.078)], default_model())["maximum_likelihood"].reasons
-    assert reason == "J_l is fitted as 6.037, but stated as 5.6 to within 0.28"
+    assert reason == "`J_l` is fitted as 6.037, but stated as 5.6 to within 0.28"
 
 
 def test_methods_without_a_check_of_their_own_are_held_against_the_fit() -> None:

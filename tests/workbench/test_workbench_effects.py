@@ -22,8 +22,12 @@ def write_diagnosis(folder: Path, name: str, misfit: float, has: set[str]) -> No
     result = folder / "results" / name
     result.mkdir(parents=True)
     signal = {"nominal": 0.02, "parameters": 0.018, "final": misfit, "noise": 0.0004, "unit": "rad"}
+    play = {
+        "name": "backlash", "site": "shaft", "grade": "certain", "family": [RIPPLE, "constant_torque@load"],
+        "parameters": {"alpha": {"value": 0.013698, "interval": [0.0136921, 0.0137041], "unit": "rad"}},
+    }  # fmt: skip
     found = {
-        "verdict": "effects", "effects": [], "trust": {"level": "amber", "reasons": []}, "angle_unit": "rad",
+        "verdict": "effects", "effects": [play], "trust": {"level": "amber", "reasons": []}, "angle_unit": "rad",
         "test": [{"source": "axis.csv", "rows": 100, "misfit": {"theta_m": signal}, "worse": False}],
         "library": {label: {"words": words, "in_model": label in has} for label, words in WORDS.items()},
         "candidates": [{"on_top_of": [], "taken": "", "tried": [{"effect": RIPPLE, "gain": 0.012, "t": 1.0}]}],
@@ -94,6 +98,8 @@ def test_effects_are_ticked_on_and_off(served: Served) -> None:
         gain = " (1.2 % of what is left)"
         assert boxes(page) == {WORDS[PLAY]: True, WORDS[FRICTION]: True, WORDS[RIPPLE] + gain: False}
         assert "before" not in said(page)
+        row = "backlash in the shaft certain alpha 0.013698 rad (0.0136921 to 0.0137041) "
+        assert row + "torque ripple at the motor, constant torque at load" in said(page)
         tick(page, WORDS[RIPPLE])
         tick(page, WORDS[FRICTION])
         press(page, "Fit the model again with what is ticked")

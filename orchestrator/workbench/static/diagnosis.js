@@ -1,5 +1,5 @@
 /* global Units */
-import { check, digits, fill, make, plain } from "./dom.js";
+import { check, digits, fill, make, plain, withInterval } from "./dom.js";
 import { inputs, needLog, reading, trustTag } from "./gap.js";
 import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, jobOf, start } from "./state.js";
@@ -31,15 +31,17 @@ export function build(panel, go) {
   }
 
   function effects(found) {
+    const words = (label) => found.library?.[label]?.words ?? label.replaceAll("_", " ").replace("@", " at ");
     const size = ([key, one]) => {
       const { factor, name } = Units.shown(one.unit, found.angle_unit);
-      return `${key.replaceAll("_", " ")} ${digits(factor * one.value)} ${name && name !== "1" ? name : ""}` + (one.interval ? ` (${digits(factor * one.interval[0])} to ${digits(factor * one.interval[1])})` : "");
+      const [value, between] = withInterval(one.value, one.interval, factor);
+      return `${key.replaceAll("_", " ")} ${value} ${name && name !== "1" ? name : ""}${between ? ` (${between})` : ""}`;
     };
     return make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Effects" }, make("table", { class: "stack" },
-      make("thead", {}, make("tr", {}, ["effect", "at", "grade", "size, 95 %", "not told apart from"].map((text) => make("th", { scope: "col" }, text)))),
+      make("thead", {}, make("tr", {}, ["effect", "grade", "size, 95 %", "not told apart from"].map((text) => make("th", { scope: "col" }, text)))),
       make("tbody", {}, found.effects.map((one) => make("tr", {},
-        make("td", {}, one.name.replaceAll("_", " ")), make("td", { "data-label": "at" }, one.site ?? ""), make("td", { "data-label": "grade" }, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
-        make("td", { "data-label": "size, 95 %" }, Object.entries(one.parameters).map(size).join("; ")), make("td", { "data-label": "not told apart from" }, (one.family ?? []).map((name) => name.replaceAll("_", " ")).join(", ") || "none"))))));
+        make("td", {}, words(`${one.name}@${one.site ?? ""}`)), make("td", { "data-label": "grade" }, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
+        make("td", { "data-label": "size, 95 %" }, Object.entries(one.parameters).map(size).join("; ")), make("td", { "data-label": "not told apart from" }, (one.family ?? []).map(words).join(", ") || "none"))))));
   }
 
   // Rms of free runs on test data, beside that of the model before effects were ticked.

@@ -1,6 +1,6 @@
 /* global Units */
 import { post } from "./api.js";
-import { check, digits, field, make, numberIn, numberInput, plain } from "./dom.js";
+import { check, digits, field, make, numberIn, numberInput, plain, withInterval } from "./dom.js";
 import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, chooseLog, start } from "./state.js";
 
@@ -41,9 +41,10 @@ export function build(panel) {
       }
       if (!found.record && found.design) return;
       const alpha = found.alpha ?? null, { factor, name } = Units.shown("rad", found.record?.angle_unit);
+      const [size, between] = withInterval(alpha, found.interval, factor);
       const lines = alpha === null
-        ? [found.not_applicable ?? found.message ?? "no half-gap"]
-        : [`Half-gap ${digits(factor * alpha)} ${name}` + (found.interval ? `, 95 %: ${digits(factor * found.interval[0])} to ${digits(factor * found.interval[1])} ${name}` : "")];
+        ? [plain(found.not_applicable ?? found.message ?? "no half-gap")]
+        : [`Half-gap ${size} ${name}` + (between ? `, 95 %: ${between} ${name}` : "")];
       place.append(make("p", { class: "answer" }, lines.join(" "), " ", trustTag(found.trust)));
       for (const reason of found.trust?.reasons ?? []) place.append(make("p", { class: "note" }, plain(reason)));
     });
