@@ -72,7 +72,7 @@ def test_the_compensator_lands_softest_and_near_the_bound(tmp_path, capsys):
     assert ours["error"] < 0.4 * plain["error"]
     # A load that coasts leaves its flank before the crossing begins, so only the quickest say how quick a crossing is.
     assert min(ours["times"]) < 1.25 * found["bound"]
-    assert np.median(ours["times"]) < 1.5 * found["bound"]
+    assert np.quantile(ours["times"], 0.25) < 1.35 * found["bound"]
     rows = (tmp_path / "out" / "traversals.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + sum(len(law["times"]) for law in found["laws"])
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
