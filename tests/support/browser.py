@@ -59,7 +59,11 @@ def set_screen(driver: Any, width: int, height: int, scheme: str) -> None:
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
     features = [{"name": "prefers-color-scheme", "value": scheme}]
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
-    # What a page draws for its size, it draws with the next frame; the one after it shows the result.
+    draw(driver)
+
+
+def draw(driver: Any) -> None:
+    """Wait until the page shows what it has drawn for its size: it draws with the next frame."""
     driver.execute_async_script("const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(done))")
 
 

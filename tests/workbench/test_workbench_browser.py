@@ -9,7 +9,7 @@ import pytest
 from orchestrator.building.build import ensure_built
 from orchestrator.scenarios.scenario import load_scenario
 from orchestrator.scenarios.ssp.write import write_ssp
-from tests.support.browser import browser, missing, set_screen
+from tests.support.browser import browser, draw, missing, set_screen
 from tests.support.workbench import HANGS, Served, drive_log, workbench
 
 pytest.importorskip("starlette")
@@ -44,6 +44,10 @@ def wait(driver: Any, condition: Any) -> Any:
     return WebDriverWait(driver, HANGS, 0.1, ignored_exceptions=moved).until(condition)
 
 
+def wait_for_text(driver: Any, place: str, text: str) -> None:
+    wait(driver, lambda d: text in d.find_element("id", place).text)
+
+
 def open_workbench(driver: Any, served: Served, width: int = 1280, scheme: str = "light") -> None:
     set_screen(driver, width, 900, scheme)
     driver.get("about:blank")
@@ -57,17 +61,26 @@ def find(driver: Any, css: str) -> Any:
 
 def press(driver: Any, text: str) -> None:
     """Bring the focus to a button as Tab does, and press Enter."""
-    found = wait(driver, lambda d: next(
-        (b for b in d.find_elements("xpath", f"//button[normalize-space()='{text}']") if b.is_displayed()), None
-    ))  # fmt: skip
-    driver.execute_script("arguments[0].focus()", found)
-    found.send_keys("\n")
+
+    def is_pressed(driver: Any) -> bool:
+        buttons = driver.find_elements("xpath", f"//button[normalize-space()='{text}']")
+        found = next((button for button in buttons if button.is_displayed()), None)
+        if found is not None:
+            driver.execute_script("arguments[0].focus()", found)
+            found.send_keys("\n")
+        return found is not None
+
+    wait(driver, is_pressed)
 
 
 def pick(driver: Any, css: str, text: str) -> None:
     from selenium.webdriver.support.select import Select
 
-    Select(find(driver, css)).select_by_visible_text(text)
+    def is_picked(driver: Any) -> bool:
+        Select(find(driver, css)).select_by_visible_text(text)
+        return True
+
+    wait(driver, is_picked)
 
 
 def choose_tab(driver: Any, name: str) -> None:
@@ -89,13 +102,14 @@ def inspected(page: Any, served: Served, log: Path) -> Any:
     open_workbench(page, served)
     find(page, "#panel-log input[type=file]").send_keys(str(log))
     find(page, "#panel-log .card")
-    assert "Not used: Achse B [deg]" in page.find_element("id", "panel-log").text
-    assert "torque constant" in page.find_element("css selector", "#panel-log [role=alert].message:not(:empty)").text
+    wait_for_text(page, "panel-log", "Not used: Achse B [deg]")
+    alert = "#panel-log [role=alert].message:not(:empty)"
+    wait(page, lambda d: "torque constant" in d.find_element("css selector", alert).text)
     pick(page, "select[aria-label='Use Achse B [deg] as']", "Load angle")
-    wait(page, lambda d: "Load angle: nothing → Achse B [deg]" in d.find_element("id", "panel-log").text)
+    wait_for_text(page, "panel-log", "Load angle: nothing → Achse B [deg]")
     find(page, "[data-key=torque_constant-u]").send_keys("0.5\t")  # Tab goes on to the next control, which is made anew
-    wait(page, lambda d: "can be read" in d.find_element("id", "panel-log").text)
-    assert page.switch_to.active_element.text == "More"
+    wait_for_text(page, "panel-log", "can be read")
+    wait(page, lambda d: d.switch_to.active_element.text == "More")
     press(page, "Look at this log")
     find(page, "#panel-log iframe")
     return page
@@ -124,10 +138,10 @@ def test_a_value_of_the_machine_becomes_the_users(inspected: Any, served: Served
     value = find(inspected, "input[aria-label='J_m, value in kg.m2']")
     value.clear()
     value.send_keys("0.003\t")
-    wait(inspected, lambda d: "Changed and not saved: J_m" in d.find_element("id", "panel-machine").text)
+    wait_for_text(inspected, "panel-machine", "Changed and not saved: J_m")
     press(inspected, "Save as a new model file")
     wait(inspected, lambda d: (served.folder / "files" / "model-yours.toml").exists())
-    wait(inspected, lambda d: "yours" in d.find_element("id", "panel-machine").text)
+    wait_for_text(inspected, "panel-machine", "yours")
     assert "value = 0.003   # kg.m2: yours" in (served.folder / "files" / "model-yours.toml").read_text()
 
 
@@ -137,7 +151,7 @@ def test_no_action_runs_on_a_number_that_is_none(inspected: Any, served: Served)
     value.clear()
     value.send_keys("4OO\t")
     press(inspected, "Save as a new model file")
-    wait(inspected, lambda d: "but is “4OO”" in d.find_element("id", "panel-machine").text)
+    wait_for_text(inspected, "panel-machine", "but is “4OO”")
     assert not (served.folder / "files" / "model-yours-2.toml").exists()
     value.clear()
     value.send_keys(f"{before}\t")
@@ -147,17 +161,17 @@ def test_results_of_a_tab_stand_there_after_a_reload(inspected: Any) -> None:
     inspected.refresh()
     choose_tab(inspected, "log")
     find(inspected, "#panel-log iframe")
-    assert find(inspected, "[data-key=use-3]").get_attribute("value") == "theta_l"
+    wait(inspected, lambda d: find(d, "[data-key=use-3]").get_attribute("value") == "theta_l")
     choose_tab(inspected, "machine")
-    wait(inspected, lambda d: "model-yours.toml" in d.find_element("id", "panel-machine").text)
+    wait_for_text(inspected, "panel-machine", "model-yours.toml")
 
 
 def test_a_diagnosis_is_stopped_from_the_page(inspected: Any, served: Served) -> None:
     choose_tab(inspected, "diagnosis")
     press(inspected, "Diagnose")
-    wait(inspected, lambda d: "fitted" in d.find_element("id", "running").text)
+    wait_for_text(inspected, "running", "fitted")
     press(inspected, "Stop")
-    wait(inspected, lambda d: "stopped" in d.find_element("id", "panel-diagnosis").text)
+    wait_for_text(inspected, "panel-diagnosis", "stopped")
     job = served.job("diagnose-1")
     assert (job["state"], job["exit_code"]) == ("stopped", 130)
 
@@ -181,9 +195,9 @@ def test_outputs_are_dragged_to_inputs_of_the_same_quantity(inspected: Any, serv
         ActionChains(inspected).click_and_hold(ends[0]).move_to_element(ends[1]).release().perform()
 
     drag("drivetrain.theta_m", "kalmanestimator.theta_m")
-    wait(inspected, lambda d: "drivetrain.theta_m → kalmanestimator.theta_m" in d.find_element("id", "panel-fmus").text)
+    wait_for_text(inspected, "panel-fmus", "drivetrain.theta_m → kalmanestimator.theta_m")
     drag("drivetrain.omega_m", "kalmanestimator.u")
-    wait(inspected, lambda d: "do not measure the same" in d.find_element("id", "panel-fmus").text)
+    wait_for_text(inspected, "panel-fmus", "do not measure the same")
     press(inspected, "Write it as TOML")
     written = served.folder / "files" / "scenario.toml"
     wait(inspected, lambda d: written.exists() and "scenario.toml" in d.find_element("id", "panel-fmus").text)
@@ -205,9 +219,9 @@ def test_a_log_chosen_in_another_tab_is_looked_at(inspected: Any, served: Served
     find(inspected, f"#panel-gap option[value='{other}']")
     pick(inspected, "#panel-gap select", "other.csv")
     choose_tab(inspected, "log")
-    wait(inspected, lambda d: "Not used: Achse A [deg], Achse B [deg]" in d.find_element("id", "panel-log").text)
-    assert "Still needed. Motor angle: the channel that holds it" in inspected.find_element("id", "panel-log").text
-    assert inspected.find_elements("css selector", "#panel-log iframe") == []
+    wait_for_text(inspected, "panel-log", "Not used: Achse A [deg], Achse B [deg]")
+    wait_for_text(inspected, "panel-log", "Still needed. Motor angle: the channel that holds it")
+    wait(inspected, lambda d: d.find_elements("css selector", "#panel-log iframe") == [])
 
 
 def test_arrow_keys_take_nothing_from_other_channels_on_their_way(inspected: Any, served: Served) -> None:
@@ -236,14 +250,14 @@ def test_arrow_keys_take_nothing_from_other_channels_on_their_way(inspected: Any
         script = "return [...document.querySelectorAll('[data-key^=use-]')].map((one) => one.value)"
         return driver.execute_script(script)
 
-    wait(inspected, lambda d: "Every channel is used." in d.find_element("id", "panel-log").text)
-    assert uses(inspected) == ["time", "u", "theta_m", "theta_l"]
+    wait_for_text(inspected, "panel-log", "Every channel is used.")
+    wait(inspected, lambda d: uses(d) == ["time", "u", "theta_m", "theta_l"])
     # What was said of a log's columns stands there again when one comes back to it.
     pick(inspected, "#panel-log select", "drive.csv")
-    wait(inspected, lambda d: "Achse B [deg]: " in d.find_element("id", "panel-log").text)
+    wait_for_text(inspected, "panel-log", "Achse B [deg]: ")
     pick(inspected, "#panel-log select", "third.csv")
-    wait(inspected, lambda d: "Wert 1: " in d.find_element("id", "panel-log").text)
-    assert uses(inspected) == ["time", "u", "theta_m", "theta_l"]
+    wait_for_text(inspected, "panel-log", "Wert 1: ")
+    wait(inspected, lambda d: uses(d) == ["time", "u", "theta_m", "theta_l"])
 
 
 def test_what_a_line_advises_is_done_by_a_click(inspected: Any, served: Served) -> None:
@@ -254,15 +268,15 @@ def test_what_a_line_advises_is_done_by_a_click(inspected: Any, served: Served) 
     find(inspected, f"#panel-log option[value='{counter}']")
     pick(inspected, "#panel-log select", "counter.csv")
     press(inspected, "Set “the counter starts again at” of “Motor angle” to 65536")
-    wait(inspected, lambda d: "can be read" in d.find_element("id", "panel-log").text)
-    assert find(inspected, "[data-key=modulo-theta_m]").get_attribute("value") == "65536"
+    wait_for_text(inspected, "panel-log", "can be read")
+    wait(inspected, lambda d: find(d, "[data-key=modulo-theta_m]").get_attribute("value") == "65536")
 
 
 def test_a_drawn_curve_and_its_scenario_outlast_a_reload(inspected: Any, served: Served) -> None:
     choose_tab(inspected, "fmus")
     inspected.refresh()
     find(inspected, "[data-port='drivetrain.u']")
-    assert "drivetrain.theta_m → kalmanestimator.theta_m" in inspected.find_element("id", "panel-fmus").text
+    wait_for_text(inspected, "panel-fmus", "drivetrain.theta_m → kalmanestimator.theta_m")
     press(inspected, "Feed an input")
     kind = "//label[normalize-space()='is']/following-sibling::select"
     inspected.find_element("xpath", kind).send_keys("drawn by hand")
@@ -270,7 +284,7 @@ def test_a_drawn_curve_and_its_scenario_outlast_a_reload(inspected: Any, served:
     type_into = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))"
     inspected.execute_script(type_into, lines, "0, 0\n0.5, 1, 2\n1, 0")
     press(inspected, "Write it as TOML")
-    wait(inspected, lambda d: "must hold two numbers a line" in d.find_element("id", "panel-fmus").text)
+    wait_for_text(inspected, "panel-fmus", "must hold two numbers a line")
     assert not (served.folder / "files" / "drawn.csv").exists()
     inspected.execute_script(type_into, lines, "0; 0\n0,5; -1,25\n1 0")
     press(inspected, "Write it as TOML")
@@ -285,8 +299,8 @@ def test_an_ssp_file_is_a_tree(inspected: Any, served: Served) -> None:
     write_ssp(system, load_scenario(served.folder / "files" / "scenario.toml"))
     find(inspected, "#panel-fmus input[type=file]").send_keys(str(system))
     said = "System of 2 FMUs until 1 s: drivetrain (Drivetrain), kalmanestimator (KalmanEstimator)"
-    wait(inspected, lambda d: said in d.find_element("id", "panel-fmus").text)
-    branches = [one.text for one in inspected.find_elements("css selector", "#panel-fmus details summary")]
+    wait_for_text(inspected, "panel-fmus", said)
+    branches = wait(inspected, lambda d: [one.text for one in d.find_elements("css selector", "#panel-fmus summary")])
     assert "Connections (1)" in branches
     assert any(text.startswith("drivetrain (") for text in branches)
 
@@ -310,6 +324,7 @@ def test_nothing_is_wider_than_the_screen(inspected: Any, served: Served, width:
     inspected.execute_script("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
     for tab in inspected.find_elements("css selector", "[role=tab]"):
         inspected.execute_script("arguments[0].click()", tab)
+        draw(inspected)
         assert inspected.execute_script("return document.documentElement.scrollWidth") <= width, tab.text
     set_screen(inspected, 1280, 900, "light")
 
