@@ -4,7 +4,7 @@ import importlib
 import os
 import sys
 
-from orchestrator.shared.stopping import end_on_signals, stop_in_words, stop_on_signals
+from orchestrator.shared.stopping import end_on_signals, stop_in_words, stop_on_signals, take_held_signals
 
 
 def run(module: str = "orchestrator.cli") -> None:
@@ -18,6 +18,7 @@ def run(module: str = "orchestrator.cli") -> None:
             setattr(sys, name, open(number, "w", encoding="utf-8"))  # noqa: SIM115 - until the process ends
     try:
         # Here, for Ctrl-C and a lack of memory or descriptors may come while modules are loaded.
+        take_held_signals()
         code = importlib.import_module(module).main()
     except SystemExit as ended:  # help, the version, or words that are refused
         code = ended.code

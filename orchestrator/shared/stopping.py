@@ -28,6 +28,12 @@ def stop_on_signals() -> None:
             signal.signal(number, _stop)
 
 
+def take_held_signals() -> None:
+    """Take the signals that whoever started this process has had held back until it answers them in words."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+
+
 def end_on_signals() -> None:
     """Let signals end the process at once: all that is to be cleaned up has been."""
     for number in _SIGNALS:

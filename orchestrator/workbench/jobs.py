@@ -244,10 +244,14 @@ async def _spawn(words: Sequence[str], folder: Path, output: int) -> "asyncio.su
 
 @cache
 def _end_with_parent() -> Callable[[], object]:
-    """Return what a child calls first: it hears Ctrl-C, and on Linux is interrupted when the server dies."""
+    """Return what a child calls first: it hears Ctrl-C, and on Linux is interrupted when the server dies.
+
+    Ctrl-C waits until the command can answer it: while the interpreter starts it would end in a traceback.
+    """
     control = ctypes.CDLL(None, use_errno=True).prctl if sys.platform.startswith("linux") else None
 
     def prepare() -> None:
+        signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell's background has it ignored
         if control is not None:
             control(_PARENT_DEATH_SIGNAL, int(signal.SIGINT), 0, 0, 0)

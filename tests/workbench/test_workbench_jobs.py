@@ -2,9 +2,12 @@
 
 import asyncio
 import json
+import os
 import re
 import shutil
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -186,6 +189,19 @@ def test_the_end_of_the_server_stops_its_jobs(tmp_path: Path, log: Path) -> None
         first.process.wait(HANGS)
         wait_until_gone(running)
     assert json.loads((folder / "results" / name / "job.json").read_text())["state"] == "stopped"
+
+
+def test_a_stop_that_comes_first_of_all_is_told_in_a_word() -> None:
+    """While the interpreter starts, Ctrl-C would end in a traceback."""
+    prepare = jobs._end_with_parent()
+
+    def stopped_at_once() -> None:
+        prepare()
+        os.kill(os.getpid(), signal.SIGINT)
+
+    command = [sys.executable, "-m", "orchestrator", "inspect", "none.csv"]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, preexec_fn=stopped_at_once)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
 
 
 def test_looks_at_files_wait_for_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
