@@ -28,8 +28,9 @@ _INEXACT = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log pow erf erfc
 # A compiler rounds the sine of a constant correctly; Python calls the C library, which may be off in the last bit.
 UNFOLDED = tuple(f"-fno-builtin-{name}" for name in _INEXACT.split())
 # No contraction of a product and a sum: it would round once where Python rounds twice.
-# Roots do not set errno, and nobody asks whether a division trapped: neither changes a value.
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-shared", "-w", *UNFOLDED)
+# Roots do not set errno, and nobody asks whether a division trapped: neither changes a value. At -O3 the products of a
+# filter's matrices take a fifth to a third less time than at -O2, with the same bits.
+FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-shared", "-w", *UNFOLDED)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ Trend = Literal["", "constant", "linear"]
 
 def density_frequencies(step: float, length: int) -> Array:
     """Return the frequencies (f,) [Hz] of densities, zero and half the sample rate included."""
-    return np.fft.rfftfreq(length, _period(step))
+    return np.asarray(np.fft.rfftfreq(length, _period(step)))
 
 
 def power_density(values: Array, step: float, length: int, detrend: Trend = "constant") -> tuple[Array, Array]:
