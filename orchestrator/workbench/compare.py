@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,7 +38,7 @@ class ResultNumber:
     def words(self) -> str:
         """Return value and interval in words."""
         between = "" if self.interval is None else f" ({self.interval[0]:.5g} to {self.interval[1]:.5g})"
-        return f"{self.value:.5g} {self.unit}".strip() + between
+        return f"{self.value:.5g} {'' if self.unit == '1' else self.unit}".strip() + between
 
 
 def compare_results(first: Path, second: Path) -> Report:
@@ -149,9 +150,14 @@ def _table(
 
     columns = (TableColumn("quantity"), *(TableColumn(name) for name in names), TableColumn("second over first"))
     return ReportTable(title, columns, tuple(
-        (name.replace("_", " "), cell(left, name), cell(right, name), _ratio(left.get(name), right.get(name)))
+        (_spaced(name), cell(left, name), cell(right, name), _ratio(left.get(name), right.get(name)))
         for name in rows
     ))  # fmt: skip
+
+
+def _spaced(name: str) -> str:
+    """Return a name with spaces between its words; symbols such as J_m are one word."""
+    return re.sub(r"(?<=[a-z]{2})_(?=[a-z]{2})", " ", name)
 
 
 def _ratio(first: ResultNumber | None, second: ResultNumber | None) -> float | None:
@@ -162,7 +168,7 @@ def _texts(names: tuple[str, str], documents: list[dict[str, Any]]) -> ReportTab
     """Return the words that differ: verdicts, grades, arguments."""
     left, right = (dict(_words({k: d.get(k) for k in ("arguments", "results")})) for d in documents)
     rows = [
-        (name.replace("_", " "), left.get(name, "none"), right.get(name, "none"))
+        (_spaced(name), left.get(name, "none"), right.get(name, "none"))
         for name in dict.fromkeys([*left, *right])
         if left.get(name) != right.get(name)
     ]

@@ -39,7 +39,7 @@ def test_what_differs_beyond_the_intervals(tmp_path: Path) -> None:
         "effects backlash parameters alpha"
     ]
     assert found["Differ by more than their intervals"].rows[0][3] == pytest.approx(2.0)
-    assert [row[0] for row in found["Agree within their intervals"].rows] == ["parameters J m"]
+    assert [row[0] for row in found["Agree within their intervals"].rows] == ["parameters J_m"]
     assert report.badge == ("warn", "they differ")
     (plot,) = [section for section in report.sections if isinstance(section, Plot)]
     assert [series.name for series in plot.series] == ["diagnose-1", "diagnose-2"]
@@ -69,6 +69,14 @@ def test_values_within_their_intervals_do_not_differ(tmp_path: Path) -> None:
     assert [row[0] for row in found["Numbers without an interval that differ"].rows] == ["analysis a.csv rate"]
     assert ("verdict", "effects", "none") in found["Words that differ"].rows
     assert report.badge == ("good", "no difference beyond the intervals")
+
+
+def test_symbols_stay_whole_and_plain_numbers_have_no_unit(tmp_path: Path) -> None:
+    first, second = result(tmp_path / "diagnose-1", 0.01, 0.001), result(tmp_path / "diagnose-2", 0.02, 0.001)
+    agree = tables(compare_results(first, second))["Agree within their intervals"]
+    assert [row[0] for row in agree.rows] == ["parameters J_m"]
+    assert ResultNumber(3.984, (3.98, 3.99), "1").words() == "3.984 (3.98 to 3.99)"
+    assert ResultNumber(2.0, None, "rad").words() == "2 rad"
 
 
 def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
