@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.units import SI, TURN, RecordUnit, parse_unit
+from orchestrator.records.words import ANGLE, CURRENT, SPEED, TORQUE, VOLTAGE, words_of
 
 __all__ = ["COLUMNS", "KINDS", "SI", "Array", "Column"]
 
@@ -36,6 +37,15 @@ EXAMPLES = {
     "theta_m": "rad, deg, rev, m, mm, counts (with counts_per_rev), rpm, rad/s",
 }
 EXAMPLES["theta_l"] = EXAMPLES["theta_m"]
+# Kinds of unit that a number of a column is for, and the unit that a message proposes.
+UNITS_OF = {
+    "counts_per_rev": (("counts",), "counts"),
+    "rated_value": (("share",), "%"),
+    "resistance": (("voltage",), "V"),
+    "back_emf_constant": (("voltage",), "V"),
+    "inductance": (("voltage",), "V"),
+    "torque_constant": (("current", "voltage"), "A"),
+}
 
 
 @dataclass(frozen=True)
@@ -81,6 +91,8 @@ def unit_of(name: str, column: Column, written: str, label: str, source: str) ->
     """Return the unit of a column: the model file's, else the one ``written`` in the file; None: SI."""
     text = column.unit or written
     unit = parse_unit(text, KINDS[name])
+    if not text:
+        _check_word(name, column, label, source)
     if unit is None and text:
         raise RecordError(
             f"{source}: column `{label}` must be in a unit that is known ({EXAMPLES[name]}), but is in {text!r}: say "
@@ -92,6 +104,33 @@ def unit_of(name: str, column: Column, written: str, label: str, source: str) ->
             f'another by `[columns.{name}] name = "..."`, or mend it by `unit`, in the model file (`model`)'
         )
     return unit
+
+
+def check_numbers(name: str, column: Column, unit: RecordUnit | None, label: str, source: str) -> None:
+    """Refuse numbers of a unit that the column is not in: nothing would use them."""
+    kind = "" if unit is None else unit.kind
+    for key, (kinds, text) in UNITS_OF.items():
+        if getattr(column, key) is not None and kind not in kinds:
+            shown = "has no unit" if unit is None else f"is in a unit of {kind}"
+            raise RecordError(
+                f"{source}: column `{label}` {shown}, but `[columns.{name}] {key}` is for {text}: say "
+                f'`[columns.{name}] unit = "{text}"` in the model file (`model`), or leave `{key}` out'
+            )
+
+
+def _check_word(name: str, column: Column, label: str, source: str) -> None:
+    """Refuse a column without a unit whose name says that it is not what the column's SI unit measures."""
+    said = set(words_of(label))
+    others = (("a current", CURRENT, "A"), ("a voltage", VOLTAGE, "V")) if name == "u" else (("a speed", SPEED, "rpm"),)
+    if name == "time" or column.factor != 1.0 or said & (TORQUE - {"u"} if name == "u" else ANGLE - {"q"}):
+        return
+    for what, known, text in others:
+        if said & known:
+            si = SI[KINDS[name][0]]
+            raise RecordError(
+                f"{source}: column `{label}` must have a unit, as its name says that it is {what}: say "
+                f'`[columns.{name}] unit = "{text}"`, or "{si}" where it is in {si}, in the model file (`model`)'
+            )
 
 
 def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, source: str) -> float:

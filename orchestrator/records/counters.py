@@ -19,6 +19,7 @@ RANGES = (TURN, 1.0, 360.0, 400.0, 3600.0, 21600.0, 36000.0, *(10.0**n for n in 
 RANGES += tuple(2.0**n for n in range(8, 54))
 LEAST_SIGN_BIT = 64.0  # counts: below it a sign bit is not told from motion
 
+LEAST_ROWS_NEAR = 10  # rows on either side of missing ones that say how fast the angle goes there
 LEAST_JUMP = 0.25  # of the largest value: what a sign bit adds is at least half of it
 
 
@@ -80,14 +81,61 @@ def _sign_bit(good: Array) -> float | None:
     return next(number for number in short if abs(number - bit) < 0.01 * unit)
 
 
-def unwrap(values: Array, column: Column) -> Array:
-    """Return values that go on where the file's start again from zero after ``column.modulo``."""
+def check_whole(values: Array, name: str, label: str, source: str) -> None:
+    """Refuse whole numbers for an angle in rad: no encoder is that coarse, so they are counts or degrees."""
+    good = values[np.isfinite(values)]
+    if good.size and np.ptp(good) > 2.0 and np.all(good == np.rint(good)):
+        raise RecordError(
+            f"{source}: column `{label}` must have a unit, as it holds whole numbers: say `[columns.{name}] unit = "
+            f'"counts"` with `counts_per_rev = ...` (or "deg") in the model file (`model`)'
+        )
+
+
+def unwrap(values: Array, column: Column, time: Array, label: str, source: str) -> Array:
+    """Return values that go on where the file's start again from zero after ``column.modulo``.
+
+    Args:
+        values: in the column's unit.
+        time: (n,) [s]; where rows are missing, the angle must not go on by more than half of ``column.modulo``.
+    """
     if column.modulo is None:
         return values
-    good = np.isfinite(values)
+    rows = np.flatnonzero(np.isfinite(values))
+    good = values[rows]
+    span = float(np.ptp(good)) if good.size else 0.0
+    if span > (1.0 + 1e-6) * column.modulo:
+        raise RecordError(
+            f"{source}: column `{label}` must start again from zero at its `modulo`, {exact_text(column.modulo)}, but "
+            f"goes over {span:.9g}: state the whole range of its numbers, or leave `modulo` out"
+        )
     out = values.copy()
-    out[good] = np.unwrap(values[good], period=column.modulo)
+    out[rows] = np.unwrap(good, period=column.modulo)
+    _check_unwrapped(np.diff(out[rows]), rows, time, column.modulo, f"{source}: column `{label}`")
     return out
+
+
+def _check_unwrapped(steps: Array, rows: NDArray[np.int64], time: Array, modulo: float, where: str) -> None:
+    """Refuse steps (m - 1,) between rows (m,) of which nobody knows how often the angle started again meanwhile."""
+    fast = np.flatnonzero(np.abs(np.diff(steps)) > 0.5 * modulo)  # a step beyond half a range turns its sign round
+    if fast.size:
+        raise RecordError(
+            f"{where} must move by less than half of its `modulo`, {exact_text(modulo)}, from row to row, but does not "
+            f"at row {int(rows[fast[0] + 2]) + 1}: state the right `modulo`, or log faster or with a wider counter"
+        )
+    if time.size <= rows.max(initial=0):
+        return
+    lengths = np.diff(time[rows])
+    usual = float(np.median(lengths)) if lengths.size else 0.0
+    for gap in np.flatnonzero(lengths > 1.5 * usual).tolist():
+        first = max(gap - LEAST_ROWS_NEAR, 0)
+        near = slice(first, gap + 1 + LEAST_ROWS_NEAR)
+        beside = np.abs(np.delete(steps[near], gap - first)) / np.delete(lengths[near], gap - first)
+        if beside.size and float(beside.max()) * lengths[gap] > 0.5 * modulo:
+            raise RecordError(
+                f"{where} must move by less than half of its `modulo`, {exact_text(modulo)}, while rows are missing, "
+                f"but may not do so before row {int(rows[gap + 1]) + 1} ({lengths[gap]:.3g} s): keep the rows before "
+                "or behind them by `part` START:END"
+            )
 
 
 def check_wraps(values: Array, name: str, label: str, source: str, turn: float | None = None) -> None:

@@ -15,10 +15,11 @@ from orchestrator.records.columns import (
     SI,
     Array,
     Column,
+    check_numbers,
     scale_of,
     unit_of,
 )
-from orchestrator.records.counters import check_sign, check_wraps, decode_sign, unwrap, unwrap_time
+from orchestrator.records.counters import check_sign, check_whole, check_wraps, decode_sign, unwrap, unwrap_time
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, find_channels
@@ -326,8 +327,11 @@ def _convert(
     """Return a column in SI, and the words that say its unit."""
     where = str(path)
     unit = unit_of(name, column, written, label, where)
+    check_numbers(name, column, unit, label, where)
     scale = scale_of(name, column, unit, label, where)
-    if column.sign_bit is None:
+    if unit is None and name != "u" and column.factor == 1.0:
+        check_whole(raw, name, label, where)
+    if column.sign_bit is None and column.modulo is None:
         check_sign(raw, name, label, where)
     values = _scale(decode_sign(raw, column, label, where), column.factor, column.offset)
     del raw
@@ -342,11 +346,10 @@ def _convert(
             np.where(np.isfinite(values), values, 0.0) * scale * np.where(np.isfinite(steps), steps, 0.0)
         )
         return summed, f"{spoken}, summed to an angle"
-    if name != "u":
-        if column.modulo is None and np.all(np.diff(time[np.isfinite(time)]) > 0.0):  # else the time is what is wrong
-            turn = column.counts_per_rev if unit is not None and unit.kind == "counts" else None
-            check_wraps(values, name, label, where, turn)
-        values = unwrap(values, column)
+    if name != "u" and np.all(np.diff(time[np.isfinite(time)]) > 0.0):  # else the time is what is wrong
+        values = unwrap(values, column, time, label, where)
+        turn = column.counts_per_rev if unit is not None and unit.kind == "counts" else None
+        check_wraps(values, name, label, where, turn)
     return _scale(values, scale, 0.0), spoken
 
 

@@ -162,9 +162,12 @@ def _check_step(step: float, where: str) -> None:
         )
     if step >= LARGEST_STEP:
         hint = " This looks like milliseconds." if step < 100.0 else ""
+        smaller = (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+        fits = [unit for unit, size in smaller if LEAST_STEP <= step * size < LARGEST_STEP] or ["ms"]
+        others = f" (or {' or '.join(fits[1:])})" if fits[1:] else ""
         raise RecordError(
             f"{where} must be in seconds with steps below {LARGEST_STEP:g} s, but steps by {step:g} s: say "
-            f'`[columns.time] unit = "ms"` (or us, min) in the model file (`model`).{hint}'
+            f'`[columns.time] unit = "{fits[0]}"`{others} in the model file (`model`).{hint}'
         )
 
 

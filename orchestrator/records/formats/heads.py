@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 
 from orchestrator.records.formats.source import Head
-from orchestrator.records.words import CURRENT, TIME, TORQUE, describes, words_of
+from orchestrator.records.words import CURRENT, TIME, TORQUE, VOLTAGE, describes, words_of
 from orchestrator.shared.units import is_unit
 
 _SQUARE = re.compile(r"\s*\[\s*([^\[\]]*?)\s*\]\s*")
@@ -17,7 +17,7 @@ _BORDER = re.compile(r"[_ .]|(?<=[a-zäöüß0-9])(?=[A-Z])")
 _WORDS = frozenset(("in", "min", "mins", "day", "days", "kp", "pa", "psi", "mol", "bar", "foot", "feet", "grade"))
 # One letter is a unit only behind a word that it fits: ``t_s``, but not ``mass.s``.
 _LETTERS = {
-    "s": TIME, "a": CURRENT | {"i"}, "v": frozenset(("u", "voltage", "volt", "spannung", "umot")), "n": TORQUE,
+    "s": TIME, "a": CURRENT | {"i"}, "v": VOLTAGE | {"u"}, "n": TORQUE,
 }  # fmt: skip
 _FORCES = frozenset(("n", "mn", "kn", "lb", "lbs", "lbf", "oz", "ozf", "kgf"))
 _LENGTHS = frozenset(("m", "cm", "mm", "in", "ft"))

@@ -123,6 +123,8 @@ class TableRows:
         place, first = next(((n, cell) for n, cell in enumerate(cells) if cell), (0, ""))
         if not first or is_missing(first) or is_value(first, self.dialect.decimal):
             return False
+        if re.search(r"\d", first) and not any(letter.isalpha() for letter in first):
+            return False  # a number or a time that is written in another way, such as `1,000.5`
         return len(cells) != self.dialect.width or place not in self.dialect.texts
 
     def _count_tail(self) -> int:
