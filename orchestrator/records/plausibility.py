@@ -31,9 +31,9 @@ def check_plausible(record: Record, model: Model) -> None:
         return
     record = record.fill_missing()
     parameters = _of_one_stage({name: entry.value for name, entry in model.parameters.items()})
-    _check_rate(record, _frequency(parameters))
     if record.theta_l is not None:
         _check_slope(record, record.theta_l, parameters["i"], "i" if "i" in model.parameters else "i_1")
+    _check_rate(record, _frequency(parameters))
     _check_inertia(record, parameters)
 
 
@@ -69,7 +69,7 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float, nam
     """Compare the slope of load over motor angle with 1/i, where the parameter ``name`` would mend ``i``."""
     motor = record.theta_m - record.theta_m.mean()
     load = theta_l - theta_l.mean()
-    if min(float(np.ptp(motor)) / ratio, float(np.ptp(load))) < LARGE_TRAVEL:
+    if max(float(np.ptp(motor)) / ratio, float(np.ptp(load))) < LARGE_TRAVEL:
         return
     correlation = float(motor @ load) / math.sqrt(float(motor @ motor) * float(load @ load))
     if abs(correlation) < 0.95:
@@ -93,8 +93,10 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float, nam
         ),
         (
             ratio * ratio,
-            "columns `theta_m` and `theta_l` must be those of motor and load, but seem to be exchanged",
-            'say `[columns.theta_m] name = "theta_l"` and the reverse in the model file',
+            "columns `theta_m` and `theta_l` must be those of motor and load, but seem to be exchanged, or "
+            f"`{name}` is the load's turns per turn of the motor",
+            'say `[columns.theta_m] name = "theta_l"` and the reverse in the model file, or put the inverse into '
+            f"`[parameters.{name}] value`",
         ),
     )
     for factor, text, cure in suspects:

@@ -176,6 +176,35 @@ def test_exchanged_columns_are_recognised() -> None:
         check_plausible(record_from_columns(columns, "r"), default_model())
 
 
+def _turned(motor: float, load: float) -> Record:
+    """Return 4 s in which motor and load swing by so many rad."""
+    time = np.arange(0.0, 4.0, 0.002)
+    shape = np.sin(2.0 * time)
+    columns = {"time": time, "u": np.cos(time), "theta_m": motor * shape, "theta_l": load * shape}
+    return record_from_columns(columns, "r")
+
+
+@pytest.mark.parametrize("load", [0.3, 1.0, 4.0])
+def test_exchanged_columns_are_recognised_though_one_of_them_moves_little(load: float) -> None:
+    right = default_model().parameters["i"].value * load
+    _check_slope(_turned(right, load), _turned(right, load).theta_l, 3.984)
+    with pytest.raises(RecordError, match="exchanged"):
+        check_plausible(_turned(load, right), default_model())
+
+
+def test_a_gear_ratio_that_is_the_inverse_is_told_as_that(tmp_path: Path) -> None:
+    record = _turned(27.0, 3.0)
+    said = {}
+    for ratio in (1.0 / 9.0, 9.0):
+        (tmp_path / "m.toml").write_text(f"[parameters.i]\nvalue = {ratio}\n[parameters.J_m]\nvalue = 2e-3\n")
+        try:
+            check_plausible(record, read_model(tmp_path / "m.toml"))
+        except RecordError as error:
+            said[ratio > 1.0] = str(error)
+    assert "put the inverse into `[parameters.i] value`" in said[False]
+    assert "inverse" not in said.get(True, "")
+
+
 @pytest.mark.parametrize(("ratio", "swing"), [(1.0, 1.0), (1.0, 1.08), (1.1, 0.95), (1.3, 1.1)])
 def test_a_load_that_swings_a_little_farther_than_its_motor_is_the_load(ratio: float, swing: float) -> None:
     time = np.arange(0.0, 4.0, 0.002)
