@@ -207,8 +207,11 @@ def _control(state, measured, target, step, p, inertia, tau, limit):
 
 
 @njit(cache=True)
-def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp, push, torque_gain, seen):
-    """Return measured-before-rounding (n, 2), the true states (n, 8), and u as applied."""
+def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp, push, torque_gain, seen, still=0):
+    """Return measured-before-rounding (n, 2), the true states (n, 8), and u as applied.
+
+    The bodies begin to move after ``still`` rows, the drive's request at once.
+    """
     n = u.size
     h = step / substeps
     end = n * step
@@ -236,6 +239,8 @@ def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp, p
                 before = asked
                 asked = _followed(asked, request, h, v[TAU2], v[SLEW])
                 request = 0.5 * (before + asked)
+            if n_k < still:
+                continue
             coulomb = v[FC_M] + (v[LATE] if t > 0.5 * end else 0.0)
             coulomb_l = v[FC_L]
             if v[MU_M] > 0.0 or v[MU_L] > 0.0:
@@ -292,6 +297,7 @@ def make_record(
     shifts: tuple[float, float] = (0.0, 0.0),
     torque_gain: float = 1.0,
     nominal: Mapping[str, float] | None = None,
+    still: int = 0,
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Return one record (time, u, theta_m, theta_l) and the truth that made it.
 
@@ -314,6 +320,7 @@ def make_record(
         shifts: how late [samples] the log has the motor's and the load's angle, against ``u``; may be negative.
         torque_gain: torque of the drive over ``u``.
         nominal: linear parameters of another machine than ``NOMINAL``, before they are drawn off.
+        still: rows over which the bodies stay as ``x0`` has them, while the drive's request runs.
 
     Returns:
         the columns, and truth: ``effects``, ``linear``, ``nominal``, ``states`` (n, 8), ``noise``, ...
@@ -357,7 +364,7 @@ def make_record(
         )
         push = torque_noise * float(np.std(plain[:, 4])) * coloured(np.random.default_rng([seed, 9]), n, step)
     raw, states, applied = _simulate(
-        v, request, step, substeps, start, target, gain, *disturbance, sharp, push, torque_gain, seen
+        v, request, step, substeps, start, target, gain, *disturbance, sharp, push, torque_gain, seen, still
     )
     raw = raw + late(states[:, [0, 2]], shifts) - states[:, [0, 2]]
     if counts is not None:
