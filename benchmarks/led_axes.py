@@ -1,6 +1,6 @@
 """Single axes that a controller leads: right, missed and wrong names by what is hidden.
 
-    python -m benchmarks.led_axes --records 80 --seed 0 [--only "by hand"]
+    python -m benchmarks.led_axes --records 80 --seed 0 [--only "by hand"] [--wrong-inertia]
 
 A controller hides from predictions what acts on an axis, and its torque is measured with noise. Records are of the
 independent simulation in ``tests/support/led_axis.py``. One line a record, in two processes, the counts at the end.
@@ -8,9 +8,11 @@ independent simulation in ``tests/support/led_axis.py``. One line a record, in t
 
 import argparse
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from benchmarks.judging import Row, Truth, grade_table, judge, seconds_line, size_line
 from benchmarks.measured import SIZE
@@ -29,6 +31,7 @@ relative_uncertainty = 0.9
 """
 RELATIVES = {"coulomb_friction": ("stribeck_friction",)}  # the one contains the other
 
+FACTORS = (1.0 / 12.0, 1.0 / 6.0, 6.0, 12.0)
 ALLOWED = ("outside_torque",)  # beside a limit that it reached once
 
 
@@ -38,11 +41,12 @@ class LedTask:
 
     seed: int
     hidden: str = ""  # goes round with the seed
+    wrong_inertia: bool = False
 
     @property
     def key(self) -> str:
         """Return what tells it from every other record."""
-        return f"led:{self.seed}" + (f":{self.hidden}" if self.hidden else "")
+        return f"led:{self.seed}" + (f":{self.hidden}" if self.hidden else "") + self.wrong_inertia * ":J"
 
 
 def diagnose_task(task: LedTask, settings: Any = None) -> Row:
@@ -56,6 +60,9 @@ def diagnose_task(task: LedTask, settings: Any = None) -> Row:
         The row.
     """
     case = led_axis(task.seed, task.hidden)
+    if task.wrong_inertia:
+        factor = float(np.random.default_rng([task.seed, 5]).choice(FACTORS))
+        case = replace(case, stated=(factor * case.truth["J"], case.stated[1]))
     outcome = diagnose_record(case.record, model_of(case), settings)
     expected = tuple((name, *RELATIVES.get(name, ())) for name in sorted(case.right))
     sizes = {name: {SIZE[name]: (case.truth[name], 0.0)} for name in case.right if case.truth.get(name)}
@@ -84,8 +91,9 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("results/led_axes"))
     parser.add_argument("--only", choices=(*HIDDEN, *FURTHER), default="")
+    parser.add_argument("--wrong-inertia", action="store_true", help="that a model file states, 6 or 12 times off")
     args = parser.parse_args()
-    tasks = [LedTask(seed, args.only) for seed in range(args.seed, args.seed + args.records)]
+    tasks = [LedTask(seed, args.only, args.wrong_inertia) for seed in range(args.seed, args.seed + args.records)]
     rows = run_tasks(tasks, diagnose_task, args.out / f"rows-{args.seed}.jsonl", args.processes)
     for kind in dict.fromkeys(row.kind for row in rows):
         chosen = [row for row in rows if row.kind == kind]
