@@ -97,7 +97,7 @@ class GradeSettings(Settings, frozen=True):
     ] = 0.5
     sure_size_t: Annotated[float, setting("sizes over their errors that count as much as likely_t")] = 6.0
     most_left: Annotated[
-        float, share("of the torque that may be left beside the name of a delay, or of a limit's own where it acts")
+        float, share("of the torque's power that may be left beside a name; for a limit of its torque where it acts")
     ] = 0.2
     confirmed_share: Annotated[
         float, share("of the misfit on test data that goes with a certain effect, or may come: 5 % in rms are chance")

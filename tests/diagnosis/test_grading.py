@@ -27,7 +27,7 @@ BROKEN = {
     "possible size": ({"possible": False}, {}),
     "confirmed": ({"motion_share": 0.02}, {}),
     "not refuted": ({"motion_share": -0.3}, {}),
-    "little left": ({"kind": "timing"}, {"left": 0.3}),
+    "little left": ({}, {"left": 0.3}),
 }
 
 
@@ -41,6 +41,12 @@ def test_each_rule_lowers_the_grade(rule):
     grade, lowered = grade_effect(effect, record, SETTINGS)
     assert rule.name in lowered
     assert grade <= rule.highest < highest_grade([])
+
+
+def test_a_limit_leaves_little_of_its_own_torque_where_it_acts():
+    effect = replace(EFFECT, left_where_it_acts=0.3)
+    assert grade_effect(effect, RECORD, SETTINGS)[0] is Grade.CERTAIN
+    assert grade_effect(replace(effect, kind="limit"), RECORD, SETTINGS) == (Grade.POSSIBLE, ("little left",))
 
 
 def test_thresholds_of_rules_are_settings():

@@ -61,10 +61,8 @@ def _is_confirmed(effect: EffectEvidence, s: GradeSettings) -> bool:
 
 
 def _left(effect: EffectEvidence, record: RecordEvidence) -> float:
-    """Return what is left of the torque that a delay makes late, or at the ceiling of a limit, which must be flat."""
-    if effect.kind == "timing":
-        return record.left
-    return effect.left_where_it_acts if effect.kind == "limit" else 0.0
+    """Return what is left of the torque, or of a limit's own where it acts, if that is more: a ceiling is flat."""
+    return max(record.left, effect.left_where_it_acts if effect.kind == "limit" else 0.0)
 
 
 GRADE_RULES: tuple[GradeRule, ...] = (
@@ -130,7 +128,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     GradeRule(
         "little left", Grade.POSSIBLE, lambda e, r, s: _left(e, r) < s.grades.most_left,
         "share of the torque that is left; of a limit: of its own, where it acts", "grades.most_left",
-        "too much of the misfit remains, and a delay or a limit then fits whatever is missing",
+        "too much of the torque remains, and a law then fits whatever is missing",
     ),
 )  # fmt: skip
 
