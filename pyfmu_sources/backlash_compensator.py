@@ -17,7 +17,8 @@ load, and the torque for it and for the motor, ahead of the drive's lag (inversi
 Martin and Rouchon, International Journal of Control 61(6), 1995). It never pulls: where the teeth part and it asks
 for a torque away from the flank, the flank is approached anew.
 
-Without a half-gap that is known, the request is that of the plain LQR.
+Without a half-gap that is known, the request is that of the plain LQR. So it is where a flank bars the way in front of
+the interval of the half-gap, until the estimate agrees with that or the teeth part again.
 """
 
 from math import exp, fabs, log, sqrt
@@ -27,7 +28,7 @@ from .gap_traversal import Traversal, go_on, plan, point_at, request_at
 from .lqr import Estimate, Gains, control
 from .state_prediction import Train
 
-HOLD, CROSS = 0, 1
+HOLD, CROSS, PLAIN = 0, 1, 2
 ANY_TORQUE = 1e300  # limit of a request that is not to be limited [N.m]
 DEVIATIONS = 2.0  # of the half-gap, by which its interval reaches down and up
 LEAST_SHARE = 0.5  # of the half-gap, that the lower end of its interval must reach for a plan
@@ -39,6 +40,7 @@ DEAD_BAND = 2.0  # margins, within which the load is where it should be
 REFERENCE_LAG = 0.25  # of a crossing: time constant of the reference's acceleration; steps of its speed last so long
 PER_CROSSING = 5.0  # poles of the feedback times the duration of a crossing
 PER_SAMPLE = 0.085  # largest poles of the feedback times the sample time
+BARRED = 0.25  # of the half-gap, by which a way that stands still is behind its line: a flank is where none is known
 TURNING = 2  # samples before the end of a plan's first part, from which it is too late to turn back
 
 
@@ -72,7 +74,7 @@ class WantedMotion(NamedTuple):
 
 class CrossingState(NamedTuple):
     """Phase, wanted flank, samples since the plan began, smoothed lead of the load over the reference [rad], speed of
-    the reference behind one lag and behind two [rad/s], plan.
+    the reference behind one lag and behind two [rad/s], plan, way from mid-gap at which a flank barred it [rad] or 0.
     """
 
     phase: int
@@ -82,13 +84,14 @@ class CrossingState(NamedTuple):
     speed_once: float
     speed_twice: float
     traversal: Traversal
+    barred: float
 
 
 def start_state(x: Estimate, reference_speed: float, i: float) -> CrossingState:
     """Return the state at the first sample: hold on the side on which the twist is."""
     flank = 1 if x[0] / i >= x[2] else -1
     none = Traversal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return CrossingState(HOLD, flank, 0, 0.0, reference_speed, reference_speed, none)
+    return CrossingState(HOLD, flank, 0, 0.0, reference_speed, reference_speed, none, 0.0)
 
 
 def derive_reference(angle: float, speed: float, once: float, twice: float, lag: float) -> WantedMotion:
@@ -137,8 +140,8 @@ def impact_speed(reference: float, reference_speed: float, x: Estimate, alpha: f
     return AIM * s.impact_speed * max(SOFTEST, min(1.0, need))
 
 
-def follow(state: CrossingState, duration: float, x: Estimate, d: Train, s: Tuning) -> float:
-    """Return the request [N.m] along the plan of a crossing.
+def follow(state: CrossingState, duration: float, end: float, x: Estimate, d: Train, s: Tuning) -> float:
+    """Return the request [N.m] along the plan of a crossing; from the way ``end`` [rad] on the teeth may touch.
 
     With ``e`` the error of the way the gains make ``e''' + 2.4 p e'' + 2.4 p^2 e' + p^3 e = 0`` of the chain of way,
     speed and torque. What else accelerates the twist, friction and load, is a torque that the request cancels.
@@ -152,7 +155,7 @@ def follow(state: CrossingState, duration: float, x: Estimate, d: Train, s: Tuni
     p = min(PER_SAMPLE / s.sample_time, PER_CROSSING / duration)
     u = request_at(t, time, time + s.sample_time) - extra
     behind = aim[0] - side * (x[0] / d.i - x[2])
-    if t.third == 0.0:
+    if t.third == 0.0 and side * (x[0] / d.i - x[2]) > end:
         behind = min(behind, s.margin)  # the teeth may touch: no push for the way that they bar
     u += d.tau * M * p * p * (p * behind + 2.4 * (aim[1] - side * (x[1] / d.i - x[3])))
     u += (2.4 * p * d.tau - 1.0) * (aim[2] - side * x[5] - extra)
@@ -185,17 +188,24 @@ def act(
         reference_speed: [rad/s].
         x: estimate ``(theta_m, omega_m, theta_l, omega_l, T_l, T_m)``, whose twist is zero in mid-gap.
     """
-    phase, flank, samples, lead, once, twice, traversal = state
+    phase, flank, samples, lead, once, twice, traversal, barred = state
     lowest = gap.alpha - DEVIATIONS * max(gap.deviation, 0.0)
-    if gap.alpha <= 0.0 or lowest <= LEAST_SHARE * gap.alpha:
+    end = lowest - s.margin
+    way = flank * (x[0] / d.i - x[2])
+    line = point_at(traversal, samples * s.sample_time, d.tau, d.J_m * d.i)[0]
+    behind = phase == CROSS and samples > 0 and way > 0.0 and line - way > BARRED * gap.alpha
+    stopped = behind and flank * (x[1] / d.i - x[3]) < 0.5 * s.impact_speed
+    barred = way if stopped else barred
+    barred = barred if barred < end and way > 0.0 else 0.0
+    if gap.alpha <= 0.0 or lowest <= LEAST_SHARE * gap.alpha or barred > 0.0:
         plain = control(reference, reference_speed, x, gains, d.i, d.compliance, s.u_max)
-        return (CrossingState(HOLD, flank, 0, 0.0, reference_speed, reference_speed, traversal), plain)
+        return (CrossingState(PLAIN, flank, 0, 0.0, reference_speed, reference_speed, traversal, barred), plain)
+    phase = HOLD if phase == PLAIN else phase
     crossing = crossing_time(gap.alpha, d, s)
     lag = REFERENCE_LAG * crossing
     share = s.sample_time / (s.sample_time + lag)
     once += share * (reference_speed - once)
     twice += share * (once - twice)
-    end = lowest - s.margin
     speed = impact_speed(reference, reference_speed, x, gap.alpha, s)
     duration = crossing + (gap.alpha - end) / s.impact_speed
     r = derive_reference(reference, reference_speed, once, twice, lag)
@@ -210,12 +220,11 @@ def act(
     held = hold(r, shifted, gains, d, s)
     way = flank * (x[0] / d.i - x[2])
     time = samples * s.sample_time
-    line = point_at(traversal, time, d.tau, d.J_m * d.i)[0]
     unsure = (DEVIATIONS * max(gap.deviation, 0.0) + s.margin) * traversal.end_speed / s.impact_speed
     sure = phase == HOLD or (samples > 0 and line >= gap.alpha + unsure)
-    touching = way > gap.alpha and sure
+    touching = (way > gap.alpha and sure) or stopped
     if touching or s.torque_share == 0.0 or (phase == HOLD and way > 0.0 and held * flank >= 0.0):
-        return (CrossingState(HOLD, flank, 0, lead, once, twice, traversal), held)
+        return (CrossingState(HOLD, flank, 0, lead, once, twice, traversal, 0.0), held)
     if phase == HOLD or samples == 0 or way < -gap.alpha - s.margin:
         # Still on the other flank: the way begins where that is left.
         samples = 0
@@ -225,6 +234,6 @@ def act(
         samples = 0
         ahead_of_line = way > line + s.margin
         traversal = plan_crossing(flank, x, end, speed, d, s) if ahead_of_line else go_on(line, speed, traversal.level)
-    state = CrossingState(CROSS, flank, samples, lead, once, twice, traversal)
-    u = follow(state, duration, x, d, s)
-    return (CrossingState(CROSS, flank, samples + 1, lead, once, twice, traversal), u)
+    state = CrossingState(CROSS, flank, samples, lead, once, twice, traversal, 0.0)
+    u = follow(state, duration, end, x, d, s)
+    return (CrossingState(CROSS, flank, samples + 1, lead, once, twice, traversal, 0.0), u)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .backlash_compensator import CrossingState, Gap, Tuning, act, start_state
+from .backlash_compensator import CROSS, PLAIN, CrossingState, Gap, Tuning, act, start_state
 from .controller_variables import GAINS, INPUTS
 from .fmu_variables import FmuVariable
 from .gap_traversal import Traversal
@@ -27,7 +27,7 @@ _INPUTS = (
 )
 _OUTPUTS = (
     ("u", "N.m", "Requested motor torque", 100.0),
-    ("flank", "1", "Flank that is held or approached: -1 or 1", 1.0),
+    ("flank", "1", "Flank that is held or approached: -1 or 1; 0: half-gap not known, plain LQR", 1.0),
     ("crossing", "1", "1 while the wanted flank is approached, 0 while it is held", 1.0),
 )
 _TRAIN = (
@@ -82,6 +82,7 @@ class BacklashCompensator(SampledSlave):
     _once: float
     _twice: float
     _plan: Traversal
+    _barred: float
     _sent: Sent
     _next_stage: int
     _next_flank: int
@@ -90,6 +91,7 @@ class BacklashCompensator(SampledSlave):
     _next_once: float
     _next_twice: float
     _next_plan: Traversal
+    _next_barred: float
 
     def take_parameters(self) -> None:
         """Collect the gains."""
@@ -110,6 +112,7 @@ class BacklashCompensator(SampledSlave):
         self._once = state.speed_once
         self._twice = state.speed_twice
         self._plan = state.traversal
+        self._barred = state.barred
         self.correct()
 
     def predict(self) -> None:
@@ -121,6 +124,7 @@ class BacklashCompensator(SampledSlave):
         self._once = self._next_once
         self._twice = self._next_twice
         self._plan = self._next_plan
+        self._barred = self._next_barred
         self._sent.append(self.real[U])
         del self._sent[:1]
 
@@ -128,7 +132,7 @@ class BacklashCompensator(SampledSlave):
         """Compute the torque request of this sample."""
         real = self.real
         state = CrossingState(
-            self._stage, self._flank, self._age, self._lead, self._once, self._twice, self._plan
+            self._stage, self._flank, self._age, self._lead, self._once, self._twice, self._plan, self._barred
         )  # fmt: skip
         n = FIRST_TRAIN
         train = Train(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6])
@@ -147,9 +151,10 @@ class BacklashCompensator(SampledSlave):
         self._next_once = state.speed_once
         self._next_twice = state.speed_twice
         self._next_plan = state.traversal
+        self._next_barred = state.barred
         real[U] = u
-        real[FLANK] = float(state.flank)
-        real[CROSSING] = float(state.phase)
+        real[FLANK] = 0.0 if state.phase == PLAIN else float(state.flank)
+        real[CROSSING] = 1.0 if state.phase == CROSS else 0.0
 
     def _estimate(self) -> Estimate:
         """Return the estimate with the twist zero in mid-gap."""

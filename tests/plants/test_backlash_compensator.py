@@ -6,6 +6,7 @@ import pytest
 from pyfmu_sources.backlash_compensator import (
     CROSS,
     HOLD,
+    PLAIN,
     CrossingState,
     Gap,
     Train,
@@ -29,7 +30,7 @@ NO_PLAN = Traversal(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 def standing(phase, flank, lead, samples=0, traversal=NO_PLAN):
     """A state under a reference that stands still."""
-    return CrossingState(phase, flank, samples, lead, 0.0, 0.0, traversal)
+    return CrossingState(phase, flank, samples, lead, 0.0, 0.0, traversal, 0.0)
 
 
 def draw_estimate(rng, way=None):
@@ -89,6 +90,25 @@ def test_teeth_that_may_not_touch_yet_are_approached_further():
         state, u = act(state, 0.5, 0.0, x, Gap(0.02, 2e-3), GAINS, TRAIN, TUNING)
         assert (state.phase, state.flank) == (phase, 1)
         assert abs(u) < 20.0 or phase == HOLD
+
+
+def test_a_flank_in_front_of_the_interval_makes_it_the_plain_lqr_until_the_teeth_part():
+    """A half-gap that is told too wide would push on and on: the load ran away."""
+    x = (3.984 * 0.010, 0.0, 0.0, 0.0, 0.0, 0.0)
+    state = standing(CROSS, 1, 0.0, 1, go_on(0.016, 0.1, 255.0))
+    for way, phase in ((0.010, PLAIN), (0.012, PLAIN), (-0.001, CROSS), (0.012, CROSS)):
+        x = (3.984 * way, 0.0, 0.0, 0.0, 0.0, 0.0)
+        state, u = act(state, 0.1, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
+        assert state.phase == phase
+        if phase == PLAIN:
+            assert u == control(0.1, 0.0, x, GAINS, 3.984, 1.0 / 3300.0, 300.0)
+
+
+def test_a_flank_within_the_interval_is_held():
+    x = (3.984 * 0.015, 0.0, 0.0, 0.0, 0.0, 0.0)
+    state = standing(CROSS, 1, 0.0, 1, go_on(0.021, 0.1, 255.0))
+    state, _ = act(state, 0.1, 0.0, x, Gap(0.02, 3e-3), GAINS, TRAIN, TUNING)
+    assert state.phase == HOLD
 
 
 def test_the_way_behind_a_plan_goes_on_at_the_speed_that_is_wanted_now():
