@@ -100,7 +100,7 @@ _TABLE = """
 2 3 | CS | start_anew        | state.restore
 2 3 | CS | restored_local    | state.restore
 2 3 | CS | state_in_place    | state.status
-2 3 | CS | bytes_pointer     | state.serialise
+2 3 | CS | bytes_pointer     | state.portable
 2 3 | CS | bytes_overrun     | state.serialise
 
 [dependencies declared, never perturbed]

@@ -14,6 +14,7 @@ from orchestrator.errors import ChildError
 
 _AMPLIFIED = 100.0
 _SMALL, _MOST_INEXACT = 1e-3, 1e-2
+_FEW_STEPS = 5
 _MOST_READ = 1000
 _LARGEST = 1000  # elements of an array
 _EQUAL = 1e-9
@@ -147,8 +148,8 @@ def state(context: Context) -> None:
             try:
                 if later.restore():
                     first.restore_values()
+                    data, memory = later.restore_from_bytes()
                     later.take_again()
-                    data, memory = later.to_bytes()
             finally:
                 driver.free_state(first.saved)
                 nulled = driver.free_state(later.saved)
@@ -212,27 +213,50 @@ class _Restoring:
         self.driver.get_state_again(self.saved)
         bench.run(self.driver, last, bench.job.steps, read=False)
         self.driver.set_state(self.saved)
-        self.half, self.values = last, now
-        self._is_back(self.driver, "state.restore", "a state that was taken into one that was made before")
+        difference = _first_difference(self.watch, now, self.driver.read(self.watch))
+        if difference is not None:
+            v, text = difference
+            what = "a state that is taken into one that was made before must be the later one"
+            self.context.report("state.restore", f"{what}, but {text}", v.name)
 
-    def to_bytes(self) -> tuple[bytes, dict[str, Any]]:
-        """The state in bytes, and what its driver keeps; no bytes where it cannot be serialised."""
-        if not self.context.bench.job.serialises:
+    def restore_from_bytes(self) -> tuple[bytes, dict[str, Any]]:
+        """Through bytes, in another instance where there may be one.
+
+        Returns:
+            The bytes and what the driver keeps beside them; no bytes where there are none, or they were reported.
+        """
+        bench = self.context.bench
+        if not bench.job.serialises:
             return b"", {}
-        return self.driver.serialise(self.saved), dict(self.driver.memory)
+        self.driver.set_state(self.saved)  # what the driver keeps beside it is back too
+        data, memory = self.driver.serialise(self.saved), dict(self.driver.memory)
+        if self.context.single:
+            return (data, memory) if self._deserialise(self.driver, data, memory) else (b"", {})
+        with bench.instance(name="restored", moved=False) as other:
+            return (data, memory) if self._deserialise(other, data, memory) else (b"", {})
 
     def restore_elsewhere(self, data: bytes, memory: dict[str, Any]) -> None:
         """In another process, where pointers into the memory of this one lead nowhere."""
         bench = self.context.bench
         bench.library.renew()
+        found = ""
         try:
             with bench.instance(name="restored", moved=False) as other:
-                self._deserialise(other, data, memory)
+                copy = other.deserialise(data, memory)
+                other.set_state(copy)
+                other.driven = True
+                difference = _first_difference(self.watch, self.values, other.read(self.watch))
+                found = "" if difference is None or self._slight(other.read(self.watch)) else difference[1]
+                bench.run(other, self.half, min(self.half + _FEW_STEPS, bench.job.steps))
+                other.free_state(copy)
         except StatusError as error:
-            self.context.report(error.rule or "state.status", str(error), when="in another process")
+            found = str(error)
         except ChildError as error:
-            self.context.report("state.serialise", f"a serialised state must be usable in another process, but {error}")
+            found = str(error)
             bench.library.renew()
+        if found:
+            text = "a serialised state must be usable in another process"
+            self.context.report("state.portable", f"{text}, but {found}")
 
     def _change(self) -> None:
         """Give inputs and tunable parameters other values after the state was saved."""
@@ -281,14 +305,16 @@ class _Restoring:
                 return False
         return True
 
-    def _deserialise(self, driver: Driver, data: bytes, memory: dict[str, Any]) -> None:
+    def _deserialise(self, driver: Driver, data: bytes, memory: dict[str, Any]) -> bool:
+        """Whether a state from bytes is the same, and goes on so; what is not is reported."""
         copy = driver.deserialise(data, memory)
         try:
             driver.set_state(copy)
             driver.driven = True
-            if self._is_back(driver, "state.serialise", "a serialised state"):
-                wanted = "a serialised state must continue as before"
-                self._continues(driver, "state.serialise", wanted, self.context.bench.job.steps)
+            wanted = "a serialised state must continue as before"
+            return self._is_back(driver, "state.serialise", "a serialised state") and self._continues(
+                driver, "state.serialise", wanted, self.context.bench.job.steps
+            )
         finally:
             driver.free_state(copy)
 
