@@ -53,7 +53,7 @@ def rest_text(f: ForecastFound, loop: str) -> str:
     if f.harmonic_load is not None:
         rest += f" (describing function: {f.harmonic_load:.3g} half-gaps at {f.harmonic_frequency:.3g} Hz)"
     if not f.settled:
-        rest += f"; its motion did not repeat itself within {LONGEST:g} s"
+        rest += f"; this is its motion after {LONGEST:g} s, which still changes: it never settles, or takes longer"
     return f"Without friction, load and limit of the torque {loop} {rest}."
 
 
