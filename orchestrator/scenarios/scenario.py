@@ -47,7 +47,7 @@ from orchestrator.scenarios.file_format import (
 )
 from orchestrator.scenarios.isolated import Safety, run_safely
 from orchestrator.scenarios.joining import terminal_connections
-from orchestrator.scenarios.tables import read_table
+from orchestrator.scenarios.tables import read_table, table_remarks
 from orchestrator.shared.toml_files import read_toml
 
 MAXIMUM_BYTES = 16 * 2**20
@@ -105,7 +105,10 @@ def load_scenario(path: Path) -> Scenario:
         raise FmuError(plain_text(f"{path}: {'; '.join(map(str, reader.lacking))}"))
     raise_problems([*problems, *reader.lacking], str(path))
     assert algorithm is not None
-    return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))
+    remarks = table_remarks(sources, top.start, top.stop)
+    return Scenario(
+        system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path), remarks=remarks
+    )  # fmt: skip
 
 
 def _joints(top: _Top, problems: list[Problem]) -> list[tuple[str, str, str]]:

@@ -1,11 +1,14 @@
 """Tables that a scenario feeds in: two columns of a file of any known format."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from orchestrator.errors import RecordError, ScenarioError
+from orchestrator.master.result import RunRemark
 from orchestrator.master.signals import Table
+from orchestrator.master.system import SignalSource
 from orchestrator.records.tables import Wanted, read_columns
 from orchestrator.records.timing import has_unpadded_fractions
 
@@ -41,3 +44,27 @@ def read_table(
             f"after {times[back[0]]:g} s: {cure}"
         )
     return Table(tuple(times.tolist()), tuple(values.tolist()), hold), read.units[0]
+
+
+def table_remarks(sources: Sequence[SignalSource], start: float, stop: float) -> tuple[RunRemark, ...]:
+    """Return a remark on each table that says nothing of a part of a run from ``start`` to ``stop`` [s].
+
+    A table that is held may end early: it says what happens, and when. Lines should go on to the end.
+    """
+    remarks = []
+    for source in sources:
+        table = source.signal
+        if not isinstance(table, Table) or len(table.times) < 3:
+            continue
+        times, run = np.asarray(table.times), f"the run's {start:.6g} to {stop:.6g} s"
+        inside = int(np.count_nonzero((times >= start) & (times <= stop)))
+        slack = 1.5 * float(np.median(np.diff(times))) + 1e-9
+        where, outside = f"its table, from {times[0]:.6g} to {times[-1]:.6g} s,", "outside, its end values hold"
+        if inside < 2:
+            text = f"{where} has {inside} of {times.size} rows within {run}: are its times in seconds?"
+        elif not table.hold and (times[0] > start + slack or times[-1] < stop - slack):
+            text = f"{where} does not cover {run}: {outside}"
+        else:
+            continue
+        remarks.append(RunRemark(source.target, text))
+    return tuple(remarks)
