@@ -25,9 +25,12 @@ Two = Annotated[Any, ArrayKind(REAL, (2,))]
 ModeMatrices = Annotated[Any, ArrayKind(REAL, (9, 6, 6))]
 ModeVectors = Annotated[Any, ArrayKind(REAL, (9, 6))]
 ModeInputs = Annotated[Any, ArrayKind(REAL, (9, 2, 6))]
+Series = Annotated[Any, ArrayKind(REAL, (21, 6))]
 
 MOST_EVENTS = 40  # in one sample
+MOST_PIECES = 1000  # power series in one sample
 TERMS = 20  # of a Taylor series whose terms fall by half at least
+SMALL = 1e-16  # a term that ends a power series
 MOST_HALVINGS = 60
 
 
@@ -41,11 +44,8 @@ def _multiply(left: Matrix, right: Matrix, out: Matrix) -> None:
             out[r, c] = acc
 
 
-def transition(a: Matrix, b_u: Inputs, b_1: Vector, h: float, phi: Matrix, gain_u: Inputs, gain_1: Vector) -> None:
-    """Fill the exact transition over ``h`` of ``x' = a x + b_u u + b_1``: a Taylor series, scaled and squared.
-
-    See Moler and Van Loan 2003, method 3.
-    """
+def _fastest_rate(a: Matrix) -> float:
+    """Return a bound [1/s] on the rates of ``x' = a x``."""
     fastest = 0.0
     for r in range(6):
         row = 0.0
@@ -53,7 +53,15 @@ def transition(a: Matrix, b_u: Inputs, b_1: Vector, h: float, phi: Matrix, gain_
             row += abs(a[r, c])
         fastest = max(fastest, row)
     # In the norm of angles and speeds over the square root of the fastest row, a row is its square root.
-    fastest = max(math.sqrt(fastest), abs(a[1, 1]) + abs(a[3, 3]) + abs(a[5, 5]))
+    return max(math.sqrt(fastest), abs(a[1, 1]) + abs(a[3, 3]) + abs(a[5, 5]))
+
+
+def transition(a: Matrix, b_u: Inputs, b_1: Vector, h: float, phi: Matrix, gain_u: Inputs, gain_1: Vector) -> None:
+    """Fill the exact transition over ``h`` of ``x' = a x + b_u u + b_1``: a Taylor series, scaled and squared.
+
+    See Moler and Van Loan 2003, method 3.
+    """
+    fastest = _fastest_rate(a)
     halvings = 0
     part = h
     while abs(part) * fastest > 1.0 and halvings < MOST_HALVINGS:
@@ -227,36 +235,94 @@ def propagate(
     _cross(mats, b_u, b_1, normals, halves, h, motor, load, x, total, end, first, second)
 
 
+def _expand(
+    a: Matrix, b_u: Inputs, b_1: Vector, motor: float, load: float, h: float, x: Vector, series: Series
+) -> int:
+    """Fill the power series of ``x`` in time over ``h``, of which it returns the last term that counts."""
+    for r in range(6):
+        series[0, r] = x[r]
+    for n in range(1, TERMS + 1):
+        largest = 0.0
+        for body in range(3):
+            speed = 2 * body + 1
+            acc = b_u[0, speed] * motor + b_u[1, speed] * load + b_1[speed] if n == 1 else 0.0
+            for c in range(6):
+                acc += a[speed, c] * series[n - 1, c]
+            series[n, speed - 1] = series[n - 1, speed] * (h / n)
+            series[n, speed] = acc * (h / n)
+            largest = max(largest, abs(series[n, speed - 1]), abs(series[n, speed]))
+        if largest < SMALL:
+            return n
+    return TERMS
+
+
+def _evaluate(series: Series, last: int, time: float, out: Vector) -> None:
+    """Fill ``out`` with the state of a power series at ``time``, a share of the time that it spans."""
+    for r in range(6):
+        acc = series[last, r]
+        for n in range(last):
+            acc = acc * time + series[last - 1 - n, r]
+        out[r] = acc
+
+
+def _grow(a: Matrix, h: float, total: Matrix, term: Matrix, work: Matrix) -> None:
+    """Replace ``total`` by ``exp(a h) total``, by its power series: ``h`` is at most one over the fastest rate."""
+    for r in range(6):
+        for c in range(6):
+            term[r, c] = total[r, c]
+    for n in range(1, TERMS + 1):
+        largest = 0.0
+        for body in range(3):
+            speed = 2 * body + 1
+            for c in range(6):
+                acc = 0.0
+                for m in range(6):
+                    acc += a[speed, m] * term[m, c]
+                work[speed - 1, c] = term[speed, c] * (h / n)  # an angle's rate is its speed
+                work[speed, c] = acc * (h / n)
+        for r in range(6):
+            for c in range(6):
+                term[r, c] = work[r, c]
+                total[r, c] += work[r, c]
+                largest = max(largest, abs(work[r, c]))
+        if largest < SMALL:
+            return
+
+
 def _cross(
     mats: ModeMatrices, b_u: Inputs, b_1: ModeVectors, normals: Inputs, halves: Two, h: float, motor: float,
     load: float, x: Vector, total: Matrix, end: Vector, first: int, second: int,
 ) -> None:  # fmt: skip
-    """Advance ``x`` through a sample in which teeth meet or part, from flanks ``first`` and ``second`` on."""
-    f = scratch(6, 6)
-    g_u = scratch(2, 6)
-    g_1 = scratch(6)
-    before = scratch(6, 6)
-    y = scratch(6)
+    """Advance ``x`` through a sample in which teeth meet or part, from flanks ``first`` and ``second`` on.
+
+    Pieces go by power series, in which an event is a root. ``x`` is NaN where that takes too many.
+    """
+    series = scratch(21, 6)
+    term = scratch(6, 6)
+    work = scratch(6, 6)
     speed0 = scratch(6)
     speed1 = scratch(6)
     for r in range(6):
         for c in range(6):
             total[r, c] = 1.0 if r == c else 0.0
     left = h
-    for _ in range(MOST_EVENTS):
+    events = 0
+    for _ in range(MOST_PIECES):
         mode = 3 * first + second
-        transition(mats[mode], b_u, b_1[mode], left, f, g_u, g_1)
-        _advance(f, g_u, g_1, x, motor, load, end)
-        hit_1, side_1 = _next_event(normals, 0, halves[0], first, x, end, left)
-        hit_2, side_2 = _next_event(normals, 1, halves[1], second, x, end, left)
-        for r in range(6):
-            for c in range(6):
-                before[r, c] = total[r, c]
-        if hit_1 < 0.0 and hit_2 < 0.0:
-            _multiply(f, before, total)
+        piece = min(left, 1.0 / max(_fastest_rate(mats[mode]), 1.0 / h))
+        last = _expand(mats[mode], b_u, b_1[mode], motor, load, piece, x, series)
+        _evaluate(series, last, 1.0, end)
+        hit_1, side_1 = _next_event(normals, 0, halves[0], first, x, end, piece)
+        hit_2, side_2 = _next_event(normals, 1, halves[1], second, x, end, piece)
+        if (hit_1 < 0.0 and hit_2 < 0.0) or events == MOST_EVENTS:
+            _grow(mats[mode], piece, total, term, work)
             for r in range(6):
                 x[r] = end[r]
-            return
+            left -= piece
+            if left <= 0.0:
+                return
+            continue
+        events += 1
         stage = 0 if hit_2 < 0.0 or (hit_1 >= 0.0 and hit_1 <= hit_2) else 1
         hit, side = (hit_1, side_1) if stage == 0 else (hit_2, side_2)
         flank = first if stage == 0 else second
@@ -264,30 +330,29 @@ def _cross(
         a = 2 * stage
         b = a + 2
         rate = 0.0
-        for newton in range(2):
-            transition(mats[mode], b_u, b_1[mode], hit, f, g_u, g_1)
-            _advance(f, g_u, g_1, x, motor, load, y)
-            gap = normals[stage, a] * y[a] + normals[stage, b] * y[b] - edge
-            rate = normals[stage, a] * y[a + 1] + normals[stage, b] * y[b + 1]
-            if newton == 1 or abs(rate) < 1e-9 or abs(gap) < 1e-12:
+        for newton in range(4):
+            _evaluate(series, last, hit / piece, x)
+            gap = normals[stage, a] * x[a] + normals[stage, b] * x[b] - edge
+            rate = normals[stage, a] * x[a + 1] + normals[stage, b] * x[b + 1]
+            if newton == 3 or abs(rate) < 1e-9 or abs(gap) < 1e-13:
                 break
-            hit = min(max(hit - gap / rate, 0.0), left)
-        _multiply(f, before, total)
+            hit = min(max(hit - gap / rate, 0.0), piece)
+        _grow(mats[mode], hit, total, term, work)
         after = (2 if side > 0.0 else 0) if flank == 1 else 1
-        _advance(mats[mode], b_u, b_1[mode], y, motor, load, speed0)
+        _advance(mats[mode], b_u, b_1[mode], x, motor, load, speed0)
         if stage == 0:
             first = after
         else:
             second = after
         mode = 3 * first + second
-        _advance(mats[mode], b_u, b_1[mode], y, motor, load, speed1)
+        _advance(mats[mode], b_u, b_1[mode], x, motor, load, speed1)
         if abs(rate) > 1e-6:
             for c in range(6):
                 aside = (normals[stage, a] * total[a, c] + normals[stage, b] * total[b, c]) / rate
                 for r in range(6):
                     total[r, c] += (speed1[r] - speed0[r]) * aside
-        for r in range(6):
-            x[r] = y[r]
         left -= hit
         if left <= 0.0:
             return
+    for r in range(6):
+        x[r] = float("nan")
