@@ -19,6 +19,8 @@ FIRST_OUTPUT = T_L + 1
 CONTACT_1, CONTACT_2 = FIRST_OUTPUT + 11, FIRST_OUTPUT + 12
 FIRST_PARAMETER = CONTACT_2 + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
+# A rate [1/s] that power series follow in bearable time: at 1 kHz they take ten thousand for a step.
+FASTEST = 1e7
 # Angles [rad] beyond which neighbouring numbers are over 2 mrad apart: a gap and most motion are lost in rounding.
 FARTHEST = 1e13
 
@@ -102,10 +104,16 @@ class TwoStageTrain(PlantSlave):
     )  # fmt: skip
 
     def initialise(self) -> None:
-        """Read the parameters and start at the initial state."""
+        """Read the parameters and start at the initial state; refuse a train that is too stiff at any step."""
         real = self.real
         n = FIRST_START
         self._p = TrainParameters._make(real[m] for m in range(FIRST_PARAMETER, FIRST_START))
+        rate = train_transition.fastest_rate((1, 1, 1, 1, 1), self._p)
+        if rate > FASTEST:
+            raise ValueError(
+                f"the fastest rate of the train must be at most 1e7 1/s, but is {rate!r}: make the inertias (`J_m`, "
+                "`J_s`, `J_l`) larger, or the stiffness, damping and friction that act on the lightest of them smaller"
+            )
         self._x = (real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6])
         self._mode = initial_mode(self._x, self._p, real[T_L])
         self._known = []

@@ -99,11 +99,17 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
 
 
 def block_variance(fit: Fit[Any], column: int, blocks: int) -> float:
-    """Return the variance of an unknown that blocks of the record show, over that of white one-step errors.
+    """Return :func:`block_variance_along` of one unknown."""
+    return block_variance_along(fit, np.eye(fit.free.size)[column], blocks)
 
-    It is one where it is no more than chance makes it. Godambe's information from blocks (White 1982; Kuensch 1989):
-    rounding, errors of the model and of the log's times make errors that hang together within a block, which the
-    Fisher information does not know. Student's distribution makes up for the number of blocks.
+
+def block_variance_along(fit: Fit[Any], slope: Array, blocks: int) -> float:
+    """Return the variance of a value that blocks of the record show, over that of white one-step errors.
+
+    ``slope`` (k,) is the derivative of the value by the free unknowns. The result is one where it is no more than
+    chance makes it. Godambe's information from blocks (White 1982; Kuensch 1989): rounding, errors of the model and of
+    the log's times make errors that hang together within a block, which the Fisher information does not know. Student's
+    distribution makes up for the number of blocks.
     """
     from scipy.special import gammaincinv, stdtrit
 
@@ -113,10 +119,9 @@ def block_variance(fit: Fit[Any], column: int, blocks: int) -> float:
     lower, upper = fit.likelihood.problem.bounds(fit.free)
     values = fit.point.theta[fit.free]
     inside = (lower < values) & (values < upper)
-    inside[column] = True
-    weights = np.where(inside, fit.covariance[:, column], 0.0)  # what is held at its bound carries no error on
+    weights = np.where(inside | (slope != 0.0), fit.covariance @ slope, 0.0)  # what is held at its bound carries none
     variance = float(np.sum((sums @ weights) ** 2)) * blocks / (blocks - 1.0)
-    ratio = variance / max(float(fit.covariance[column, column]), 1e-300)
+    ratio = variance / max(float(slope @ fit.covariance @ slope), 1e-300)
     if not ratio > 2.0 * float(gammaincinv(0.5 * (blocks - 1), 0.975)) / (blocks - 1.0):
         return 1.0
     return ratio * (float(stdtrit(blocks - 1, 0.975)) / NORMAL_95) ** 2

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from orchestrator.building.translation.kernel_arrays import plain_array
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.cli import main
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
-from orchestrator.estimation.stages.fit import fit_stages
+from orchestrator.estimation.stages.fit import fit_stages, look_nearby, move_share
 from orchestrator.estimation.stages.likelihood import StagesLikelihood
 from orchestrator.estimation.stages.location import locate
 from orchestrator.estimation.stages.motion import VALUES
@@ -184,6 +185,43 @@ def test_the_stage_is_named_and_its_gap_measured(tmp_path, halves, answer):
     assert all(found.behind[other] > 20.0 for other in ("1", "2", "both") if other != answer)
 
 
+def test_the_intervals_of_both_hold_every_optimum_that_is_about_as_good(tmp_path):
+    effects = {"alpha_1": 0.014, "alpha_2": 0.008} | FRICTION
+    likelihood, _ = likelihood_of(tmp_path, effects, 11, 0.2, torque=25.0)
+    fits = fit_stages(likelihood, DEFAULT_SETTINGS.stages, lambda what, share: None)
+    own = locate(replace(fits, shared=()), DEFAULT_SETTINGS.stages)
+    assert own.answers == ("both",)
+    theta = fits.free.point.theta.copy()
+    theta[likelihood.problem.index(SHARE)] += 0.2
+    ratio = likelihood.value(theta, "i_2")
+    for behind, held in ((2.0, True), (30.0, False)):  # of the objective
+        point = replace(fits.free.point, theta=theta, objective=fits.free.point.objective + behind)
+        other = replace(fits.free, point=point)
+        found = locate(replace(fits, shared=(other,)), DEFAULT_SETTINGS.stages)
+        assert [gap.alpha for gap in found.stages] == [gap.alpha for gap in own.stages]
+        for n, half in enumerate(likelihood.halves(theta)):
+            assert (found.stages[n].interval[0] <= half <= found.stages[n].interval[1]) == held
+            assert found.stages[n].interval[0] <= own.stages[n].interval[0]
+            assert found.stages[n].interval[1] >= own.stages[n].interval[1]
+    assert abs(own.total.alpha - (0.014 / ratio + 0.008)) < 1e-3
+
+
+def test_a_fit_at_a_wrong_share_finds_a_better_one_nearby(tmp_path):
+    """All else moves with the share: with the share alone moved, no point is as good."""
+    effects = {"alpha_1": 0.014, "alpha_2": 0.008} | FRICTION
+    likelihood, _ = likelihood_of(tmp_path, effects, 11, 0.2, torque=25.0)
+    best = fit_stages(likelihood, DEFAULT_SETTINGS.stages, lambda what, share: None).free
+    place = likelihood.problem.index(SHARE)
+    column = list(best.free).index(place)
+    away = 3.0 * math.sqrt(best.covariance[column, column])
+    (moved,) = move_share(best, [away])
+    assert math.isclose(moved.theta[place], best.point.theta[place] + away)
+    alone = best.point.theta.copy()
+    alone[place] += away
+    assert moved.objective < best.likelihood.at(alone).objective
+    assert look_nearby(replace(best, point=moved)).objective < moved.objective
+
+
 def test_a_light_intermediate_shaft_leaves_a_set_that_holds_the_truth(tmp_path):
     likelihood, _ = likelihood_of(tmp_path, {"alpha_2": 0.008} | FRICTION, 23, 0.01)
     found = locate(fit_stages(likelihood, DEFAULT_SETTINGS.stages, lambda what, share: None), DEFAULT_SETTINGS.stages)
@@ -283,6 +321,11 @@ def test_exchanged_columns_and_degrees_are_refused(place, tmp_path):
     table = np.genfromtxt(place / "record.csv", delimiter=",", names=True)
     columns = {name: table[name] for name in table.dtype.names}
     model = oc.read_model(place / "train.toml")
+    assert np.ptp(columns["theta_l"]) < 2.0, "as the motor's angle it is a small travel"
+    exchanged = columns | {"theta_m": columns["theta_l"], "theta_l": columns["theta_m"]}
     degrees = columns | {"theta_l": np.degrees(columns["theta_l"])}
-    with pytest.raises(oc.RecordError, match="theta_l"):
-        oc.locate_gap(record_from_columns(degrees, "degrees"), model)
+    fast = columns | {"theta_m": np.degrees(columns["theta_m"])}
+    wrong = {"to be exchanged": exchanged, "`theta_l` must be in radians": degrees, "`theta_m` must be": fast}
+    for said, given in wrong.items():
+        with pytest.raises(oc.RecordError, match=said):
+            oc.locate_gap(record_from_columns(given, "wrong"), model)

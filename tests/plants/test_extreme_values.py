@@ -44,6 +44,7 @@ TRAIN = (
     {"J_s": 1e-9, "effects.coulomb_friction.shaft.torque": 1e12},
     {"effects.coulomb_friction.load.torque": 1e-12},
 )
+TOO_FAST = "the fastest rate of the train must be at most 1e7 1/s"
 REASONS = ("must be one that can be resolved", "must stay finite", "must stay within 1e13 rad")
 
 
@@ -60,7 +61,7 @@ def stepped(slave, values, inputs, model=None):
     slave.enter_initialization_mode()
     slave.set_real([references[name] for name in inputs], list(inputs.values()))
     slave.exit_initialization_mode()
-    for n in range(STEPS):
+    for n in range(0 if said else STEPS):
         if not slave.do_step(n * STEP, STEP):
             break
         outputs = slave.get_real(read)
@@ -102,7 +103,18 @@ def test_so_does_an_axis(values, torque):
 @pytest.mark.parametrize("values", TRAIN, ids="-".join)
 def test_so_do_two_stages(values, torque):
     said = stepped(TwoStageTrain(instance_name="a"), values, {"u": torque, "T_l": 0.5 * torque})
-    assert all(any(reason in text for reason in REASONS) for text in said), said
+    assert all(any(reason in text for reason in (*REASONS, TOO_FAST)) for text in said), said
+
+
+@pytest.mark.parametrize(("inertia", "begins"), [(1e-9, False), (1e-6, True)])
+def test_a_train_that_is_too_stiff_at_any_step_does_not_begin(inertia, begins):
+    """Else a host that shortens the steps that are discarded takes hours for a second."""
+    said = stepped(TwoStageTrain(instance_name="a"), {"J_s": inertia}, {"u": 0.0, "T_l": 0.0})
+    assert begins == (not any(TOO_FAST in text for text in said))
+    if not begins:
+        (text,) = said
+        assert text.startswith("fmi2ExitInitializationMode")
+        assert "make the inertias (`J_m`, `J_s`, `J_l`) larger" in text
 
 
 def test_a_stiff_shaft_without_effects_is_exact_and_not_refused(work):

@@ -27,6 +27,8 @@ COARSE, MIDDLE, FINE = 0.3, (0.1, 0.03), 0.01  # torque noise at the motor [N.m.
 USUAL = 20.0
 QUIET = 0.2  # torque noise of the intermediate shaft over that of the motor, for its inertia
 PLACES = (-1.0, 0.0, 1.0)  # of the intermediate shaft within the first gap at the first row, in half-gaps
+SHARES_BETWEEN = 13  # that a rough fit of both tries
+SHARES_NEARBY, NEARBY = 24, 6.0  # that a fit tries about its own, to so many standard deviations of it
 NOISE_STEPS = (-3.0, -1.0, 1.0)  # of a logarithm
 
 StagesFit = Fit[StagesLikelihood]
@@ -35,12 +37,17 @@ Report = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class StageFits:
-    """The best fit under each answer; ``free`` is at least as good as all others."""
+    """The best fit under each answer; ``free`` is at least as good as all others.
+
+    Attributes:
+        shared: every optimum with a gap in both stages that was found.
+    """
 
     first: StagesFit
     second: StagesFit
     both: StagesFit
     free: StagesFit
+    shared: tuple[StagesFit, ...]
 
 
 def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Report) -> StageFits:
@@ -49,8 +56,10 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
     coarse = _fit_size(likelihood)
     report("fitting a gap in both stages", 0.15)
     floating = _bound_share(likelihood, settings.shared)
-    start = min(_try_shares(coarse.likelihood, coarse.point.theta, SHARES), key=_objective).theta
-    both = _fit_both(floating, start, FINE)
+    first, second, *_ = sorted(_try_shares(coarse.likelihood, coarse.point.theta, SHARES), key=_objective)
+    both = _fit_both(floating, first.theta, (*MIDDLE, FINE))
+    found = [both]
+    others = [(first.theta, (FINE,)), (second.theta, (*MIDDLE, FINE))]
     singles = []
     for share, done in ((0.0, 0.5), (1.0, 0.7)):
         report(f"fitting a gap in stage {1 + round(share)} alone", done)
@@ -59,13 +68,20 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
         singles.append(_finish(coarse.likelihood, min(tried, key=_objective), _all_but(likelihood, SHARE)))
     report("fitting the share of each stage", 0.8)
     if 0.5 * (both.point.objective - _better(*singles).point.objective) < settings.hopeless:
-        both = _better(both, _fit_both(floating, _renew(both), FINE))
+        found.append(_fit_both(floating, _renew(both), (FINE,)))
+        both = _better(*found)
     free = _free(likelihood, both, *singles)
-    for n in range(settings.starts):
-        if not settings.shared < _share(free) < 1.0 - settings.shared or _scatter(free) < settings.restless:
+    for _ in range(settings.starts):
+        if not settings.shared < _share(free) < 1.0 - settings.shared:
             break
-        both = _better(both, _fit_both(floating, _renew(free), (FINE, MIDDLE[-1])[n % 2]))
-        free = _better(free, _free(likelihood, both))
+        nearby = look_nearby(free)
+        if nearby.objective < free.point.objective:
+            found.append(maximise(free.likelihood, nearby.theta, free.free, 15, 0.1))
+        elif not others or _scatter(free) < settings.restless:
+            break
+        else:
+            found.append(_free(likelihood, _fit_both(floating, *others.pop(0))))
+        free = _better(free, found[-1])
     for n, share in enumerate((0.0, 1.0)):  # what the free fit has learnt, the nearest single one should know
         if abs(_share(free) - share) < settings.shared:
             singles[n] = _better(singles[n], _fit_at(free, share))
@@ -73,11 +89,12 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
         free = _free(likelihood, both, *singles)
     if settings.shared <= _share(free) <= 1.0 - settings.shared:
         both = _better(both, free)
+        found.append(free)
         # An excluded single gap must have had the same chances.
         singles = [
             _begin_anew(one, free, share, settings.hopeless) for one, share in zip(singles, (0.0, 1.0), strict=True)
         ]
-    return StageFits(singles[0], singles[1], both, free)
+    return StageFits(singles[0], singles[1], both, free, tuple(found))
 
 
 def _begin_anew(single: StagesFit, free: StagesFit, share: float, hopeless: float) -> StagesFit:
@@ -186,16 +203,53 @@ def _try_shares(likelihood: StagesLikelihood, theta: Array, shares: Iterable[flo
     return found
 
 
-def _fit_both(likelihood: StagesLikelihood, start: Array, level: float) -> StagesFit:
-    """Return the fit of a gap in both stages, begun with torque noise of a level."""
-    place = likelihood.problem.index(SHARE)
-    bounds = likelihood.problem.unknowns[place]
-    shares = [share for share in SHARES if bounds.lower <= share <= bounds.upper]
-    theta = with_noise(likelihood, start, level)
-    theta[place] = min(max(theta[place], bounds.lower), bounds.upper)
-    rough = maximise(likelihood, theta, _all_but(likelihood, "torque"), 4, tolerance=1.0)
-    tried = [*_try_shares(rough.likelihood, rough.point.theta, shares), rough.point]
-    return _finish(rough.likelihood, min(tried, key=_objective), _all_but(likelihood))
+def _fit_both(likelihood: StagesLikelihood, start: Array, levels: Sequence[float]) -> StagesFit:
+    """Return the fit of a gap in both stages; the torque noise goes down levels for as long as that pays."""
+    best = None
+    theta = np.clip(start, *likelihood.problem.bounds(range(start.size)))
+    for level in levels:
+        rough = maximise(
+            likelihood, with_noise(likelihood, theta, level), _all_but(likelihood, "torque"), 4, tolerance=1.0
+        )
+        moved = min(_follow_share(rough), key=_objective)
+        if best is not None and moved.objective > best.objective:
+            break
+        best, theta, likelihood = moved, moved.theta, rough.likelihood
+    assert best is not None
+    return _finish(likelihood, best, _all_but(likelihood))
+
+
+def _follow_share(fit: StagesFit) -> list[Point]:
+    """Return the likelihood of a fit and along the share, once with all else as it is and once moved with it."""
+    place = fit.likelihood.problem.index(SHARE)
+    low, high = (float(bound[0]) for bound in fit.likelihood.problem.bounds([place]))
+    shares = np.linspace(low, high, SHARES_BETWEEN)
+    alone = []
+    for share in shares:
+        theta = fit.point.theta.copy()
+        theta[place] = share
+        alone.append(fit.likelihood.at(theta))
+    return [fit.point, *alone, *move_share(fit, shares - fit.point.theta[place])]
+
+
+def look_nearby(fit: StagesFit) -> Point:
+    """Return the best point at shares near that of a fit."""
+    column = list(fit.free).index(fit.likelihood.problem.index(SHARE))
+    away = np.linspace(-NEARBY, NEARBY, SHARES_NEARBY) * math.sqrt(fit.covariance[column, column])
+    return min(move_share(fit, away), key=_objective)
+
+
+def move_share(fit: StagesFit, away: Iterable[float]) -> list[Point]:
+    """Return the likelihood at other shares, all other unknowns moved as the information of a fit says."""
+    column = list(fit.free).index(fit.likelihood.problem.index(SHARE))
+    slope = fit.covariance[:, column] / fit.covariance[column, column]
+    low, high = fit.likelihood.problem.bounds(fit.free)
+    found = []
+    for step in away:
+        moved = fit.point.theta.copy()
+        moved[fit.free] = np.clip(moved[fit.free] + slope * step, low, high)
+        found.append(fit.likelihood.at(moved))
+    return found
 
 
 def _fit_at(fit: StagesFit, share: float) -> StagesFit:

@@ -6,13 +6,14 @@ stage has a notable share of the gap. What is left is the answer, a set where th
 """
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.estimation.description import autocorrelation, block_variance
+from orchestrator.estimation.description import autocorrelation, block_variance, block_variance_along
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.settings import StageSettings
 from orchestrator.estimation.stages.fit import StageFits, StagesFit
@@ -80,11 +81,15 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
     scatter = min(_scatter(fits.free), settings.most_scatter)
     factors = {FIRST: settings.misfit_widening, SECOND: settings.misfit_widening, BOTH: settings.widening_of_both}
     wider = {name: max(factor**2, scatter) for name, factor in factors.items()}
+    if BOTH in answers:
+        wider[BOTH] = max(wider[BOTH], min(_scatter_of_stages(fits.both), settings.most_scatter))
     ways = {FIRST: fits.first, SECOND: fits.second, BOTH: fits.both}
     within = settings.shared <= share <= 1.0 - settings.shared
     if BOTH in answers and (within or behind[BOTH] > settings.decisive):
         ways[BOTH] = fits.free
-    sizes = [_sizes(ways[answer], wider[answer]) for answer in answers]
+    sizes = [_sizes(ways[answer], wider[answer]) for answer in answers if answer != BOTH]
+    if BOTH in answers:
+        sizes.append(_sizes_of_all(ways[BOTH], fits.shared, wider[BOTH]))
     nearest = min(answers, key=lambda answer: ways[answer].point.objective)
     best, total = ways[nearest], _total(ways[nearest], wider[nearest])
     stages = [_join([each[n] for each in sizes]) for n in range(2)]
@@ -145,6 +150,12 @@ def _scatter(fit: StagesFit) -> float:
     return block_variance(fit, column, fit.likelihood.settings.verdict.blocks)
 
 
+def _scatter_of_stages(fit: StagesFit) -> float:
+    """Return the same of the stages' own half-gaps, whichever is more."""
+    blocks = fit.likelihood.settings.verdict.blocks
+    return max(block_variance_along(fit, slope, blocks) for slope in _gradients(fit)[1])
+
+
 def _gradients(fit: StagesFit) -> tuple[Array, Array]:
     """Return both half-gaps (2,) [rad] and their derivatives by the free unknowns (2, k)."""
     likelihood, theta = fit.likelihood, fit.point.theta
@@ -169,6 +180,17 @@ def _sizes(fit: StagesFit, wider: float) -> tuple[StageGap, StageGap]:
     first, second = (
         StageGap(float(value), (max(float(value - half), 0.0), min(float(value + half), float(end))))
         for value, half, end in zip(values, reach, most, strict=True)
+    )
+    return first, second
+
+
+def _sizes_of_all(best: StagesFit, found: Sequence[StagesFit], wider: float) -> tuple[StageGap, StageGap]:
+    """Return the half-gap of each stage by the best fit; the intervals hold those of all that are about as good."""
+    limit = best.point.objective + NORMAL_95**2 * wider
+    alike = [_sizes(fit, wider) for fit in found if fit.point.objective <= limit]
+    first, second = (
+        replace(own, interval=_join([own, *(each[n] for each in alike)]).interval)
+        for n, own in enumerate(_sizes(best, wider))
     )
     return first, second
 

@@ -235,9 +235,7 @@ def propagate(
     _cross(mats, b_u, b_1, normals, halves, h, motor, load, x, total, end, first, second)
 
 
-def _expand(
-    a: Matrix, b_u: Inputs, b_1: Vector, motor: float, load: float, h: float, x: Vector, series: Series
-) -> int:
+def _expand(a: Matrix, b_u: Inputs, b_1: Vector, motor: float, load: float, h: float, x: Vector, series: Series) -> int:
     """Fill the power series of ``x`` in time over ``h``, of which it returns the last term that counts."""
     for r in range(6):
         series[0, r] = x[r]
