@@ -84,6 +84,11 @@ class LocationResult(PlottedResult):
         where, low = self.location.answer, self.location.total.interval[1]
         if not self.answers:
             return f"No gap is seen: with 95 % confidence both half-gaps together are below {low:.3g} rad at the load."
+        if not self.location.explained:
+            return (
+                "The model does not explain the record, so that no stage is named: check the units and signs of `u`, "
+                "`theta_m` and `theta_l`, and the inertias of the model file."
+            )
         if len(self.answers) == 1:
             return f"The gap is in {where}."
         return (

@@ -82,7 +82,7 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
         "measurement_noise": list(likelihood.noise(fit.point.theta).measured[: white.shape[1]]),
     }
     visible, message = _verdict(alpha, low, high, traversals)
-    still = _stillness_note(problem.outputs, likelihood.noise(fit.point.theta).measured, settings)
+    still = stillness_note(problem.outputs, likelihood.noise(fit.point.theta).measured, settings)
     message = still or message
     if "cannot be seen" in message:  # then no number is an answer
         visible, alpha, error, low, high = False, math.nan, math.inf, 0.0, math.inf
@@ -150,7 +150,7 @@ def _verdict(alpha: float, low: float, high: float, traversals: int) -> tuple[bo
     return False, "the gap cannot be seen: every size fits the record; `design` proposes an excitation"
 
 
-def _stillness_note(outputs: Array, noise: tuple[float, float], settings: GapVerdictSettings) -> str:
+def stillness_note(outputs: Array, noise: tuple[float, float], settings: GapVerdictSettings) -> str:
     """Return the sentence that says which side does not move beyond its noise, or nothing."""
     sides = (("motor", settings.least_travel_motor), ("load", settings.least_travel_load))
     for n, (name, least) in enumerate(sides[: outputs.shape[1]]):

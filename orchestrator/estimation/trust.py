@@ -42,7 +42,10 @@ def trust_of_location(location: Location, record: Record, model: Model, settings
         if not location.converged:
             yield Reason(Level.AMBER, "the fit stopped before it converged")
         if not location.explained:
-            yield Reason(Level.AMBER, "the model does not explain the record: its torque noise is too large")
+            yield Reason(
+                Level.AMBER,
+                "the model does not explain the record: the torque noise or the size of the best fit is too large",
+            )
         if location.answers and location.traversals < settings.trust.least_traversals:
             yield Reason(Level.AMBER, f"the gap is traversed only {_times(location.traversals)}")
         if record.u_sampled is not None:

@@ -329,3 +329,20 @@ def test_exchanged_columns_and_degrees_are_refused(place, tmp_path):
     for said, given in wrong.items():
         with pytest.raises(oc.RecordError, match=said):
             oc.locate_gap(record_from_columns(given, "wrong"), model)
+
+
+def test_a_record_at_rest_is_refused_with_what_it_lacks(tmp_path):
+    columns, _ = make_two_stage_record({"alpha_2": 0.015}, 4, share=0.2, duration=1.0, torque=1e-3)
+    with pytest.raises(oc.RecordError, match="the motor moves by only .* log a motion that reverses"):
+        oc.locate_gap(record_from_columns(columns, "rest"), oc.read_model(model_of(tmp_path, 0.2)))
+
+
+def test_of_angles_in_degrees_no_stage_is_named(place, tmp_path):
+    """Both are in degrees, so that the slope is right; what fits best is a gap of a radian."""
+    columns, _ = make_two_stage_record({"alpha_2": 0.015} | FRICTION, 23, share=0.2)
+    for name in ("theta_m", "theta_l"):
+        columns[name] = np.degrees(columns[name])
+    found = oc.locate_gap(record_from_columns(columns, "degrees"), oc.read_model(model_of(tmp_path, 0.2)))
+    assert found.answers == ("1", "2", "both")
+    assert not found.location.explained
+    assert found.message.startswith("The model does not explain the record, so that no stage is named: check the units")

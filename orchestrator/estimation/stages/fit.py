@@ -76,7 +76,7 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
             break
         nearby = look_nearby(free)
         if nearby.objective < free.point.objective:
-            found.append(maximise(free.likelihood, nearby.theta, free.free, 15, 0.1))
+            found.append(maximise(free.likelihood, nearby.theta, list(free.free), 15, 0.1))
         elif not others or _scatter(free) < settings.restless:
             break
         else:

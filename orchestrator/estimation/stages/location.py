@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from orchestrator.estimation.description import autocorrelation, block_variance, block_variance_along
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.settings import StageSettings
-from orchestrator.estimation.stages.fit import StageFits, StagesFit
+from orchestrator.estimation.stages.fit import GRID, StageFits, StagesFit
 from orchestrator.estimation.stages.problem import BODIES, SHARE, TOTAL
 from orchestrator.shared.inference.normal import NORMAL_95
 
@@ -42,7 +42,8 @@ class Location:
         stages: half-gap of each stage, at its gear's output.
         behind: by how much log-likelihood the best fit of each answer falls behind the best of all.
         converged: whether the free fit did.
-        explained: whether the torque noise of the free fit is as little as that of a right model.
+        explained: whether the torque noise of the free fit is as little as that of a right model, and its size one that
+            is looked for.
         traversals: changes of flank of either stage.
         autocorrelation: of the one-step errors of motor and load encoder.
         parameters: value, standard error and nominal of each fitted unknown.
@@ -74,9 +75,10 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         for name, fit in ((FIRST, fits.first), (SECOND, fits.second), (BOTH, fits.both))
     }
     share = float(fits.free.point.theta[fits.free.likelihood.problem.index(SHARE)])
-    noise = _torque_noise(fits.free)
+    size = float(fits.free.point.theta[fits.free.likelihood.problem.index(TOTAL)])
+    explained = _torque_noise(fits.free) <= settings.unexplained and size <= GRID[-1]
     answers = _possible_answers(behind, share, settings)
-    if noise > settings.unexplained:  # how far such fits are apart says nothing
+    if not explained:  # how far such fits are apart says nothing
         answers = [FIRST, SECOND, BOTH]
     scatter = min(_scatter(fits.free), settings.most_scatter)
     factors = {FIRST: settings.misfit_widening, SECOND: settings.misfit_widening, BOTH: settings.widening_of_both}
@@ -107,7 +109,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         (stages[0], stages[1]),
         behind,
         fits.free.converged,
-        noise <= settings.unexplained,
+        explained,
         traversals,
         (autocorrelation(white[:, 0]), autocorrelation(white[:, 1])),
         _parameters(best),
