@@ -333,7 +333,7 @@ def test_exchanged_columns_and_degrees_are_refused(place, tmp_path):
 
 def test_a_record_at_rest_is_refused_with_what_it_lacks(tmp_path):
     columns, _ = make_two_stage_record({"alpha_2": 0.015}, 4, share=0.2, duration=1.0, torque=1e-3)
-    with pytest.raises(oc.RecordError, match="the motor moves by only .* log a motion that reverses"):
+    with pytest.raises(oc.RecordError, match=r"the motor moves by only .* log a motion that reverses"):
         oc.locate_gap(record_from_columns(columns, "rest"), oc.read_model(model_of(tmp_path, 0.2)))
 
 

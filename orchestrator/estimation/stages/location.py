@@ -186,10 +186,10 @@ def _sizes(fit: StagesFit, wider: float) -> tuple[StageGap, StageGap]:
     return first, second
 
 
-def _sizes_of_all(best: StagesFit, found: Sequence[StagesFit], wider: float) -> tuple[StageGap, StageGap]:
+def _sizes_of_all(best: StagesFit, optima: Sequence[StagesFit], wider: float) -> tuple[StageGap, StageGap]:
     """Return the half-gap of each stage by the best fit; the intervals hold those of all that are about as good."""
     limit = best.point.objective + NORMAL_95**2 * wider
-    alike = [_sizes(fit, wider) for fit in found if fit.point.objective <= limit]
+    alike = [_sizes(fit, wider) for fit in optima if fit.point.objective <= limit]
     first, second = (
         replace(own, interval=_join([own, *(each[n] for each in alike)]).interval)
         for n, own in enumerate(_sizes(best, wider))
