@@ -207,6 +207,22 @@ def stock(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "Drivetrain.fmu"
 
 
+# In processes of their own: at each instance PythonFMU's library drops a reference to the module's names too many.
+STEPS = """
+import sys
+from pathlib import Path
+from tests.support.fmu_calls import RawFmu
+raw = RawFmu(Path(sys.argv[1]))
+c = raw.started(alpha=0.02)
+early, statuses = raw.step(c, 0.5, 1e-3), set()
+for n in range(200):
+    raw.set_real(c, ["u"], [30.0])
+    statuses.add(raw.step(c, n * 1e-3, 1e-3))
+print([early, *statuses], raw.get_real(c, ["theta_m", "theta_l", "T_shaft"]))
+raw.library.fmi2FreeInstance(c)
+"""
+
+
 def test_without_a_compiler_the_fmu_still_refuses_and_runs_in_python_hosts(stock: Path, fmus: dict[str, Path]) -> None:
     with zipfile.ZipFile(stock) as archive:
         assert len([name for name in archive.namelist() if name.startswith("binaries/linux64")]) == 1
@@ -221,15 +237,11 @@ def test_without_a_compiler_the_fmu_still_refuses_and_runs_in_python_hosts(stock
     )
     assert (run.returncode, run.stdout) == (0, "alive None\n"), run.stderr[-500:]
     ends = []
-    for raw in (RawFmu(stock), RawFmu(fmus["Drivetrain"])):
-        c = raw.started(alpha=0.02)
-        assert raw.step(c, 0.5, 1e-3) == DISCARD
-        for n in range(200):
-            raw.set_real(c, ["u"], [30.0])
-            assert raw.step(c, n * 1e-3, 1e-3) == OK
-        ends.append(raw.get_real(c, ["theta_m", "theta_l", "T_shaft"]))
-        raw.library.fmi2FreeInstance(c)
+    for path in (stock, fmus["Drivetrain"]):
+        words = [sys.executable, "-c", STEPS, str(path)]
+        ends.append(subprocess.run(words, cwd=root, capture_output=True, text=True, timeout=HANGS, check=True).stdout)
     assert ends[0] == ends[1]
+    assert ends[0].startswith(f"[{DISCARD}, {OK}] ")
 
 
 # --- Hosts without Python ----------------------------------------------------------------------------------------

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from orchestrator.fmi.farewell import ends_cleanly
+
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 _LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 
@@ -44,6 +46,7 @@ class RawFmu:
         component = self.library.fmi2Instantiate(
             b"instance", 1, (guid or self.guid).encode(), uri.encode(), ctypes.byref(self._callbacks), 0, 0
         )
+        ends_cleanly(self.folder / "binaries" / "linux64")  # or this process aborts now and then as it ends
         return None if component is None else ctypes.c_void_p(component)
 
     def started(self, **reals: float) -> ctypes.c_void_p:
