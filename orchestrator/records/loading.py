@@ -1,5 +1,6 @@
 """From an opened file to the columns of a record in SI: which channels, which units, which time."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -251,7 +252,10 @@ def _time(
     raw = values[choice.place]
     if column.rate is not None and not _are_sample_numbers(raw):
         _refuse_broken(source, path)
+        said = _rate_of(raw, column, source.heads[choice.place].unit)
+        differs = math.isfinite(said) and abs(said / column.rate - 1.0) > 0.01
         spoken = f"time from the row and {column.rate:.12g} Hz, `{label}` not used"
+        spoken += f" though it says {said:.6g} Hz" if differs else ""
         return _Clock(np.arange(raw.size) / column.rate, spoken)
     if raw.dtype.kind == "M":
         return _Clock(seconds_of(raw, label, path), f"{label} as date and time")
@@ -272,6 +276,15 @@ def _time(
     first = float(numbers[np.isfinite(numbers)][0]) if np.isfinite(numbers).any() else 0.0
     start = first if abs(first * factor) > 1e6 else 0.0
     return _Clock(_scale(numbers, factor, -start * factor), f"{label} in {spoken or 's'}", factor, start)
+
+
+def _rate_of(raw: NDArray[Any], column: Column, written: str) -> float:
+    """Return the mean rate that stamps say [Hz]; NaN: none."""
+    stamps = raw[~np.isnat(raw)].astype("datetime64[ns]").astype(float) if raw.dtype.kind == "M" else raw
+    stamps = stamps[np.isfinite(stamps)].astype(float)
+    unit = parse_unit("ns" if raw.dtype.kind == "M" else column.unit or written, KINDS["time"])
+    away = float(stamps[-1] - stamps[0]) * (unit.factor if unit is not None else 1.0) if stamps.size > 1 else 0.0
+    return (stamps.size - 1) / away if away > 0.0 else math.nan
 
 
 def _time_alike(source: RecordSource, place: int, column: Column, clock: "_Clock", label: str, path: Path) -> Array:
@@ -339,6 +352,11 @@ def _convert(
     if unit is None and not written and not column.unit:
         spoken += " (no unit given)" if label != name else ""
     if unit is not None and unit.kind in ("speed", "velocity"):
+        if column.modulo is not None:
+            raise RecordError(
+                f"{path}: column `{label}` is a speed, but `[columns.{name}] modulo` is for an angle: leave it out in "
+                "the model file (`model`)"
+            )
         if time.size != values.size:
             raise RecordError(f"{path}: column `{label}` must have the rows of the time, but has {values.size}")
         steps = np.diff(time, prepend=time[0] - float(np.nanmedian(np.diff(time))))

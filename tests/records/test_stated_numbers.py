@@ -135,3 +135,23 @@ def test_rows_with_thousands_separators_are_not_left_out(first: str, tmp_path: P
     path.write_text("time [ms],u,theta_m\n" + "".join(rows), encoding="utf-8")
     with pytest.raises(RecordError, match=r"row 501, column `time .ms.` must be a number"):
         read_record(path)
+
+
+@pytest.mark.parametrize(("stamps", "rate", "said"), [
+    (TIME, 500.0, ""), (np.floor(TIME * 100.0) / 100.0, 500.0, ""), (TIME, 1000.0, "though it says 500 Hz"),
+    (TIME * 2.0, 500.0, "though it says 250 Hz"), (np.zeros(ROWS), 500.0, ""),
+])  # fmt: skip
+def test_a_rate_that_contradicts_the_stamps_is_told(stamps: np.ndarray, rate: float, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    table = np.column_stack([stamps, TORQUE, ANGLE])
+    np.savetxt(path, table, delimiter=",", header="time,u,theta_m", comments="", fmt="%.12g")
+    notes = " ".join(read_record(path, {"time": Column(rate=rate)}).notes)
+    assert f"time from the row and {rate:g} Hz, `time` not used" in notes
+
+    assert (" though" in notes) == bool(said)
+    assert said in notes
+
+
+def test_a_speed_has_no_modulo(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match=r"is a speed, but `\[columns.theta_m\] modulo` is for an angle"):
+        _read(tmp_path, TORQUE, np.gradient(ANGLE, TIME), "u,theta_m [rad/s]", theta_m=Column(modulo=6.28))
