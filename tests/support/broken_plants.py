@@ -165,7 +165,7 @@ _TABLE = """
 2 3 | ME | nominals_others   | states.nominal-differs
 2 3 | ME | event_silent      | event.states-changed
 2 3 | ME | event_jump        | event.states-changed
-2 3 | ME | -                 | event.reinit    | attributes v=start="0" nominal="2"
+2 3 | ME | near_wall         | event.reinit    | attributes v=start="0" nominal="2"
 2 3 | CS ME | interfaces     | interfaces.differ
 2 3 | ME | small_ignored     | states.order
 2 3 | ME | rates_late        | states.rates

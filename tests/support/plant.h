@@ -15,7 +15,7 @@
 #define FAULT ""
 #endif
 #define IS(name) (!strcmp(FAULT, #name))
-#define WALL (-0.2)
+#define WALL (IS(event_silent) || IS(near_wall) ? -0.15 : -0.2)
 enum { U = 1, W, K, D, C, X, V, DX, DV, Y, Z, TIME, Q, E, DQ, P, YS, R, I = 20, M, J, O, G, B = 30, ON, SW, L = 40, T, BLOB = 50, N, TICK = 60, CC, CU, Z0 = 70, Z1, Z2 };
 enum { INSTANTIATED, CONFIGURATION, INITIALISATION, EVENT, CONTINUOUS, STEP, TERMINATED };
 enum { SIZE = 8 };
