@@ -18,7 +18,7 @@ from tools import refuse_arguments
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 WIDTH, HEIGHT = 1100, 900
 COLOURS = 64
-CHOICES = "sessionStorage.setItem('workbench', JSON.stringify(arguments[0])); location.reload()"
+CHOICES = "sessionStorage.setItem('workbench', JSON.stringify(arguments[0]))"
 
 
 def main() -> None:
@@ -30,8 +30,9 @@ def main() -> None:
         inspected = served.wait(served.start("inspect", [log], model=model))["name"]
         machine = f"results/{inspected}/model.toml"
         set_screen(driver, WIDTH, HEIGHT, "light")
-        driver.get(served.address)
+        driver.get(f"{served.address}state")  # of the same origin, and no page that keeps choices of its own
         driver.execute_script(CHOICES, {"log": log, "model": machine, "columns": columns, "header": None})
+        driver.get(served.address)
         _wait(driver, "#panel-log .card")
         _save(driver, "log", 980)
         _tab(driver, "machine", "#panel-machine td")
