@@ -95,8 +95,8 @@ def where_it_acts(problem: FitProblem, point: ModelPoint, label: str) -> tuple[f
         stretches = np.append(stretches, np.bincount(begins[acts], own[body][acts] ** 2))
     if not here.size or not elsewhere.size:
         return 0.0, False
-    excess = np.mean(here**2) - LOUDER * np.mean(elsewhere**2)
-    share = float(np.sqrt(max(excess, 0.0) / np.mean(own_here**2)))
+    excess = float(np.mean(here**2)) - LOUDER * float(np.mean(elsewhere**2))
+    share = float(np.sqrt(max(excess, 0.0) / float(np.mean(own_here**2))))
     return share, bool(stretches.max() > ONE_STRETCH * stretches.sum())
 
 
