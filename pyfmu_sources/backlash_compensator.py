@@ -40,7 +40,7 @@ DEAD_BAND = 2.0  # margins, within which the load is where it should be
 REFERENCE_LAG = 0.25  # of a crossing: time constant of the reference's acceleration; steps of its speed last so long
 PER_CROSSING = 5.0  # poles of the feedback times the duration of a crossing
 PER_SAMPLE = 0.085  # largest poles of the feedback times the sample time
-BARRED = 0.25  # of the half-gap, by which a way that stands still is behind its line: a flank is where none is known
+BARRED = 0.75  # of the half-gap, by which a way that stands still is behind its line: a flank is where none is known
 TURNING = 2  # samples before the end of a plan's first part, from which it is too late to turn back
 
 

@@ -95,7 +95,7 @@ def test_teeth_that_may_not_touch_yet_are_approached_further():
 def test_a_flank_in_front_of_the_interval_makes_it_the_plain_lqr_until_the_teeth_part():
     """A half-gap that is told too wide would push on and on: the load ran away."""
     x = (3.984 * 0.010, 0.0, 0.0, 0.0, 0.0, 0.0)
-    state = standing(CROSS, 1, 0.0, 1, go_on(0.016, 0.1, 255.0))
+    state = standing(CROSS, 1, 0.0, 1, go_on(0.026, 0.1, 255.0))
     for way, phase in ((0.010, PLAIN), (0.012, PLAIN), (-0.001, CROSS), (0.012, CROSS)):
         x = (3.984 * way, 0.0, 0.0, 0.0, 0.0, 0.0)
         state, u = act(state, 0.1, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
@@ -106,7 +106,7 @@ def test_a_flank_in_front_of_the_interval_makes_it_the_plain_lqr_until_the_teeth
 
 def test_a_flank_within_the_interval_is_held():
     x = (3.984 * 0.015, 0.0, 0.0, 0.0, 0.0, 0.0)
-    state = standing(CROSS, 1, 0.0, 1, go_on(0.021, 0.1, 255.0))
+    state = standing(CROSS, 1, 0.0, 1, go_on(0.031, 0.1, 255.0))
     state, _ = act(state, 0.1, 0.0, x, Gap(0.02, 3e-3), GAINS, TRAIN, TUNING)
     assert state.phase == HOLD
 
