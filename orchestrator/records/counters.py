@@ -84,7 +84,8 @@ def _sign_bit(good: Array) -> float | None:
 def check_whole(values: Array, name: str, label: str, source: str) -> None:
     """Refuse whole numbers for an angle in rad: no encoder is that coarse, so they are counts or degrees."""
     good = values[np.isfinite(values)]
-    if good.size and np.ptp(good) > 2.0 and np.all(good == np.rint(good)):
+    # From 2**53 on all numbers are whole.
+    if good.size and 2.0 < np.ptp(good) < 2.0**53 and np.all(good == np.rint(good)):
         raise RecordError(
             f"{source}: column `{label}` must have a unit, as it holds whole numbers: say `[columns.{name}] unit = "
             f'"counts"` with `counts_per_rev = ...` (or "deg") in the model file (`model`)'
