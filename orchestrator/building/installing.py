@@ -40,7 +40,6 @@ LIBRARIES = (
     ("orchestrator.estimation.flanks.chain", False),
     (f"{_PLANTS}.linear", False),
     (f"{_PLANTS}.requests", False),
-    (f"{_PLANTS}.filters", False),
 )
 """Kernels of the package: modules, and whether their arithmetic is checked; those that compile longest come first."""
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.estimation.innovations import Array, NoiseLevels
-from orchestrator.plants.filters import rms_behind_lag
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
-from orchestrator.shared.inference.noise import robust_noise
+from orchestrator.shared.inference.noise import rms_behind_lag, robust_noise
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
 ALPHA = "alpha"

@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt, welch
 
 from orchestrator.diagnosis.settings import BandSettings
-from orchestrator.plants.filters import low_pass
 from orchestrator.records.arrays import interpolate_missing
 from orchestrator.records.record import Record
-from orchestrator.shared.inference.spectra import Trend, power_density
 
 Array = NDArray[np.float64]
 
@@ -84,8 +83,9 @@ def prepare_signals(
     measured, held = ~record.is_missing, True
     if factor > 1:
         centred = [np.append(u[:1], 0.5 * (u[1:] + u[:-1])) for u in torques]  # half a sample of the hold
-        torques = [low_pass(u, 0.8 / factor)[::factor] for u in centred]
-        angles = [low_pass(angle, 0.8 / factor)[::factor] for angle in angles]
+        low_pass = butter(6, 0.8 / factor, output="sos")
+        torques = [sosfiltfilt(low_pass, u)[::factor] for u in centred]
+        angles = [sosfiltfilt(low_pass, angle)[::factor] for angle in angles]
         rows = np.arange(0, count, factor)
         measured = np.array([measured[row : row + factor].all() for row in rows])
         step, held = step * factor, False
@@ -143,7 +143,7 @@ def coherent_band(torque: Array, angle: Array, step: float, inertia: float, sett
     excess = np.convolve(inertia**2 * acceleration, mean, "same") > settings.torque_excess * np.convolve(
         asked, mean, "same"
     )
-    fine, motion = power_density(angle, step, angle.size, "linear")
+    fine, motion = welch(angle, 1.0 / step, nperseg=angle.size, detrend="linear")
     excess &= frequencies > 4.0 * _share_below(motion, fine, 0.99)
     return float(frequencies[np.argmax(excess)]) if excess.any() else float(frequencies[-1])
 
@@ -203,11 +203,11 @@ def smooth(values: Array, step: float, frequency: float) -> Array:
     """
     if frequency * step > 0.4:
         return values
-    return low_pass(values, 2.0 * frequency * step)
+    return np.asarray(sosfiltfilt(butter(6, 2.0 * frequency * step, output="sos"), values))
 
 
-def _spectrum(values: Array, step: float, most: int, detrend: Trend = "") -> tuple[Array, Array]:
-    return power_density(values, step, min(values.size, most), detrend)
+def _spectrum(values: Array, step: float, most: int, detrend: str | bool = False) -> tuple[Array, Array]:
+    return welch(values, 1.0 / step, nperseg=min(values.size, most), detrend=detrend)
 
 
 def _share_below(power: Array, frequencies: Array, share: float) -> float:

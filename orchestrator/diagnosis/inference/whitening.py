@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.signal import csd, welch
 
 from orchestrator.diagnosis.model.interface import ResidualModel
 from orchestrator.diagnosis.settings import FitSettings
-from orchestrator.shared.inference.spectra import cross_density, density_frequencies
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -113,11 +113,11 @@ def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSett
     """Return the weights that residuals (channels, n) of a model ask for."""
     plain = band_only(model, settings)
     segment = min(model.size // 4, 1024)
-    frequencies = density_frequencies(model.step, segment)
+    frequencies = welch(residuals[0], 1.0 / model.step, nperseg=segment, detrend=False)[0]
     measured = np.empty((frequencies.size, len(residuals), len(residuals)), dtype=complex)
     for row, left in enumerate(residuals):
-        for column, right in enumerate(residuals):
-            measured[:, row, column] = cross_density(right, left, model.step, segment, "")
+        for column, right in enumerate(residuals):  # scipy's cross-spectrum conjugates its first signal
+            measured[:, row, column] = csd(right, left, 1.0 / model.step, nperseg=segment, detrend=False)[1]
     inside = np.array([(frequencies > 0) & (frequencies < max(c, 3 * frequencies[1])) for c in model.cutoffs])
     measurement, process = _most_likely_levels(model, frequencies, measured, inside, settings)
     if quiet:

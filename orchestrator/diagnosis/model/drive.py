@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import shift as shift_samples
+from scipy.signal import lfilter
 
 from orchestrator.diagnosis.data.signals import triangle_average
 from orchestrator.effects.of_logs import LEAD, SAMPLED
 from orchestrator.plants.description import Plant
-from orchestrator.plants.filters import first_order
 
 Array = NDArray[np.float64]
 SHORT_LAG = 0.3  # of a sample: a lag below it is a delay as long, which no triangle average tells from it
@@ -69,7 +69,7 @@ def hold_behind_lag(requests: Array, lag: float, step: float) -> Array:
     """
     ratio = step / lag
     decay = np.exp(-ratio)
-    state = first_order(requests, 0.0, 1.0 - decay, decay)
+    state = lfilter([0.0, 1.0 - decay], [1.0, -decay], requests)
     before, after = (ratio - 1.0 + decay) / ratio**2, (1.0 - decay * (1.0 + ratio)) / ratio**2
     rising = 0.5 * requests + (state - requests) * before
     falling = 0.5 * requests + (state - requests) * after
@@ -87,7 +87,7 @@ def apply_lag(values: Array, lag: float, step: float) -> Array:
     ratio = step / lag
     decay = np.exp(-ratio)
     now, before = 1.0 - (1.0 - decay) / ratio, (1.0 - decay) / ratio - decay
-    return first_order(values, now, before, decay, values[0] * (1.0 - now))
+    return np.asarray(lfilter([now, before], [1.0, -decay], values, zi=[values[0] * (1.0 - now)])[0])
 
 
 def shift_signal(values: Array, samples: float) -> Array:

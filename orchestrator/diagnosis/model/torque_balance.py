@@ -47,7 +47,6 @@ from orchestrator.effects.effect import SignalScales, rms
 from orchestrator.effects.of_logs import LEAD, SAMPLED, SHIFT
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-from orchestrator.shared.inference.spectra import power_density
 
 Array = NDArray[np.float64]
 SHORTEST = 1e-9  # rad: distance over which friction of a body that does not move builds up
@@ -316,10 +315,13 @@ class TorqueBalance(ResidualModel):
 
     def _encoder_levels(self) -> Array:
         """Return each encoder's noise (one-sided density), read where second differences are highest in frequency."""
+        from scipy.signal import welch
+
         levels = []
         for angle in self.signals.angles:
-            bend = np.diff(angle, 2) / self.step**2
-            frequencies, power = power_density(bend, self.step, min(self.size // 4, 1024), "")
+            frequencies, power = welch(
+                np.diff(angle, 2) / self.step**2, 1.0 / self.step, nperseg=min(self.size // 4, 1024), detrend=False
+            )
             top = frequencies > 0.6 * frequencies[-1]
             levels.append(np.median(power[top] / second_difference_gain(frequencies[top], self.step) ** 2))
         return np.array(levels)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.stats import t as student
 
 from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem
@@ -99,7 +99,7 @@ def value_covariance(fitted: FittedModel) -> Array:
 
 def interval_width(problem: FitProblem, level: float) -> float:
     """Return half the width of an interval in standard errors."""
-    return float(stdtrit(problem.block_count - 1, 0.5 + 0.5 * level))
+    return float(student.ppf(0.5 + 0.5 * level, problem.block_count - 1))
 
 
 def _wrap_phase(name: str, difference: float) -> float:

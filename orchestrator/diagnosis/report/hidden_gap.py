@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.stats import norm
 
 from orchestrator.diagnosis.model.plant_effects import unit_in
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, SignalMisfit, ValueEstimate
@@ -65,7 +65,7 @@ def find_hidden_gap(record: Record, model: Model) -> HiddenGap | None:
 
 def gap_parameters(gap: HiddenGap, model: Model, level: float) -> dict[str, ParameterEstimate]:
     """Return the estimates of the parameters that were fitted beside a gap."""
-    width = float(ndtri(0.5 + 0.5 * level))
+    width = float(norm.ppf(0.5 + 0.5 * level))
     return {
         name: ParameterEstimate(
             value, error, (value - width * error, value + width * error),

@@ -212,7 +212,7 @@ def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Deviations, float]:
 
     Errors within a block may be correlated as they like (Quenouille 1956; Kuensch 1989).
     """
-    from scipy.special import stdtrit
+    from scipy.stats import t
 
     n, blocks = problem.points.time.size, problem.settings.blocks
     found = []
@@ -223,4 +223,4 @@ def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Deviations, float]:
         found.append((without.alpha, without.late, without.ratio))
     values = np.array(found)
     errors = np.sqrt((blocks - 1.0) / blocks * np.sum((values - values.mean(axis=0)) ** 2, axis=0))
-    return Deviations(*(float(error) for error in errors)), float(stdtrit(blocks - 1, 0.975))
+    return Deviations(*(float(error) for error in errors)), float(t.ppf(0.975, blocks - 1))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from orchestrator.records.arrays import runs_of
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import robust_noise
-from orchestrator.shared.inference.spectra import cross_density, power_density
 
 Array = NDArray[np.float64]
 
@@ -92,15 +91,15 @@ def _saturation_share(values: Array) -> float:
 
 def excitation_of(record: Record) -> list[Band]:
     """Return the torque's power by frequency, and how much of the motor's motion follows it."""
+    from scipy.signal import coherence, welch
+
     if not record.has_torque:
         return []
     filled = record.fill_missing()
     length = min(filled.size // 4, max(64, round(8.0 / filled.step)))
     rate = 1.0 / filled.step
-    speed = np.gradient(filled.theta_m, filled.step)
-    frequency, power = power_density(filled.u, filled.step, length)
-    _, moved = power_density(speed, filled.step, length)
-    common = np.abs(cross_density(filled.u, speed, filled.step, length)) ** 2 / power / moved
+    frequency, power = welch(filled.u, rate, nperseg=length)
+    _, common = coherence(filled.u, np.gradient(filled.theta_m, filled.step), rate, nperseg=length)
     total = float(power[1:].sum())
     bands = []
     for low, high in itertools.pairwise(BANDS):

@@ -12,7 +12,6 @@ from orchestrator.records.model_file import Model, ModelParameter
 from orchestrator.records.plausibility import check_plausible, momentum_balance, smooth
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.inverse import pseudo_inverse
-from orchestrator.shared.inference.spectra import power_density
 
 LAGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # s, tried for the drive
 LEAST_LAG = 1e-9  # s, of a drive that has none
@@ -114,8 +113,10 @@ def _shaft_frequency(record: Record, ratio: float) -> float:
     guess = min(20.0, 0.1 * rate)
     if record.theta_l is None:
         return guess
+    from scipy.signal import welch
+
     twist = record.theta_m / ratio - record.theta_l
-    frequency, power = power_density(np.diff(twist), record.step, min(record.size // 4, 1024))
+    frequency, power = welch(np.diff(twist), rate, nperseg=min(record.size // 4, 1024))
     inside = (frequency > LEAST_FREQUENCY) & (frequency < 0.2 * rate)
     if not inside.any():
         return guess

@@ -15,9 +15,9 @@ from orchestrator.estimation.problem import (
     parameter_unknowns,
     scale_unknowns,
 )
-from orchestrator.plants.filters import rms_behind_lag
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.inference.noise import rms_behind_lag
 
 GAPS = ("alpha_1", "alpha_2")
 TOTAL = "alpha_total"  # both half-gaps, seen from the load: alpha_1 / i_2 + alpha_2

@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.shared.inference.spectra import power_density
-
 Array = NDArray[np.float64]
 
 
@@ -16,8 +14,10 @@ def content_band(values: Array, step: float, noise: float, shows: float, most_ab
         step: sample time [s].
         pane: samples of a spectrum's pane at most.
     """
+    from scipy.signal import welch
+
     rate = 1.0 / step
-    frequency, power = power_density(np.diff(values), step, min(pane, values.size // 4))
+    frequency, power = welch(np.diff(values), rate, nperseg=min(pane, values.size // 4))
     slope = np.abs(1.0 - np.exp(-2j * np.pi * frequency / rate)) ** 2
     power = power[1:] / slope[1:]
     floor = max(2.0 * noise**2 / rate, float(np.median(power[-len(power) // 8 :])))

@@ -40,3 +40,18 @@ def robust_noise(values: Array) -> float:
 def rms(values: Array) -> float:
     """Return the root mean square of all values of an array of any shape."""
     return float(np.sqrt(np.mean(values**2)))
+
+
+def rms_behind_lag(u: Array, h: float, tau: float) -> float:
+    """Return the rms [N.m] of ``u`` behind a lag of ``tau`` [s].
+
+    Args:
+        u: (n,) requested torque [N.m].
+        h: sample time [s].
+        tau: [s].
+    """
+    from scipy.signal import lfilter
+
+    pole = math.exp(-h / tau) if tau > 0.0 else 0.0
+    torque = lfilter([1.0 - pole], [1.0, -pole], u)
+    return max(float(np.sqrt(np.mean(torque**2))), 1e-12)
