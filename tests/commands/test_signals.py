@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,17 @@ def wait_for_step(pid: int, process: "subprocess.Popen[str]") -> None:
     wait_until(spins, lambda: "no child came to its step")
 
 
+@pytest.fixture
+def heeded() -> Iterator[None]:
+    """Signals act on what a test starts, even where whoever started the tests has them ignored (`nohup`)."""
+    before = {name: signal.signal(name, signal.SIG_DFL) for name in (signal.SIGTERM, signal.SIGHUP)}
+    before[signal.SIGINT] = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    for name, handler in before.items():
+        signal.signal(name, handler)
+
+
+@pytest.mark.usefixtures("heeded")
 @pytest.mark.parametrize(
     ("kind", "names"),
     [
@@ -97,6 +109,7 @@ def test_a_signal_while_an_fmu_runs_ends_the_command_and_leaves_nothing(
 
 PROGRAM = """
 import os, signal, sys
+from collections.abc import Iterator
 from pathlib import Path
 for name in {ignored!r}:
     signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -115,6 +128,7 @@ run()
 """
 
 
+@pytest.mark.usefixtures("heeded")
 @pytest.mark.parametrize(
     ("ignored", "sent", "code", "told"),
     [

@@ -10,11 +10,14 @@ from orchestrator.building.build import ensure_built
 from orchestrator.scenarios.scenario import load_scenario
 from orchestrator.scenarios.ssp.write import write_ssp
 from tests.support.browser import browser, draw, missing, set_screen
-from tests.support.workbench import HANGS, Served, drive_log, workbench
+from tests.support.workbench import Served, drive_log, workbench
 
 pytest.importorskip("starlette")
 pytest.importorskip("uvicorn")
 pytestmark = [pytest.mark.slow(shares="page"), pytest.mark.skipif(bool(missing()), reason=missing())]
+
+
+NEVER = 240.0  # s, after which the page does not show what is waited for: no job of these tests takes half of that
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +44,7 @@ def wait(driver: Any, condition: Any) -> Any:
     from selenium.webdriver.support.wait import WebDriverWait
 
     moved = (ElementClickInterceptedException, StaleElementReferenceException)
-    return WebDriverWait(driver, HANGS, 0.1, ignored_exceptions=moved).until(condition)
+    return WebDriverWait(driver, NEVER, 0.1, ignored_exceptions=moved).until(condition)
 
 
 def wait_for_text(driver: Any, place: str, text: str) -> None:
@@ -262,7 +265,7 @@ def test_arrow_keys_take_nothing_from_other_channels_on_their_way(inspected: Any
 
 def test_what_a_line_advises_is_done_by_a_click(inspected: Any, served: Served) -> None:
     rows = "\n".join(f"{n / 100},{(n % 40 - 20) / 10},{(n * n) % 65536}" for n in range(420))
-    (served.folder / "counter.csv").write_text(f"time,u,theta_m\n{rows}\n")
+    (served.folder / "counter.csv").write_text(f"time,u,theta_m [deg]\n{rows}\n")
     counter = served.upload(served.folder / "counter.csv")
     choose_tab(inspected, "log")
     find(inspected, f"#panel-log option[value='{counter}']")
