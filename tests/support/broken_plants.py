@@ -128,7 +128,6 @@ _TABLE = """
 2 3 | ME | feeds_unswitched  | dependency.missing
 2 3 | ME | -                 | dependency.kind    | Output kinds y=dependent tunable
 2 3 | ME | -                 | dependency.kind    | Output kinds y=dependent discrete
-2 3 | ME | -                 | dependency.superfluous | Output z=v x w
 3   | ME | -                 | dependency.missing | Indicator z1=v
 
 [derivatives]

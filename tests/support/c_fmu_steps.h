@@ -267,7 +267,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     self->s.x = (float)self->s.x;
 #endif
 #ifdef FAULT_state_coarse
-    self->s.x += 4e-4;
+    self->s.x += 2e-4;
 #endif
     return fmi2OK;
 }

@@ -4,6 +4,7 @@ The child does the calls (``checking.host``); what it says is taken for what the
 types and sizes, and nothing more.
 """
 
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -57,6 +58,15 @@ NAMES: Mapping[Version, Names] = {
 }  # fmt: skip
 
 
+def _stamp(path: str) -> tuple[int, ...] | None:
+    """Return what changes with a file; None where there is none."""
+    try:
+        found = os.lstat(path)
+    except OSError:
+        return None
+    return found.st_ino, found.st_mode, found.st_size, found.st_mtime_ns
+
+
 class Library:
     """The shared library of an FMU.
 
@@ -83,6 +93,7 @@ class Library:
         self.logged: list[tuple[list[str], int]] = []
         """Messages and number of errors of each call that was done last in one go."""
         self._path = ""
+        self._loaded: tuple[int, ...] | None = None
         self._known = {(_LETTERS.get(v.base, ""), v.reference): v.name for v in reversed(variables)}
 
     def load(self, path: str) -> str:
@@ -91,10 +102,14 @@ class Library:
         Returns:
             The reason, empty when it is loaded.
         """
-        self._path = path
+        self._path, self._loaded = path, _stamp(path)
         names = self.names
         freer = f"{names.prefix}FreeInstance"
         return self._ask(str, "loading the library", "load", path, names.texts, names.makers, freer)
+
+    def is_replaced(self) -> bool:
+        """Return whether the FMU has put something else in the place of the file that was loaded."""
+        return _stamp(self._path) != self._loaded
 
     def renew(self) -> None:
         """Load the library anew in another process; its instances and states are gone."""

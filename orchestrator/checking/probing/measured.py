@@ -17,7 +17,6 @@ _ALWAYS, _AT_A_POINT = ("constant", "fixed", "tunable"), ("discrete",)
 _FEW_LISTED = 12  # more are taken for the list of all knowns, which tools write where they know nothing
 _OFTEN = 3
 _MOST_SILENT = 8
-_MOST_PAIRS = 5
 _MOST_NAMED = 10
 _PIECE = 10  # steps
 _WHERE = {
@@ -73,7 +72,6 @@ class Measured:
             for known, kind in zip(u.knowns or (), u.kinds, strict=False):
                 self._judge_kind(u, known.name, kind)
         self._report_silent()
-        self._report_idle()
 
     def _judge_kind(self, u: ProbedUnknown, known: str, kind: str) -> None:
         """A factor is as constant as its kind says: in the whole run, or at one point."""
@@ -88,25 +86,6 @@ class Measured:
                 text = f"`{name}` must follow `{known}` by a {kind} factor, as dependenciesKind says"
                 self.context.report("dependency.kind", f"{text}, but by {low:.4g} to {high:.4g}", name)
                 return
-
-    def _report_idle(self) -> None:
-        """Name what is listed for an unknown of model exchange, and moves others but not that one, at any point."""
-        heard = {known for _, _, known in self.reacted}
-        pairs = [
-            f"`{k.name}` for `{u.variable.name}`"
-            for u in self.listing()
-            for k in u.knowns or ()
-            if u.section != "initial"
-            and self.context.bench.job.interface == "ModelExchange"
-            and self.tried.get((u.section, u.variable.name, k.name), 0) >= _OFTEN
-            and (u.section, u.variable.name, k.name) not in self.reacted
-            and k.name in heard
-        ]
-        if pairs:
-            more = f", and {len(pairs) - _MOST_PAIRS} more" if len(pairs) > _MOST_PAIRS else ""
-            text = "what is listed as a dependency must have an effect, but none was seen of"
-            where = "at three points of a run"
-            self.context.report("dependency.superfluous", f"{text} {', '.join(pairs[:_MOST_PAIRS])}{more}, {where}")
 
     def _report_silent(self) -> None:
         """Name knowns that are listed and change nothing: at no point, and in no run."""
