@@ -22,7 +22,8 @@ from pathlib import Path
 import msgspec
 
 from orchestrator.checking.rules import RULES, Severity
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, ScenarioError
+from orchestrator.shared.toml_files import read_toml
 
 FILE_NAME = "fmu-check.toml"
 _MOST_BYTES = 1 << 20
@@ -81,14 +82,8 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 def read_policy(path: Path) -> Policy:
     """Read a file of a policy."""
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"the policy {path} must be readable, but is not: {error.strerror}") from None
-    if len(data) > _MOST_BYTES:
-        raise InputError(f"the policy {path} must have at most {_MOST_BYTES} bytes, but has {len(data)}")
-    try:
-        policy = msgspec.toml.decode(data, type=Policy)
-    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        policy = msgspec.convert(read_toml(path, _MOST_BYTES), type=Policy)
+    except (msgspec.ValidationError, ScenarioError) as error:
         raise InputError(f"the policy {path} must be a valid policy file, but is not: {error}") from None
     for place, pattern in _patterns(policy):
         if not _match_rules([pattern]):

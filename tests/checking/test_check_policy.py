@@ -56,6 +56,7 @@ def test_a_rule_that_does_not_count_was_not_run(tmp_path: Path) -> None:
         ('[[fmu]]\nignore = ["model.guid"]', "missing required field `fmu`"),
         ('[[fmu]]\nfmu = "a.fmu"\nignore = ["x"]', "`fmu[0].ignore` must name a rule"),
         ("select = [", "must be a valid policy file"),
+        ("select = " + "[" * 5000 + "]" * 5000, "nested too deeply"),
         ("\xff", "must name a rule"),
     ],
 )

@@ -15,6 +15,7 @@ from orchestrator.master.protocol import Unit, Value, Variable
 from orchestrator.master.units import unit_of
 from orchestrator.master.values import coerce_value
 from orchestrator.records.model_file import ModelParameter
+from orchestrator.shared.toml_files import read_toml
 
 MAXIMUM_BYTES = 1 << 24
 
@@ -127,14 +128,8 @@ class Map(MapFile, frozen=True):
 def read_map(path: Path, system: FmuSystem) -> Map:
     """Read a map, and check it against an FMU, or several."""
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise ScenarioError(f"`map` must be a readable file, but {path} is not: {error.strerror}") from None
-    if len(data) > MAXIMUM_BYTES:
-        raise ScenarioError(f"`map` must be at most {MAXIMUM_BYTES >> 20} MB, but {path} is larger")
-    try:
-        written = msgspec.toml.decode(data, type=MapFile)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        written = msgspec.convert(read_toml(path, MAXIMUM_BYTES), type=MapFile)
+    except msgspec.ValidationError as error:
         raise ScenarioError(f"{path}: {error}") from None
     return _MapCheck(written, system, str(path)).map()
 

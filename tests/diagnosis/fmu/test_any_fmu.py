@@ -322,6 +322,12 @@ def test_parameters_that_do_nothing_are_left_out(made):
     assert any("changes nothing" in note for note in found.notes)
 
 
+def test_a_map_that_is_nested_too_deeply_is_refused(tmp_path):
+    (tmp_path / "deep.toml").write_text("inputs = " + "[" * 5000 + "]" * 5000)
+    with pytest.raises(InputError, match="nested too deeply"):
+        read_map(tmp_path / "deep.toml", None)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
