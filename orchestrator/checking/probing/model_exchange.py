@@ -131,10 +131,7 @@ class ModelExchange(EventDriver):
             if h > slack:
                 x, t, h, signs = self._try(t, x, h, when)
                 before = self.read(self.watched, when)
-                entered, terminate = (v[0] for v in self.call(
-                    "CompletedIntegratorStep", (self._truth, True), ("out", self._truth, 1), ("out", self._truth, 1),
-                    when=when,
-                ))  # fmt: skip
+                entered, terminate = self.complete_step(when)
                 if terminate:
                     raise TerminatedError
                 crossed = signs != self.memory["signs"]
@@ -149,6 +146,12 @@ class ModelExchange(EventDriver):
                 self.memory["h"] = h
                 return
         raise TerminatedError
+
+    def complete_step(self, when: str = "") -> tuple[bool, bool]:
+        """Complete a step of the integrator; whether that enters event mode, and whether it ends the run."""
+        out = ("out", self._truth, 1)
+        entered, terminate = self.call("CompletedIntegratorStep", (self._truth, True), out, out, when=when)
+        return bool(entered[0]), bool(terminate[0])
 
     @property
     def _truth(self) -> str:

@@ -88,12 +88,10 @@ def judge_completed_step(context: Context, point: RestPoint) -> None:
     t = point.time + _LATER * context.bench.job.step
     if driver.next_instant(t) < t:
         return
-    truth = "int" if driver.job.version == "2.0" else "bool"
     try:
         driver.call("SetTime", ("double", t))
         before, signs = driver.rates(), driver.signs()
-        entered, ended = driver.call("CompletedIntegratorStep", (truth, True), ("out", truth, 1), ("out", truth, 1))
-        if entered[0] or ended[0] or signs != driver.memory["signs"]:
+        if any(driver.complete_step()) or signs != driver.memory["signs"]:
             return
         after = driver.rates()
     except StatusError:

@@ -247,8 +247,9 @@ class _Restoring:
                 copy = other.deserialise(data, memory)
                 other.set_state(copy)
                 other.driven = True
-                difference = _first_difference(self.watch, self.values, other.read(self.watch))
-                found = "" if difference is None or self._slight(other.read(self.watch)) else difference[1]
+                restored = other.read(self.watch)
+                difference = _first_difference(self.watch, self.values, restored)
+                found = "" if difference is None or self._slight(restored) else difference[1]
                 bench.run(other, self.half, min(self.half + _FEW_STEPS, bench.job.steps))
                 other.free_state(copy)
         except StatusError as error:
