@@ -53,9 +53,11 @@ def _effect_evidence(result: SearchResult, label: str, base: float, remains: flo
     family = review.family
     if kinds == {"friction"} and acts_one_way(problem, final.point, label):
         kinds, family = {*kinds, "constant"}, (*family, f"constant_torque@{effect.site}")
-    left_there, once = where_it_acts(problem, final.point, label)
-    if effect.takes_drive and effect.kind == "limit" and once:
-        kinds, family = {*kinds, "disturbance"}, (*family, "outside_torque@motor")
+    left_there = 0.0
+    if effect.kind == "limit":
+        left_there, once = where_it_acts(problem, final.point, label)
+        if effect.takes_drive and once:
+            kinds, family = {*kinds, "disturbance"}, (*family, "outside_torque@motor")
     return EffectEvidence(
         label, effect.kind, max(leaving.comparison.t, entry.comparison.t),
         max(leaving.comparison.gain, entry.comparison.gain), min(max(without - remains, before - after) / base, 1.0),

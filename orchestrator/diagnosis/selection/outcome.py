@@ -141,7 +141,7 @@ class EffectEvidence:
         runs_hold: free runs of the final model stay by the test data; else they drift, and the torque decides.
         torque: power of its own torque, in shares of what the nominal model misses.
         asked: it was asked for, and stays in the model whatever its grade.
-        left_where_it_acts: what is left there over its own torque (rms), if it is more than elsewhere.
+        left_where_it_acts: of a limit, what is left there over its own torque (rms), if it is more than elsewhere.
     """
 
     label: str
