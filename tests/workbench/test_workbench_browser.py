@@ -213,14 +213,25 @@ def test_outputs_are_dragged_to_inputs_of_the_same_quantity(inspected: Any, serv
     set_screen(inspected, 1280, 900, "light")
 
 
-def test_a_log_chosen_in_another_tab_is_looked_at(inspected: Any, served: Served) -> None:
+def renamed_log(served: Served, names: str) -> str:
+    """Return the text of the dropped log with other names of its columns."""
     lines = (served.folder / "files" / "drive.csv").read_text().splitlines()
-    lines[2] = "Time [ms];Current setpoint [A];Achse A [deg];Achse B [deg]"
-    (served.folder / "other.csv").write_text("\n".join(lines) + "\n")
-    other = served.upload(served.folder / "other.csv")
-    choose_tab(inspected, "gap")
-    find(inspected, f"#panel-gap option[value='{other}']")
-    pick(inspected, "#panel-gap select", "other.csv")
+    lines[2] = names
+    return "\n".join(lines) + "\n"
+
+
+def pick_new_log(driver: Any, served: Served, tab: str, name: str, text: str) -> None:
+    """Upload a log, and choose it in a tab."""
+    (served.folder / name).write_text(text)
+    uploaded = served.upload(served.folder / name)
+    choose_tab(driver, tab)
+    find(driver, f"#panel-{tab} option[value='{uploaded}']")
+    pick(driver, f"#panel-{tab} select", name)
+
+
+def test_a_log_chosen_in_another_tab_is_looked_at(inspected: Any, served: Served) -> None:
+    names = "Time [ms];Current setpoint [A];Achse A [deg];Achse B [deg]"
+    pick_new_log(inspected, served, "gap", "other.csv", renamed_log(served, names))
     choose_tab(inspected, "log")
     wait_for_text(inspected, "panel-log", "Not used: Achse A [deg], Achse B [deg]")
     wait_for_text(inspected, "panel-log", "Still needed. Motor angle: the channel that holds it")
@@ -231,13 +242,7 @@ def test_arrow_keys_take_nothing_from_other_channels_on_their_way(inspected: Any
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
 
-    lines = (served.folder / "files" / "drive.csv").read_text().splitlines()
-    lines[2] = "Time [ms];Wert 1;Wert 2;Wert 3"
-    (served.folder / "third.csv").write_text("\n".join(lines) + "\n")
-    third = served.upload(served.folder / "third.csv")
-    choose_tab(inspected, "log")
-    find(inspected, f"#panel-log option[value='{third}']")
-    pick(inspected, "#panel-log select", "third.csv")
+    pick_new_log(inspected, served, "log", "third.csv", renamed_log(served, "Time [ms];Wert 1;Wert 2;Wert 3"))
     chosen = "const one = document.activeElement; return [one.ariaLabel, one.selectedOptions?.[0].textContent]"
     titles = {"Wert 1": "Torque asked for", "Wert 2": "Motor angle", "Wert 3": "Load angle"}
     for channel, title in titles.items():
@@ -265,11 +270,7 @@ def test_arrow_keys_take_nothing_from_other_channels_on_their_way(inspected: Any
 
 def test_what_a_line_advises_is_done_by_a_click(inspected: Any, served: Served) -> None:
     rows = "\n".join(f"{n / 100},{(n % 40 - 20) / 10},{(n * n) % 65536}" for n in range(420))
-    (served.folder / "counter.csv").write_text(f"time,u,theta_m [deg]\n{rows}\n")
-    counter = served.upload(served.folder / "counter.csv")
-    choose_tab(inspected, "log")
-    find(inspected, f"#panel-log option[value='{counter}']")
-    pick(inspected, "#panel-log select", "counter.csv")
+    pick_new_log(inspected, served, "log", "counter.csv", f"time,u,theta_m [deg]\n{rows}\n")
     press(inspected, "Set “the counter starts again at” of “Motor angle” to 65536")
     wait_for_text(inspected, "panel-log", "can be read")
     wait(inspected, lambda d: find(d, "[data-key=modulo-theta_m]").get_attribute("value") == "65536")
