@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -185,40 +186,48 @@ def test_the_stage_is_named_and_its_gap_measured(tmp_path, halves, answer):
     assert all(found.behind[other] > 20.0 for other in ("1", "2", "both") if other != answer)
 
 
-def test_the_intervals_of_both_hold_every_optimum_that_is_about_as_good(tmp_path):
-    effects = {"alpha_1": 0.014, "alpha_2": 0.008} | FRICTION
-    likelihood, _ = likelihood_of(tmp_path, effects, 11, 0.2, torque=25.0)
-    fits = fit_stages(likelihood, DEFAULT_SETTINGS.stages, lambda what, share: None)
-    own = locate(replace(fits, shared=()), DEFAULT_SETTINGS.stages)
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """The fits of a record with a gap in both stages."""
+    effects = {"alpha_1": 0.006, "alpha_2": 0.012} | FRICTION
+    likelihood, _ = likelihood_of(tmp_path_factory.mktemp("both"), effects, 6, 0.2, torque=25.0)
+    return fit_stages(likelihood, DEFAULT_SETTINGS.stages, lambda what, share: None)
+
+
+def test_the_intervals_of_both_hold_every_optimum_that_is_about_as_good(both):
+    # How far blocks differ depends on the optimum, and which of many is found on how the machine rounds.
+    settings = msgspec.structs.replace(DEFAULT_SETTINGS.stages, most_scatter=1.0)
+    own = locate(replace(both, shared=()), settings)
     assert own.answers == ("both",)
-    theta = fits.free.point.theta.copy()
+    likelihood, theta = both.free.likelihood, both.free.point.theta.copy()
     theta[likelihood.problem.index(SHARE)] += 0.2
     ratio = likelihood.value(theta, "i_2")
     for behind, held in ((2.0, True), (30.0, False)):  # of the objective
-        point = replace(fits.free.point, theta=theta, objective=fits.free.point.objective + behind)
-        other = replace(fits.free, point=point)
-        found = locate(replace(fits, shared=(other,)), DEFAULT_SETTINGS.stages)
+        point = replace(both.free.point, theta=theta, objective=both.free.point.objective + behind)
+        other = replace(both.free, point=point)
+        found = locate(replace(both, shared=(other,)), settings)
         assert [gap.alpha for gap in found.stages] == [gap.alpha for gap in own.stages]
         for n, half in enumerate(likelihood.halves(theta)):
             assert (found.stages[n].interval[0] <= half <= found.stages[n].interval[1]) == held
             assert found.stages[n].interval[0] <= own.stages[n].interval[0]
             assert found.stages[n].interval[1] >= own.stages[n].interval[1]
-    assert abs(own.total.alpha - (0.014 / ratio + 0.008)) < 1e-3
+    assert abs(own.total.alpha - (0.006 / ratio + 0.012)) < 1e-3
 
 
-def test_a_fit_at_a_wrong_share_finds_a_better_one_nearby(tmp_path):
-    """All else moves with the share: with the share alone moved, no point is as good."""
-    effects = {"alpha_1": 0.014, "alpha_2": 0.008} | FRICTION
-    likelihood, _ = likelihood_of(tmp_path, effects, 11, 0.2, torque=25.0)
-    best = fit_stages(likelihood, DEFAULT_SETTINGS.stages, lambda what, share: None).free
-    place = likelihood.problem.index(SHARE)
+def test_a_fit_at_a_wrong_share_finds_a_better_one_nearby(both):
+    """All else moves with the share, but for what is at its bound: of that the information says nothing."""
+    likelihood, problem, theta = both.free.likelihood, both.free.likelihood.problem, both.free.point.theta.copy()
+    place, quiet = problem.index(SHARE), problem.index("log_torque_middle")
+    theta[quiet] = problem.unknowns[quiet].lower
+    best = replace(both.free, point=likelihood.at(theta))
     column = list(best.free).index(place)
-    away = 3.0 * math.sqrt(best.covariance[column, column])
+    away = 4.0 * math.sqrt(best.covariance[column, column])
     (moved,) = move_share(best, [away])
-    assert math.isclose(moved.theta[place], best.point.theta[place] + away)
-    alone = best.point.theta.copy()
+    assert math.isclose(moved.theta[place], theta[place] + away)
+    assert moved.theta[quiet] == theta[quiet]
+    alone = theta.copy()
     alone[place] += away
-    assert moved.objective < best.likelihood.at(alone).objective
+    assert moved.objective < likelihood.at(alone).objective
     assert look_nearby(replace(best, point=moved)).objective < moved.objective
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import block_variance
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import Fit, Point, maximise
+from orchestrator.estimation.likelihood import Fit, Point, inverse, maximise
 from orchestrator.estimation.settings import StageSettings
 from orchestrator.estimation.stages.likelihood import StagesLikelihood
 from orchestrator.estimation.stages.problem import BODIES, SHARE, TOTAL, TWIST
@@ -240,14 +240,20 @@ def look_nearby(fit: StagesFit) -> Point:
 
 
 def move_share(fit: StagesFit, away: Iterable[float]) -> list[Point]:
-    """Return the likelihood at other shares, all other unknowns moved as the information of a fit says."""
-    column = list(fit.free).index(fit.likelihood.problem.index(SHARE))
-    slope = fit.covariance[:, column] / fit.covariance[column, column]
-    low, high = fit.likelihood.problem.bounds(fit.free)
+    """Return the likelihood at other shares, all unknowns that are at no bound moved as the information of a fit says.
+
+    A bound is where the record shows next to nothing of an unknown, so that the information would move it anywhere.
+    """
+    place = fit.likelihood.problem.index(SHARE)
+    values, (low, high) = fit.point.theta[fit.free], fit.likelihood.problem.bounds(fit.free)
+    inside = np.flatnonzero(((low < values) & (values < high)) | (fit.free == place))
+    covariance = inverse(fit.information[np.ix_(inside, inside)])
+    column = list(fit.free[inside]).index(place)
+    slope = covariance[:, column] / covariance[column, column]
     found = []
     for step in away:
         moved = fit.point.theta.copy()
-        moved[fit.free] = np.clip(moved[fit.free] + slope * step, low, high)
+        moved[fit.free[inside]] = np.clip(values[inside] + slope * step, low[inside], high[inside])
         found.append(fit.likelihood.at(moved))
     return found
 
