@@ -93,12 +93,7 @@ def distance_variance(f: Filter, side: float) -> float:
 
 
 def flank(distance: float, variance: float) -> tuple[float, float]:
-    """Return (probability that a flank is loaded, mean penetration [rad]) for a Gaussian distance beyond it.
-
-    Args:
-        distance: mean of the distance beyond the flank [rad].
-        variance: of it [rad2].
-    """
+    """Return (probability that a flank is loaded, mean penetration [rad]) of a Gaussian distance beyond it [rad]."""
     sigma = sqrt(variance)
     z = distance / sigma
     share = 0.5 * erfc(-z * ROOT_HALF)
@@ -291,13 +286,7 @@ def begin(
 
 
 def advance(filters: Filters, m: Model, s: SettingValues, u: float, h: float) -> None:
-    """Predict with all filters over a sample of ``h`` [s].
-
-    Args:
-        filters: ``FILTERS`` filters, changed in place.
-        u: torque request held over the sample [N.m].
-        h: sample time [s].
-    """
+    """Predict with all filters over a sample of ``h`` [s], in which the request ``u`` [N.m] is held."""
     fastest = sqrt(m[2] * (1.0 / m[1] + 1.0 / (m[0] * m[6] * m[6])))
     parts = 1 + int(h * fastest / LONGEST_PART)
     for n in range(FILTERS):

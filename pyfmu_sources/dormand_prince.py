@@ -72,11 +72,7 @@ def driven(x: State, after: State, quick: bool, p: Parameters, u: float, h: floa
 def runge_kutta(
     x: State, k1: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float
 ) -> tuple[State, State, float]:
-    """Return the state after one Dormand-Prince step, its derivative there and the scaled error.
-
-    Returns:
-        The three; an error below 1 is within the tolerance.
-    """
+    """Return the state after one step, its derivative there and the scaled error: below 1 within the tolerance."""
     quick = is_quick(p, h)
     k2 = mode_rates(driven(x, ahead(x, h / 5.0, k1), quick, p, u, h / 5.0), mode, p, u, T_l)
     at3 = ahead(x, h, combine(3.0 / 40.0, k1, 9.0 / 40.0, k2))

@@ -58,11 +58,7 @@ def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Ind
 
 
 def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Outputs:
-    """Return the derivatives of the outputs of :func:`rates_and_outputs`; that of T_shaft is a central difference.
-
-    Returns:
-        The derivatives, SI units per second.
-    """
+    """Return the derivatives of the outputs of :func:`rates_and_outputs` [1/s]; of T_shaft by a central difference."""
     r = state_rates(x, mode, p, u, T_l)
     later = shaft_torque(along(x, r, LITTLE), mode, p, T_l)
     sooner = shaft_torque(along(x, r, -LITTLE), mode, p, T_l)

@@ -103,11 +103,7 @@ class Bridge:
         return getattr(slave, method)()
 
     def restore(self, text: bytes) -> float:
-        """Take over a hidden state.
-
-        Returns:
-            0, or 1 where the text is none of this slave.
-        """
+        """Take over a hidden state; return 0, or 1 where the text is none of this slave."""
         slave = self.slave
         try:
             saved = json.loads(text)

@@ -67,11 +67,7 @@ def until_knot(law: Law, clock: float) -> float:
 
 
 def law_torque(law: Law, clock: float, motion: Motion) -> float:
-    """Return the torque of a law that acts, without its dry friction.
-
-    Returns:
-        The torque [N.m]: against motor or load; on the shaft, with the elastic one.
-    """
+    """Return the torque [N.m] of a law that acts, without its dry friction: against a body, or with the elastic one."""
     kind = kind_of(law)
     s = motion[kind - 1] if kind <= DRIVE else (clock - law[L_SINCE]) % law[L_PERIOD]
     torque = straight(s, law, L_KNOTS, L_VALUES)
@@ -93,9 +89,7 @@ def at_bodies(law: Law, torque: float, ratio: float) -> tuple[float, float]:
 def longest_piece(law: Law, motor: float, load: float, ratio: float) -> float:
     """Return over how long a law may be held [s]: a share of the shortest time constant that it makes.
 
-    Args:
-        motor: inertia [kg.m2].
-        load: inertia [kg.m2].
+    ``motor`` and ``load`` are inertias [kg.m2].
     """
     kind = kind_of(law)
     steepest = largest = 0.0

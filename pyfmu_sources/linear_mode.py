@@ -73,7 +73,6 @@ def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float
     """Return the Taylor coefficients of the state, scaled so that time runs from 0 to 1 over ``step`` [s].
 
     Args:
-        step: over which it is expanded [s].
         kappa: rate at which a parted shaft unwinds [1/s].
     """
     coefficients: Coefficients = [x]

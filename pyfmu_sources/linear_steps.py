@@ -94,11 +94,7 @@ def advance_linear(
 def linear_to_event(
     x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, kappa: float, elapsed: float, pieces: int
 ) -> tuple[State, float, int, int]:
-    """Return the exact linear solution at its next event, or at the end of a step.
-
-    Args:
-        elapsed: time since the beginning of the step at which ``x`` is [s].
-    """
+    """Return the exact linear solution from ``elapsed`` [s] in a step on, at its next event or at the step's end."""
     most = MAX_PIECES + int(MAX_PIECES_PER_SECOND * h)
     law = law_of(contact, p)
     while elapsed < h:

@@ -72,11 +72,7 @@ def settled(x: State, contact: int, p: Parameters, theta_m: float, speed: float)
     A motor's angle from elsewhere is never exact: within ``LOOSE`` a contact ends only when the teeth move on that way.
 
     Args:
-        contact: flank that touched: -1, 0 or 1.
         speed: derivative of the twist [rad/s].
-
-    Returns:
-        -1, 0 or 1.
     """
     if p.alpha == 0.0:
         return 1

@@ -137,11 +137,7 @@ class PlantSlave(SlaveBase):
             self._advance_delayed(u, time, step, False)
 
     def advance_to_event(self, time: float, step: float) -> float:
-        """Integrate like ``advance``, up to the first event.
-
-        Returns:
-            How far it is [s]: ``step`` where there is no event.
-        """
+        """Integrate like ``advance``, up to the first event; return how far it is [s], ``step`` without one."""
         u = self._request()
         if self._dead_time() != 0.0:
             return self._advance_delayed(u, time, step, True)

@@ -92,11 +92,8 @@ def request_to_event(
 ) -> tuple[State, int, float, int, bool]:
     """Return the solution right after its next event, or at the end of a step: it breaks away, stops, or meets a stop.
 
-    An axis that breaks away is still at rest; its direction follows from the torque of what comes next.
-
-    Args:
-        h: length of the step [s].
-        elapsed: time since the beginning of the step at which ``x`` is [s].
+    An axis that breaks away is still at rest; its direction follows from the torque of what comes next. ``x`` is at the
+    time ``elapsed`` [s] since the beginning of the step.
     """
     f = friction_of(p)
     bends = builds_up(f)

@@ -194,11 +194,7 @@ class SlaveBase(Fmi2Slave):
             self._failed("fmi2ExitInitializationMode", error)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Move on from ``current_time`` by ``step_size`` [s]; False (``fmi2Discard``) leaves everything as it was.
-
-        Returns:
-            Whether the step was taken.
-        """
+        """Move on from ``current_time`` by ``step_size`` [s]; False (``fmi2Discard``) leaves everything as it was."""
         try:
             end = current_time + step_size
             slack = TIME_TOLERANCE * (1.0 + abs(current_time))

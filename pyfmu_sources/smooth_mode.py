@@ -103,11 +103,7 @@ def advance_smooth_to_event(
 def smooth_to_event(
     x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, elapsed: float, work: int
 ) -> tuple[State, Mode, float, int, int]:
-    """Return the solution at its next event, or at the end of a step.
-
-    Args:
-        elapsed: time since the beginning of the step at which ``x`` is [s].
-    """
+    """Return the solution from ``elapsed`` [s] in a step on, at its next event or at the step's end."""
     k1 = mode_rates(x, mode, p, u, T_l)
     step = h - elapsed
     most = MAX_STEPS + int(MAX_STEPS_PER_SECOND * h)

@@ -76,12 +76,7 @@ def foresee(x: Estimate, u: float, duration: float, alpha: float, d: Train) -> E
 
 
 def foresee_late(x: Estimate, sent: Sent, delay: float, sample_time: float, alpha: float, d: Train) -> Estimate:
-    """Return the state ``delay`` samples of ``sample_time`` [s] later: what is under way acts until then.
-
-    Args:
-        x: as for ``foresee``.
-        alpha: half-gap [rad].
-    """
+    """Return the state ``delay`` samples of ``sample_time`` [s] later; what is under way acts until then."""
     share = oldest_share(delay)
     for n in range(len(sent)):
         x = foresee(x, sent[n], share * sample_time, alpha, d)

@@ -46,11 +46,7 @@ def first_event(coefficients: Coefficients, mode: Mode, p: Parameters, T_l: floa
 
 
 def leap(x: State, mode: Mode, p: Parameters, u: float, T_l: float, part: float, table: Table) -> tuple[State, bool]:
-    """Return the state after one product with a transition matrix, and whether no event can lie inside.
-
-    Args:
-        part: of a step [s].
-    """
+    """Return the state ``part`` [s] later by one product with a matrix, and whether no event can lie inside."""
     if table[4] == 0 or mode[2] == 0 or mode[3] == 0 or mode[4] == 0:
         return (x, False)
     torques = outside_torques(mode, p, u, T_l)

@@ -83,10 +83,6 @@ def add(a: Row, b: Row) -> Row:
 
 
 def followed(row: Row, wound: Row, motor: Row, load: Row, torque: Row) -> Row:
-    """Return what ``row`` adds in a step that starts where a step with the given rows has ended.
-
-    Args:
-        row: of the second step.
-    """
+    """Return what ``row`` of a second step adds, which starts where a step with the given rows has ended."""
     moved = add(add(scale(wound, row[0]), scale(motor, row[1])), add(scale(load, row[2]), scale(torque, row[3])))
     return add(row, moved)

@@ -156,11 +156,7 @@ class TwoStageTrain(PlantSlave):
         return state_rates(self._x, self._mode, self._p, self._acting_request(), self.real[T_L])
 
     def output_rates(self) -> Outputs:
-        """Return the derivatives of the outputs that ``response_outputs`` names, with the inputs held.
-
-        Returns:
-            The derivatives, SI units per second.
-        """
+        """Return the derivatives of the outputs that ``response_outputs`` names, inputs held, SI units per second."""
         return output_rates(self._x, self._mode, self._p, self._acting_request(), self.real[T_L])
 
     def indicators(self) -> Indicators:

@@ -161,11 +161,7 @@ def format_varied(vary: Varied) -> tuple[str, ...]:
 
 
 def draws_of(samples: int | None, vary: Sequence[str], sizes: str = "") -> int:
-    """Return how often random and Sobol parameters are drawn.
-
-    Returns:
-        At least 1.
-    """
+    """Return how often random and Sobol parameters are drawn, at least once."""
     if samples is None:
         return DEFAULT_SAMPLES
     if sizes.startswith("random"):

@@ -81,11 +81,7 @@ class DesignResult(PlottedResult):
             raise OutputError(f"cannot write {path}: {error.strerror}") from None
 
     def draw(self, path: Path) -> None:
-        """Draw the torque of the best excitation against time.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-        """
+        """Draw the torque of the best excitation against time."""
         from orchestrator.estimation.figures import draw_design
 
         draw_design(path, self.time, self.best)

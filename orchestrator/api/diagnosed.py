@@ -102,11 +102,7 @@ class DiagnosisResult(AnyDiagnosisResult):
             return before_and_after(self.diagnosis, fmu), with_law
 
     def draw(self, path: Path) -> None:
-        """Draw the test part: measured, of the nominal model and of the corrected one.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-        """
+        """Draw the test part: measured, of the nominal model and of the corrected one."""
         from orchestrator.diagnosis.report.figures import draw_signals
 
         draw_signals(path, self.runs, self.diagnosis)

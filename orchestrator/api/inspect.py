@@ -88,11 +88,7 @@ class InspectResult(PlottedResult):
         return self.sufficiency.smallest
 
     def draw(self, path: Path) -> None:
-        """Draw the channels over time and the excitation by frequency.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-        """
+        """Draw the channels over time and the excitation by frequency."""
         from orchestrator.estimation.figures import draw_record
 
         draw_record(path, self.record, [(band.low, band.high, band.share) for band in self.excitation])

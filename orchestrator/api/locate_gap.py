@@ -107,11 +107,7 @@ class LocationResult(PlottedResult):
         return [table(title, HEAD, rows), table("Where the gap can be", BEHIND, ways), self.message, *doubts]
 
     def results(self, place: Path | None = None) -> EstimateFound:
-        """Return what ``estimate.json`` says.
-
-        Args:
-            place: the folder of the result; nothing in it is named.
-        """
+        """Return what ``estimate.json`` says, which names nothing of the result's folder."""
         found = self.location
         seen = bool(found.answers)
         deviation = (found.total.interval[1] - found.total.alpha) / NORMAL_95
@@ -144,11 +140,7 @@ class LocationResult(PlottedResult):
         write_columns(folder / "stages.csv", self.location.curves, lambda v: "" if math.isnan(v) else f"{v:.10g}")
 
     def draw(self, path: Path) -> None:
-        """Draw the twist of each stage against its flanks.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-        """
+        """Draw the twist of each stage against its flanks."""
         from orchestrator.estimation.figures import draw_stages
 
         draw_stages(path, self.record, self.location.curves, [gap.alpha for gap in self.stages])

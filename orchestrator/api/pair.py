@@ -96,11 +96,7 @@ class PairResult(PlottedResult):
         write_columns(Path(path), self.signals())
 
     def draw(self, path: Path) -> None:
-        """Draw both load angles, their difference and the torques against time.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-        """
+        """Draw both load angles, their difference and the torques against time."""
         from orchestrator.paired.figures import draw_pair
 
         title = f"Paired loops, {self.experiment.backlash_model}, half-gap {self.alpha:g} rad"

@@ -60,18 +60,10 @@ class PlottedResult(Result):
     """
 
     def write_data(self, folder: Path) -> None:
-        """Write the data that the page shows.
-
-        Args:
-            folder: where to; it exists.
-        """
+        """Write the data that the page shows into ``folder``, which exists."""
 
     def draw_files(self, folder: Path) -> None:
-        """Draw the pictures that lie beside the page.
-
-        Args:
-            folder: where to; it exists.
-        """
+        """Draw the pictures that lie beside the page into ``folder``, which exists."""
 
     def draw(self, path: Path) -> None:
         """Draw the main picture.
@@ -85,12 +77,7 @@ class PlottedResult(Result):
         raise ScenarioError(f"`path` must be absent, but is {path}: this result has plots and no picture", "path")
 
     def write_files(self, folder: Path, pictures: bool = False) -> None:
-        """Write data, and pictures where they are asked for.
-
-        Args:
-            folder: where to; it exists.
-            pictures: whether to draw the plots of the page as PNG files too.
-        """
+        """Write data, and with ``pictures`` the plots of the page as PNG files, into ``folder``, which exists."""
         self.write_data(folder)
         if pictures:
             self.draw_files(folder)

@@ -86,11 +86,7 @@ class SimulationResult(PlottedResult):
         write_columns(Path(path), {"time": self.time} | {name: self[name] for name in self.names})
 
     def draw(self, path: Path) -> None:
-        """Draw the signals against time, those of one unit in one panel.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-        """
+        """Draw the signals against time, those of one unit in one panel."""
         from orchestrator.paired.figures import draw_signals
 
         units = {name: self.units.get(name) or "" for name in self.names}
@@ -212,12 +208,7 @@ def run_ssp(
     safety: Safety | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> SimulationResult:
-    """Run an SSP file, whatever its name; see ``simulate``.
-
-    Args:
-        stop: end [s].
-        step: communication step [s].
-    """
+    """Run an SSP file, whatever its name, to ``stop`` [s] in communication steps of ``step`` [s]; see ``simulate``."""
     if step is not None and not 0.0 < step < float("inf"):
         raise ScenarioError(f"`step` must be finite and positive, but is {step!r}", "step")
     constants = {name: Constant(float(value)) for name, value in inputs.items()}

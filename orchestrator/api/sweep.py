@@ -77,11 +77,7 @@ class SweepResult(AnySweepResult):
         return trust_of_sweep(self.statistics.values(), level, self.failed)
 
     def draw(self, path: Path) -> None:
-        """Draw estimated against actual half-gaps, with their intervals.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-        """
+        """Draw estimated against actual half-gaps, with their intervals."""
         from orchestrator.paired.figures import draw_estimates
 
         a = self.arrays

@@ -70,7 +70,6 @@ def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_dire
     """Build a wheel of this platform, or of any where nothing was compiled; return its name.
 
     Args:
-        wheel_directory: folder in which the wheel is put.
         config_settings: ``platform``, one of ``PLATFORMS``, makes it for that one.
     """
     name = _platform(config_settings)
@@ -87,22 +86,13 @@ def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_dire
 
 
 def build_editable(wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:
-    """Build an editable installation, its machine code in the source tree; return the name of its wheel.
-
-    Args:
-        wheel_directory: folder in which the wheel is put.
-    """
+    """Build an editable installation, its machine code in the source tree; return the name of its wheel."""
     compile_all(INSTALLED)
     return build_meta.build_editable(wheel_directory, config_settings, metadata_directory)
 
 
 def compile_all(folder: Path, made_for: Platform = HERE) -> int:
-    """Compile all kernels of the package into a folder, which is emptied before; return how many were made.
-
-    Args:
-        folder: of the libraries, made anew.
-        made_for: where the libraries will run (default: here).
-    """
+    """Compile all kernels for a platform into a folder, which is emptied before; return how many were made."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     files = [folder / library_file(library_stem(*entry), made_for) for entry in LIBRARIES]

@@ -91,11 +91,7 @@ def digest(parts: Iterable[bytes]) -> str:
 
 
 def fingerprint(recipe: Recipe, *made_with: str) -> str:
-    """Return what changes whenever a build of ``recipe`` would: sources, builder, start values, what it is made with.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Return 64 hexadecimal digits that change whenever a build would: by sources, builder, start values or tools."""
     options = {
         "name": recipe.name,
         "class": recipe.class_name,

@@ -92,11 +92,7 @@ def read_arguments(args: argparse.Namespace) -> Policy:
 
 
 def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
-    """Mend FMUs, where that was asked for, and say what was mended.
-
-    Returns:
-        What to check: the mended FMUs, and those with nothing to mend.
-    """
+    """Mend FMUs, where that was asked for, and say so; return what to check: those, and those with nothing to mend."""
     if args.fix is None:
         return list(paths)
     targets = [args.fix / path.with_suffix(".fmu").name for path in paths]

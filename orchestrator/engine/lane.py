@@ -56,17 +56,11 @@ class Lane:
         self._jail: Jail | None = None
 
     def run(self, cases: Sequence[Case]) -> list[Outcome]:
-        """Run a batch of cases, or as many of them as a worker process gets done in ``BATCH_TIME``.
+        """Run cases, as many of them as a worker process gets done in ``BATCH_TIME``, and return how those ended.
 
         When the process dies, hangs or breaks another limit, the case that was running is the one whose outcome is
         returned. A case whose process dies is tried once more in a fresh one, and up to four times where the process
         was killed, so that what somebody else killed costs nothing; a case that hangs, or breaks another limit, is not.
-
-        Args:
-            cases: to run, at least one.
-
-        Returns:
-            How some of them ended, at least one.
         """
         with self._lock:
             self._busy = True

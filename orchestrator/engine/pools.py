@@ -42,11 +42,7 @@ class Pool(Protocol):
     """An executor with what is needed to use it for cases. ``close`` ends every worker process at once."""
 
     def submit(self, cases: Sequence[Case]) -> "Future[list[Outcome]]":
-        """Hand cases to the executor; the future ends with outcomes of some of them, or why no case can be run here.
-
-        Args:
-            cases: to run, at least one.
-        """
+        """Hand cases, at least one, to the executor; its future has outcomes of some, or why no case can run here."""
 
     def outcome_of_loss(self, case: Case, error: BaseException) -> Outcome | None:
         """Return the outcome of a case that its executor has given up, ``None`` when ``error`` is no such thing."""

@@ -100,11 +100,7 @@ def open_worker(assignment: Assignment) -> Callable[[Sequence[Case]], Answer]:
 
 
 def count_finished(temporary: Path) -> int:
-    """Return how many cases of its batch a worker process had finished, as it claims.
-
-    Returns:
-        The number; 0 where the process has left none.
-    """
+    """Return how many cases of its batch a worker process had finished, as it claims; 0 where it has left no number."""
     try:
         return int(_COUNT.unpack((temporary / _FINISHED).read_bytes())[0])
     except (OSError, struct.error):

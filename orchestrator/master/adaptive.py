@@ -114,9 +114,6 @@ def run_adaptive(
     Args:
         signals: signals in place of those of ``System.sources``, by index.
         record: (recorded,) slots of the recorded signals.
-
-    Returns:
-        Steps taken, steps refused, sizes.
     """
     check_adaptive(wiring.layout)
     return _Run(wiring, signals, start, stop, settings, rows, record).run()

@@ -74,13 +74,7 @@ MAXIMUM_STEPS = 100_000_000
 
 
 def step_count(start: float, stop: float, step: float) -> int:
-    """Return the number of steps of the communication grid ``start + n * step``.
-
-    Args:
-        start: beginning of the run [s].
-        stop: its end [s].
-        step: length of a step [s].
-    """
+    """Return the number of steps of the communication grid ``start + n * step`` from ``start`` to ``stop`` [s]."""
     if not (math.isfinite(step) and step > 0.0):
         raise ScenarioError(f"`step` must be finite and positive, but is {step!r}")
     if not (math.isfinite(start) and math.isfinite(stop) and stop > start):

@@ -13,14 +13,11 @@ BEYOND = 1e36
 def divergence_remarks(
     names: tuple[str, ...], rows: NDArray[np.float64], times: NDArray[np.float64]
 ) -> list[RunRemark]:
-    """Return a remark for each instance that has a signal beyond all sizes.
+    """Return a remark for each instance that has a signal beyond all sizes, on the one that comes there first.
 
     Args:
         rows: (times, names) recorded.
         times: [s].
-
-    Returns:
-        The remarks; of each instance the signal that comes there first.
     """
     far = np.abs(rows) > BEYOND  # NaN is not: a result with it is refused
     first: dict[str, tuple[int, int]] = {}

@@ -141,10 +141,6 @@ class EventStage:
         return found.again
 
     def raise_end(self, time: float) -> None:
-        """Raise where the slave wants the run to end, at ``time`` [s].
-
-        Raises:
-            RunEndedError: it wants the run to end.
-        """
+        """Raise ``RunEndedError`` where the slave wants the run to end, at ``time`` [s]."""
         if self.ends_run:
             raise RunEndedError(f"{self.name}: t = {time:g} s, {self.ends_run}", self.name, time, self.ends_run)

@@ -86,9 +86,6 @@ class EventWindows:
 
         Args:
             rows: results, shape (grid points, recorded); row 0 is already there.
-
-        Returns:
-            Windows taken and refused, calls of slaves, events.
         """
         time, length, row = self.start, min(self.settings.first, self.settings.largest), 1
         guess: Track | None = None

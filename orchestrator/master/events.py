@@ -77,11 +77,7 @@ class EventIteration:
                 self.rated[slot] = name not in stage.follows
 
     def rates(self) -> Array:
-        """Return the derivatives of the outputs where the slaves are, as far as they know them; zero for others.
-
-        Returns:
-            Shape (slots,), in the slots' units per second.
-        """
+        """Return the derivatives of the outputs (slots,) where the slaves are, per second; zero where unknown."""
         found = np.zeros(len(self.wiring.values))
         for stage in self._taking:
             stage.read_rates(found)
@@ -159,11 +155,7 @@ class EventIteration:
         self.catch_up(time, gather)
 
     def raise_end(self, time: float) -> None:
-        """Raise where a slave wants the run to end, after a step or an instant at ``time`` [s].
-
-        Raises:
-            RunEndedError: one wants the run to end.
-        """
+        """Raise ``RunEndedError`` where a slave wants the run to end, after a step or an instant at ``time`` [s]."""
         for stage in self.stages:
             stage.raise_end(time)
 

@@ -18,15 +18,13 @@ def solve_fixed_point(
 ) -> int:
     """Solve ``x = sweep(x)`` by Anderson acceleration (Walker and Ni, SIAM J. Numer. Anal. 49, 2011), type II.
 
-    ``sweep`` is left having been called last with a point that it maps onto itself within the tolerance.
+    ``sweep`` is left having been called last with a point that it maps onto itself within the tolerance. The number of
+    its calls is returned.
 
     Args:
         sweep: the map; its argument and its value have the shape of ``guess``.
         guess: first point, shape (n,).
         tolerance: largest ``|sweep(x) - x|`` relative to ``max(1, |x|)``.
-
-    Returns:
-        The number of calls of ``sweep``.
     """
     points: list[Array] = []
     residuals: list[Array] = []

@@ -64,16 +64,7 @@ class Iterated:
     iterations: int = 50
 
     def run(self, wiring: Wiring, table: Array, start: float, steps: int, rows: Array, record: Slots) -> int:
-        """Run on the grid from ``start`` [s]; each algebraic loop is stepped until what it exchanges settles.
-
-        Args:
-            table: signals, shape (signals, steps + 1).
-            rows: (steps + 1, recorded) filled from row 1 on.
-            record: (recorded,) slots of the recorded signals.
-
-        Returns:
-            The number of passes over loops.
-        """
+        """Run on the grid, each algebraic loop until what it exchanges settles; see ``FixedStepLoop``."""
         groups = loop_groups(wiring)
         passes = 0
         for n in range(steps):

@@ -99,14 +99,7 @@ class Layout:
         return np.array(rows).reshape(len(rows), len(times))
 
     def signal_row(self, row: int, times: Signals, replaced: Mapping[int, Signal]) -> NDArray[np.float64]:
-        """Return one row of the table.
-
-        Args:
-            times: communication points [s], shape (steps + 1,).
-
-        Returns:
-            Shape (steps + 1,), in the unit of the input.
-        """
+        """Return one row of the table, (steps + 1,) in the input's unit, at the communication points ``times`` [s]."""
         found = np.zeros(len(times))
         for values, at_end in self._source_samples(row, times, replaced):
             found[0] += values[0]
@@ -114,14 +107,7 @@ class Layout:
         return found
 
     def signal_values(self, row: int, times: Signals, replaced: Mapping[int, Signal]) -> NDArray[np.float64]:
-        """Return what the sources of a row add at any times.
-
-        Args:
-            times: [s], shape (n,).
-
-        Returns:
-            Shape (n,), in the unit of the input.
-        """
+        """Return what the sources of a row add at any ``times`` (n,) [s]: (n,) in the unit of the input."""
         return np.sum([values for values, _ in self._source_samples(row, times, replaced)], axis=0)
 
     def _source_samples(

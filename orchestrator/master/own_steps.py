@@ -23,9 +23,6 @@ def own_step_remarks(system: System, names: tuple[str, ...], rows: Array, start:
     Args:
         start: of the run [s].
         step: communication step [s].
-
-    Returns:
-        The remarks, one an instance at most.
     """
     moves: dict[str, Array] = {}
     for name, column in zip(names, rows.T, strict=True):

@@ -43,11 +43,7 @@ def _node_basis(nodes: int) -> list[Polynomial]:
 
 @cache
 def piece_weights(closing: bool) -> Array:
-    """Return the matrix from an input's values at the nodes to its constants on all pieces of a window.
-
-    Returns:
-        shape (pieces of the window, nodes).
-    """
+    """Return the matrix (pieces, nodes) from an input's values at nodes to its constants on all pieces of a window."""
     columns = []
     for polynomial in _node_basis(NODES):
         constants: list[float] = []
@@ -80,8 +76,7 @@ def _integral(u: Polynomial) -> float:
 def dense_matrix(nodes: int) -> Array:
     """Return the matrix from values at equidistant nodes to the coefficients of the polynomial in ``s``, square.
 
-    Returns:
-        Shape (nodes, nodes); row ``k`` holds the coefficients of ``s**k``, ``s`` being the fraction of the window.
+    Row ``k`` holds the coefficients of ``s**k``, ``s`` being the fraction of the window.
     """
     return np.array([p.coef for p in _node_basis(nodes)]).T.copy()
 

@@ -100,14 +100,7 @@ class Session:
         signals: Mapping[int, Signal] | None = None,
         allow_early_end: bool = False,
     ) -> Recording:
-        """Run once.
-
-        Args:
-            signals: signals in place of those of ``System.sources``, by index.
-
-        Returns:
-            Times [s], recorded signals and statistics.
-        """
+        """Run once, with ``signals`` in place of those of ``System.sources``, by index."""
         values = self._start_values(start or {})
         table = self._signal_table(signals or {})
         rows = np.empty((self.steps + 1, len(self.record)))

@@ -101,15 +101,6 @@ class Square(Signal):
         return self.offset + np.where(half % 2 == 0, self.amplitude, -self.amplitude)
 
     def breaks(self, start: float, stop: float) -> list[float]:
-        """Find the jumps within a step.
-
-        Args:
-            start: of a step [s].
-            stop: of the step [s].
-
-        Returns:
-            Times [s] within the step at which the signal jumps.
-        """
         half = 0.5 * self.period
         if (stop - start) / half > MAXIMUM_DRAWS:
             raise ScenarioError(f"`period` must leave at most {MAXIMUM_DRAWS:,} jumps, but is {self.period!r}")
@@ -181,14 +172,6 @@ class Noise(Signal):
     start: float = 0.0
 
     def sample(self, times: Array) -> Array:
-        """Draw the noise, each value held for a period.
-
-        Args:
-            times: [s], shape (n,).
-
-        Returns:
-            Values at those times, shape (n,).
-        """
         index = np.floor((times - self.start) / self.period + GRID_SLACK).astype(np.int64)
         count = int(index.max(initial=0)) + 1
         if not 0 < count <= MAXIMUM_DRAWS:

@@ -40,28 +40,14 @@ class Track:
         return number, passed - number
 
     def at(self, times: Array) -> Array:
-        """Return the signals.
-
-        Args:
-            times: [s], shape (n,); the polynomials go on beyond the window.
-
-        Returns:
-            Shape (n, signals).
-        """
+        """Return the signals at ``times`` [s], shape (n, signals); the polynomials go on beyond the window."""
         number, share = self._shares(times)
         powers = np.vander(share, 4, increasing=True)
         found: Array = np.einsum("np,nps->ns", powers, self.coefficients[number])
         return found
 
     def rates_at(self, times: Array) -> Array:
-        """Return the derivatives [1/s]; arguments and shape as for ``at``.
-
-        Args:
-            times: [s], shape (n,).
-
-        Returns:
-            Shape (n, signals).
-        """
+        """Return the derivatives [1/s] at ``times`` [s], shape (n, signals)."""
         number, share = self._shares(times)
         powers = np.vander(share, 3, increasing=True) * np.array([1.0, 2.0, 3.0])
         found: Array = np.einsum("np,nps->ns", powers, self.coefficients[number][:, 1:])
@@ -69,16 +55,7 @@ class Track:
 
 
 def cell_coefficients(values: Array, rates: Array, rated: NDArray[np.bool_], cell: float) -> Array:
-    """Return the polynomials of both cells of a window, see ``Track``.
-
-    Args:
-        values: at begin, middle and end, shape (3, signals).
-        rates: derivatives there, shape (3, signals).
-        cell: length of a cell [s].
-
-    Returns:
-        Shape (2, 4, signals).
-    """
+    """Return the polynomials of both cells of a window, each ``cell`` [s] long; all shapes as in ``Track``."""
     found = np.zeros((2, 4, values.shape[1]))
     slope = 0.5 * (values[2] - values[0])
     bend = 0.5 * (values[0] - 2.0 * values[1] + values[2])
@@ -101,14 +78,7 @@ class JoinedTracks:
         self._values = np.concatenate([tracks[0].values, *(track.values[1:] for track in tracks[1:])])
 
     def at(self, times: Array) -> Array:
-        """Return the signals.
-
-        Args:
-            times: [s] within the windows, shape (n,).
-
-        Returns:
-            Shape (n, signals).
-        """
+        """Return the signals at ``times`` [s] within the windows, shape (n, signals)."""
         found = np.empty((len(times), self._values.shape[1]))
         for track in self._tracks:
             inside = times >= track.start
@@ -123,14 +93,7 @@ class JoinedTracks:
         return found
 
     def values_before(self, times: Array) -> Array:
-        """Return the values at the last node before each time: of signals that jump at nodes.
-
-        Args:
-            times: [s] within the windows, shape (n,).
-
-        Returns:
-            Shape (n, signals).
-        """
+        """Return the values (n, signals) at the last node before each of ``times`` [s], for what jumps at nodes."""
         node = np.searchsorted(self._nodes, times + 1e-9 * (self._nodes[1] - self._nodes[0]), side="right") - 1
         held: Array = self._values[np.maximum(node, 0)]
         return held

@@ -30,29 +30,18 @@ class Waveform:
         self.coefficients = dense_matrix(len(self.nodes)) @ self.nodes
 
     def at(self, times: NDArray[np.floating]) -> Array:
-        """Return the values of the polynomials at ``times`` [s], shape (times, slots).
-
-        Args:
-            times: (times,) [s].
-        """
+        """Return the values of the polynomials at ``times`` (n,) [s], shape (n, slots)."""
         s = (times - self.start) / (self.end - self.start)
         return np.vander(s, len(self.nodes), increasing=True) @ self.coefficients
 
     def times(self) -> Array:
-        """Return the instants of the nodes [s].
-
-        Returns:
-            Shape (nodes,), ends of the window included.
-        """
+        """Return the instants of the nodes (nodes,) [s], ends of the window included."""
         return np.linspace(self.start, self.end, len(self.nodes))
 
     def error_between(self, before: "Waveform", times: NDArray[np.floating]) -> Array:
-        """Return an estimate of the polynomials' errors at ``times`` [s], shape (times, slots).
+        """Return an estimate of the polynomials' errors at ``times`` (n,) [s], shape (n, slots).
 
         It is Newton's term for one more node, the last one but one of ``before``, the window that ended at ``start``.
-
-        Args:
-            times: (times,) [s].
         """
         nodes = self.times()
         extra = before.times()[-2]

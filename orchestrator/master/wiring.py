@@ -132,11 +132,7 @@ def _copies(feeds: tuple[Feed, ...], view: View) -> tuple[Copy, ...]:
 
 
 def gather(stage: Stage, view: View, table: NDArray[np.float64], column: int) -> None:
-    """Fill the input slots of a stage from the outputs and from ``column`` of the table of signals.
-
-    Args:
-        column: 0 for initialisation, ``n + 1`` for step ``n``.
-    """
+    """Fill the input slots of a stage from outputs and from ``column`` of the signals; see ``Layout.signal_table``."""
     for target, source in stage.copies:
         target[:] = source
     for feed in stage.mixed:

@@ -161,12 +161,7 @@ def _noise_label(level: float) -> str:
 
 
 def draw_signals(path: Path, time: Array, signals: Mapping[str, Array], units: Mapping[str, str]) -> None:
-    """Draw signals against time, those of one unit in one panel.
-
-    Args:
-        time: (n,) [s].
-        signals: (n,) each, by name.
-    """
+    """Draw signals (n,) against ``time`` (n,) [s], those of one unit in one panel."""
     names = list(dict.fromkeys(units[name] for name in signals))
     figure, axes = _figure(len(names), (8.0, 1.2 + 2.2 * len(names)))
     for axis, unit in zip(axes, names, strict=True):

@@ -36,14 +36,7 @@ class ErrorStatistics:
 
 
 def error_statistics(actual: Array, estimated: Array, lower: Array, upper: Array) -> ErrorStatistics:
-    """Return the statistics of estimates of half-gaps, all arrays of one shape [rad].
-
-    Args:
-        actual: (n,) half-gaps.
-        estimated: (n,) their estimates.
-        lower: (n,) lower ends of the intervals.
-        upper: (n,) upper ends.
-    """
+    """Return the statistics of estimates of half-gaps with their intervals; all arrays (n,) [rad]."""
     if not len(actual) or not len(actual) == len(estimated) == len(lower) == len(upper):
         raise ValueError("the arrays must be of one length of at least 1")
     percent = 100.0 * np.abs(estimated - actual) / actual

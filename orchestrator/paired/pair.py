@@ -35,11 +35,7 @@ def run_pair(
 ) -> PairRun:
     """Co-simulate the loop with a half-gap ``alpha`` [rad] and its twin without one, side by side.
 
-    Args:
-        alpha: half-gap [rad]; any size, for the estimate says itself when it cannot be trusted.
-
-    Returns:
-        Both loops, S and the estimate.
+    The half-gap may have any size, for the estimate says itself when it cannot be trusted.
     """
     prefixes = (MACHINE, TWIN)
     system = loop_system(experiment, fmus, prefixes)
@@ -64,11 +60,7 @@ def _add_prefix(prefix: str, address: str) -> str:
 
 
 def with_settings(experiment: Experiment, backlash_model: str | None = None, noise: float | None = None) -> Experiment:
-    """Return ``experiment`` with another backlash model or another encoder noise [rad].
-
-    Args:
-        noise: [rad]; None: unchanged.
-    """
+    """Return ``experiment`` with another backlash model or another encoder noise [rad]; None: unchanged."""
     if backlash_model is not None:
         experiment = replace(experiment, backlash_model=backlash_model)
     if noise is not None:

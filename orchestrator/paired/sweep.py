@@ -77,11 +77,7 @@ class SweepPlan:
     def calibrations(
         self, progress: Callable[[str], None] | None = None, settings: MapSettings = DEFAULT_SETTINGS
     ) -> dict[float, Calibration]:
-        """Return the calibration of each noise level; ``progress`` is told of those that must be made.
-
-        Returns:
-            Calibration by noise level [rad].
-        """
+        """Return the calibration by noise level [rad]; ``progress`` is told of those that must be made."""
         levels = {level: with_settings(self.experiment, noise=level) for level in self.noise}
         return {level: load_or_calibrate(experiment, progress, settings) for level, experiment in levels.items()}
 

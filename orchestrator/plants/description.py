@@ -224,11 +224,7 @@ class Plant:
         return Kernels(self.kernel, checked=True)
 
     def jacobian(self, p: Array) -> Array:
-        """Return the matrix of the linear plant, by differences of its own (linear) rates.
-
-        Returns:
-            Shape (states, states), in the order of ``states``.
-        """
+        """Return the matrix (states, states) of the linear plant, by differences of its own (linear) rates."""
         plain = self._plain(p)
         columns = []
         for place in self.states:

@@ -17,11 +17,7 @@ Run = Callable[[Array, Array, Array, Array], None]
 def is_linear(plant: Plant, p: Array) -> bool:
     """Tell whether a model moves as the linear plant does: what acts on it changes the request or the encoders alone.
 
-    Args:
-        p: the parameters of the analysis.
-
-    Returns:
-        True where no gap is open, no law was learned, and all effects but a limit, a delay and offsets are off.
+    It does where no gap is open, no law was learned, and all effects but a limit, a delay and offsets are off.
     """
     if plant.learned:
         return False

@@ -54,14 +54,7 @@ class ReferencePlant(DrivetrainValues):
 
 
 def first_flank(plant: ReferencePlant, x: Array) -> int:
-    """Return the flank (-1, 0, 1) at which a state of at least 3 values starts.
-
-    Args:
-        x: state; motor's angle [rad] first, load's angle third.
-
-    Returns:
-        The flank; 0 inside the gap.
-    """
+    """Return the flank (-1, 1; 0: in the gap) at which a state starts, motor's angle [rad] first, load's third."""
     if plant.alpha == 0.0:
         return 1
     wound = x[0] / plant.i - x[2]

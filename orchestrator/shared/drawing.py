@@ -16,12 +16,7 @@ def label_text(name: str) -> str:
 
 
 def shade_gap(axis: Any, time: NDArray[np.float64], contact: NDArray[Any], label: str | None = None) -> None:
-    """Shade the spans of time in which no teeth touch, the first with a label.
-
-    Args:
-        time: (n,) [s].
-        contact: (n,) flank that touches, 0 for none.
-    """
+    """Shade the spans of ``time`` (n,) [s] in which no teeth touch (``contact`` (n,) is 0), the first with a label."""
     free = np.concatenate([[False], contact == 0, [False]])
     edges = np.flatnonzero(free[1:] != free[:-1])
     for first, last in zip(edges[::2], edges[1::2], strict=True):

@@ -125,13 +125,9 @@ def kill_group(process: "subprocess.Popen[bytes]") -> bool:
 
 
 def collect(process: "subprocess.Popen[bytes]", limit: float) -> int:
-    """Wait for a child to end.
+    """Wait at most ``limit`` [s] for a child to end, and return its peak of resident memory in bytes.
 
-    Args:
-        limit: [s].
-
-    Returns:
-        Its peak of resident memory in bytes; 0 where that may be another's, or the system does not tell.
+    It is 0 where that may be another's, or the system does not tell.
     """
     if _resource is None or not hasattr(os, "wait4"):
         process.wait(limit)
@@ -152,11 +148,7 @@ def collect(process: "subprocess.Popen[bytes]", limit: float) -> int:
 
 
 def lock(descriptor: int) -> bool:
-    """Lock an open file for this process, until it is closed.
-
-    Returns:
-        False when another process has locked it. Where the system has no locks, True.
-    """
+    """Lock an open file until it is closed; return False if another process has. Without locks in the system, True."""
     from filelock import lock_descriptor
 
     try:

@@ -9,20 +9,12 @@ _ONE_AT_A_TIME = Lock()
 
 
 def parse_python(source: bytes | str) -> ast.Module:
-    """Return the syntax tree of a module.
-
-    Raises:
-        SyntaxError: it is no Python.
-    """
+    """Return the syntax tree of a module, or raise ``SyntaxError``."""
     with _ONE_AT_A_TIME:
         return ast.parse(source)
 
 
 def parse_expression(source: str) -> ast.expr:
-    """Return the syntax tree of an expression.
-
-    Raises:
-        SyntaxError: it is no expression of Python.
-    """
+    """Return the syntax tree of an expression, or raise ``SyntaxError``."""
     with _ONE_AT_A_TIME:
         return ast.parse(source, mode="eval").body

@@ -72,9 +72,7 @@ def followed_request(request: float, u: float, time_constant: float, limit: floa
     """Return a request that follows a held ``u`` [N.m] with a lag and a limited rate, after ``h`` [s], and its mean.
 
     Args:
-        request: at the beginning [N.m].
         limit: largest rate [N.m/s].
-        h: duration [s].
     """
     ramp = min(h, ramp_time(request, u, time_constant, limit))
     slope = limit if u > request else -limit

@@ -47,11 +47,6 @@ def hysteresis_rate(memory: float, rate: float, width: float) -> float:
     """Return the rate [1/s] of Bouc and Wen's hysteresis (-1 to 1), twisted at ``rate`` [rad/s] (exponent 1).
 
     It turns round over the twist ``width`` [rad] (Wen, J. Engineering Mechanics 102(2), 1976).
-
-    Args:
-        memory: of the hysteresis, -1 to 1.
-        rate: of the twist [rad/s].
-        width: [rad].
     """
     return (rate - 0.5 * abs(rate) * memory - 0.5 * rate * abs(memory)) / width
 
@@ -70,12 +65,8 @@ def hardening_torque(twist: float, cubic: float, stiffness: float, sharpness: fl
     """Return what a hardening stiffness adds to the torque of a shaft twisted by ``twist`` [rad].
 
     ``cubic * twist**3 + sharpness * cubic**2 / stiffness * twist**5``: the odd series of a stiffness that grows, to its
-    third term. A cubic spring has a sharpness of 0, one that grows as the tangent does, up to a rigid end, 1.2.
-
-    Args:
-        twist: [rad].
-        stiffness: of small twists [N.m/rad]; without one there is no fifth power.
-        sharpness: [1].
+    third term. A cubic spring has a sharpness of 0, one that grows as the tangent does, up to a rigid end, 1.2. Without
+    a stiffness of small twists there is no fifth power.
     """
     third = cubic * twist * twist * twist
     if sharpness == 0.0 or stiffness <= 0.0:

@@ -79,11 +79,7 @@ class KindError(ValueError):
 
 
 def kind_of(annotation: Any) -> Kind:
-    """Return the kind that an annotation (evaluated) stands for.
-
-    Args:
-        annotation: such as ``float`` or ``tuple[float, float]``.
-    """
+    """Return the kind that an evaluated annotation, such as ``float`` or ``tuple[float, float]``, stands for."""
     if isinstance(annotation, type | None) and annotation in _SCALARS:
         return _SCALARS[annotation]
     if isinstance(annotation, type) and issubclass(annotation, tuple) and hasattr(annotation, "_fields"):

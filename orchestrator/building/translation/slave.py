@@ -45,11 +45,7 @@ class TranslatedSlave:
 
 
 def translate_slave(cls: Any, taken: frozenset[str] = frozenset(), fmi: int = 2) -> TranslatedSlave:
-    """Translate an adapter (a subclass of ``SlaveBase``) and all that it calls. Return the slave in C, in parts.
-
-    Args:
-        fmi: version of FMI, 2 or 3.
-    """
+    """Return an adapter (a subclass of ``SlaveBase``), and all that it calls, in C, in parts, for FMI 2 or 3."""
     owner = Owner(cls, attributes_of(cls), len(cls.table))
     program = Program(translate, owner, taken | {cls.__name__})
     sampled = any(base.__name__ == "SampledSlave" for base in cls.__mro__)

@@ -40,12 +40,7 @@ def observer_gain(A: Array, output: Array, V_d: float, V_n: float) -> Array:
 
 
 def error_covariance(A: Array, output: Array, V_d: float, V_n: float) -> Array:
-    """Return the (6, 6) stationary covariance of the estimate's error; arguments as for :func:`observer_gain`.
-
-    Args:
-        A: (6, 6) of the model.
-        output: (1, 6) row of the measured angle.
-    """
+    """Return the (6, 6) stationary covariance of the estimate's error; arguments as for :func:`observer_gain`."""
     return np.asarray(solve_continuous_are(A.T, output.T, V_d * np.eye(6), np.array([[V_n]])))
 
 

@@ -27,11 +27,7 @@ def refusal(values: Mapping[str, float]) -> str:
 
 
 def fmu_parameters(p: Array) -> Array:
-    """Return the FMU's own parameters of a model (n,): fitted distances of friction and contact included.
-
-    Args:
-        p: the parameters of the analysis, (n,).
-    """
+    """Return the FMU's own parameters (n,) of a model's ``p`` (n,), fitted distances of friction included."""
     own = dt.DrivetrainParameters._make(p[: dt.COUNT])
     gap = own.alpha if int(own.backlash_model) in GRADUAL else 0.0
     ons = (breakaway_torque(dt.motor_friction(own)), breakaway_torque(dt.load_friction(own)), gap)

@@ -53,13 +53,10 @@ def fit_damped(
     iterations: int,
     converged: Callable[[float, float], bool],
 ) -> tuple[T, Array | None]:
-    """Return the point at which damped steps end, and the last Hessian (None: not even one was made).
+    """Return the point at which damped steps end, and the last Hessian (k, k); None where no step was tried.
 
     Args:
         converged: (gain of the step, cost after it) -> True when the fit may end; a failed step gains nothing.
-
-    Returns:
-        The point at which steps end, and the last Hessian (k, k), or None where no step was tried.
     """
     point, strength = start, damping.first
     hessian: Array | None = None

@@ -9,12 +9,9 @@ Array = NDArray[np.float64]
 
 
 def pseudo_inverse(matrix: Array, **how: Any) -> Array:
-    """Return the pseudo-inverse of a matrix.
+    """Return the pseudo-inverse of a matrix (n, m).
 
     A singular value decomposition of a matrix with infinities in it need not end: it is not begun.
-
-    Args:
-        matrix: (n, m).
 
     Examples:
         >>> pseudo_inverse(np.diag([2.0, 0.0])).tolist()

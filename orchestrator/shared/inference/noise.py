@@ -27,12 +27,9 @@ def residual_noise(values: Array, count: float, window: int = 9) -> float:
 
 
 def robust_noise(values: Array) -> float:
-    """Return the standard deviation of white noise on a smooth motion (n,), from its third differences.
+    """Return the standard deviation of white noise on a smooth motion (n,), NaN missing, from its third differences.
 
     Motion hardly shows in them, their gain on white noise is sqrt(20), and their median sheds impacts.
-
-    Args:
-        values: (n,) samples; NaN: missing.
     """
     return MAD_TO_DEVIATION * float(np.nanmedian(np.abs(np.diff(values, 3)))) / math.sqrt(20.0)
 
@@ -43,13 +40,7 @@ def rms(values: Array) -> float:
 
 
 def rms_behind_lag(u: Array, h: float, tau: float) -> float:
-    """Return the rms [N.m] of ``u`` behind a lag of ``tau`` [s].
-
-    Args:
-        u: (n,) requested torque [N.m].
-        h: sample time [s].
-        tau: [s].
-    """
+    """Return the rms [N.m] of ``u`` (n,) [N.m], sampled every ``h`` [s], behind a lag of ``tau`` [s]."""
     from scipy.signal import lfilter
 
     pole = math.exp(-h / tau) if tau > 0.0 else 0.0

@@ -68,11 +68,7 @@ def system_folders() -> set[Path]:
 
 
 def code_folders(shadow: Path, packages: Sequence[str]) -> list[Path]:
-    """Link the packages from ``shadow`` and return where they are, so that nothing beside them has to be readable.
-
-    Returns:
-        Where the packages really are.
-    """
+    """Link the packages from ``shadow`` and return where they are, so that nothing beside them has to be readable."""
     found = []
     for name in dict.fromkeys((*_OURS, *packages)):
         spec = importlib.util.find_spec(name)

@@ -60,11 +60,7 @@ def follow_parent(parent: int) -> None:
 
 
 def limit_process(limits: Limits) -> None:
-    """Set the limits that the kernel keeps: processor time, address space, size of files, descriptors, no core file.
-
-    Args:
-        limits: memory [bytes], time [s] and so on.
-    """
+    """Set the limits that the kernel keeps: processor time, address space, size of files, descriptors, no core file."""
     # Address space is more than what is resident: libraries reserve far more than they touch.
     set_limits(
         {
