@@ -7,7 +7,6 @@ from typing import ClassVar
 from .backlash_compensator import CROSS, PLAIN, CrossingState, Gap, Tuning, act, start_state
 from .controller_variables import GAINS, INPUTS
 from .fmu_variables import FmuVariable
-from .gap_traversal import Traversal
 from .lqr import Estimate, Gains
 from .sampled_slave import SampledSlave
 from .state_prediction import MOST_LATE, Sent, Train, foresee_late, n_under_way
@@ -75,23 +74,9 @@ class BacklashCompensator(SampledSlave):
     )  # fmt: skip
 
     _gains: Gains
-    _stage: int
-    _flank: int
-    _age: int
-    _lead: float
-    _once: float
-    _twice: float
-    _plan: Traversal
-    _barred: float
+    _state: CrossingState
+    _next: CrossingState
     _sent: Sent
-    _next_stage: int
-    _next_flank: int
-    _next_age: int
-    _next_lead: float
-    _next_once: float
-    _next_twice: float
-    _next_plan: Traversal
-    _next_barred: float
 
     def take_parameters(self) -> None:
         """Collect the gains."""
@@ -104,36 +89,18 @@ class BacklashCompensator(SampledSlave):
         self._sent = []
         for _ in range(n_under_way(self.real[DELAY])):
             self._sent.append(self.real[FIRST_ESTIMATE + 5])
-        state = start_state(self._estimate(), self.real[REFERENCE_SPEED], self.real[FIRST_TRAIN + 4])
-        self._stage = state.phase
-        self._flank = state.flank
-        self._age = state.samples
-        self._lead = state.lead
-        self._once = state.speed_once
-        self._twice = state.speed_twice
-        self._plan = state.traversal
-        self._barred = state.barred
+        self._state = start_state(self._estimate(), self.real[REFERENCE_SPEED], self.real[FIRST_TRAIN + 4])
         self.correct()
 
     def predict(self) -> None:
         """Take over the state of the last sample."""
-        self._stage = self._next_stage
-        self._flank = self._next_flank
-        self._age = self._next_age
-        self._lead = self._next_lead
-        self._once = self._next_once
-        self._twice = self._next_twice
-        self._plan = self._next_plan
-        self._barred = self._next_barred
+        self._state = self._next
         self._sent.append(self.real[U])
         del self._sent[:1]
 
     def correct(self) -> None:
         """Compute the torque request of this sample."""
         real = self.real
-        state = CrossingState(
-            self._stage, self._flank, self._age, self._lead, self._once, self._twice, self._plan, self._barred
-        )  # fmt: skip
         n = FIRST_TRAIN
         train = Train(real[n], real[n + 1], real[n + 2], real[n + 3], real[n + 4], real[n + 5], real[n + 6])
         n = FIRST_TUNING
@@ -143,15 +110,8 @@ class BacklashCompensator(SampledSlave):
         speed = real[REFERENCE_SPEED]
         reference = real[REFERENCE] + real[DELAY] * h * speed
         x = foresee_late(self._estimate(), self._sent, real[DELAY], h, max(gap.alpha, 0.0), train)
-        state, u = act(state, reference, speed, x, gap, self._gains, train, tuning)
-        self._next_stage = state.phase
-        self._next_flank = state.flank
-        self._next_age = state.samples
-        self._next_lead = state.lead
-        self._next_once = state.speed_once
-        self._next_twice = state.speed_twice
-        self._next_plan = state.traversal
-        self._next_barred = state.barred
+        state, u = act(self._state, reference, speed, x, gap, self._gains, train, tuning)
+        self._next = state
         real[U] = u
         real[FLANK] = 0.0 if state.phase == PLAIN else float(state.flank)
         real[CROSSING] = 1.0 if state.phase == CROSS else 0.0

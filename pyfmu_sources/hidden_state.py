@@ -34,8 +34,9 @@ def shaped(value: Any, kind: Any) -> Any:
     base = getattr(kind, "__origin__", kind)  # Annotated[list[T], N] leads to list[T], that to list
     if hasattr(kind, "__metadata__"):
         return shaped(value, base)
-    if hasattr(kind, "_fields"):  # a NamedTuple of numbers
-        return kind._make(value)
+    if hasattr(kind, "_fields"):
+        fields = list(kind.__annotations__.values())
+        return kind._make([shaped(item, fields[n]) for n, item in enumerate(value)])
     kinds: tuple[Any, ...] = getattr(kind, "__args__", ())
     if base is list:
         return [shaped(item, kinds[0]) for item in value]
