@@ -5,14 +5,16 @@ The laws and their guards are those of :mod:`smooth_events`; here they are witho
 In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
+from typing import Annotated
+
 from .dormand_prince import mode_rates
 from .dry_friction import NEVER, shaft_torque
 from .equations import Mode, Parameters, State
 from .event_numbers import NO_EVENT
 from .laws.drive import saturated
-from .smooth_events import guard, guard_room, settled, switched
+from .smooth_events import GUARDS, guard, guard_room, settled, switched
 
-Indicators = tuple[float, float, float, float]
+Indicators = Annotated[tuple[float, ...], GUARDS]
 Outputs = tuple[float, float, float, float, float, float]
 
 # An indicator turns negative when its guard is this many roundings below zero, so that the event update, which
@@ -49,12 +51,7 @@ def indicator(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: fl
 
 def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Indicators:
     """Return all event indicators; the mode ends when one turns negative."""
-    return (
-        indicator(x, mode, 0, p, u, T_l),
-        indicator(x, mode, 1, p, u, T_l),
-        indicator(x, mode, 2, p, u, T_l),
-        indicator(x, mode, 3, p, u, T_l),
-    )
+    return tuple(indicator(x, mode, which, p, u, T_l) for which in range(GUARDS))
 
 
 def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Outputs:

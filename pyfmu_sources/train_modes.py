@@ -8,6 +8,8 @@ In all functions: ``which``: number of a guard; ``constant``: 1: with inputs and
 ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
+from typing import Annotated
+
 from .event_numbers import NO_EVENT
 from .laws.drive import saturated
 from .linear_mode import EPSILON, GUARD_ROUNDINGS
@@ -24,10 +26,10 @@ from .train_equations import (
     twists,
 )
 
-Indicators = tuple[float, float, float, float, float, float, float, float, float, float]
 Outputs = tuple[float, float, float, float, float, float, float, float, float, float, float]
 
 GUARDS = 10
+Indicators = Annotated[tuple[float, ...], GUARDS]
 FRICTION = 4  # the first guard of dry friction
 # An indicator turns negative when its guard is this many roundings below zero, so that the event update, which
 # wants one, surely finds it violated.
@@ -146,15 +148,4 @@ def indicator(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> fl
 
 def indicators(x: State, mode: Mode, p: Parameters, T_l: float) -> Indicators:
     """Return all event indicators; the mode ends when one turns negative."""
-    return (
-        indicator(x, mode, 0, p, T_l),
-        indicator(x, mode, 1, p, T_l),
-        indicator(x, mode, 2, p, T_l),
-        indicator(x, mode, 3, p, T_l),
-        indicator(x, mode, 4, p, T_l),
-        indicator(x, mode, 5, p, T_l),
-        indicator(x, mode, 6, p, T_l),
-        indicator(x, mode, 7, p, T_l),
-        indicator(x, mode, 8, p, T_l),
-        indicator(x, mode, 9, p, T_l),
-    )
+    return tuple(indicator(x, mode, which, p, T_l) for which in range(GUARDS))

@@ -17,7 +17,7 @@ from orchestrator.building.documentation import documentation
 from orchestrator.building.fmi3_description import fmi3_description
 from orchestrator.building.fmi3_files import build_description, terminals_and_icons
 from orchestrator.building.native_description import native_description
-from orchestrator.building.native_sources import c_sources, indicator_count, slave_class
+from orchestrator.building.native_sources import c_sources, indicator_total, slave_class
 from orchestrator.building.reference_files import reference_files
 from orchestrator.building.sources import PLACEHOLDER, Recipe, fingerprint, recipes_of
 from orchestrator.building.stamping import content_guid, final_text, stamp
@@ -49,14 +49,6 @@ def ensure_native(
     return {recipe.name: _ensure(recipe, folder, force, here, fmi, real_outputs) for recipe in recipes_of(names)}
 
 
-def _require_compiler(here: bool = False) -> Compiler:
-    """Return the compiler, see :func:`find_compiler`."""
-    compiler = find_compiler(here)
-    if compiler is None:
-        raise FmuError(NO_COMPILER)
-    return compiler
-
-
 def native_remark() -> str | None:
     """Return one line on what is missing for all platforms, or ``None``."""
     compiler = find_compiler()
@@ -70,7 +62,9 @@ def native_remark() -> str | None:
 
 
 def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int, real_outputs: bool) -> Path:
-    compiler = _require_compiler(here)
+    compiler = find_compiler(here)
+    if compiler is None:
+        raise FmuError(NO_COMPILER)
     targets = [str(target.zig) for target in compiler.targets]
     current = fingerprint(recipe, "native", f"{fmi} {real_outputs}", compiler.identity, *FLAGS, *targets)
     build = partial(_build, recipe, compiler, fmi, real_outputs)
@@ -78,28 +72,21 @@ def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int, 
 
 
 def _build(recipe: Recipe, compiler: Compiler, fmi: int, real_outputs: bool, path: Path, current: str) -> None:
-    write_archive(path, _native_members(recipe, compiler, current, fmi, real_outputs))
-
-
-def _native_members(
-    recipe: Recipe, compiler: Compiler, fingerprint: str, fmi: int, real_outputs: bool
-) -> dict[str, bytes]:
-    """Return the members of the archive."""
     cls = slave_class(recipe, fmi, real_outputs)
     sources = c_sources(recipe, cls, PLACEHOLDER, fmi)
     folders = {target: target.folders(fmi) for target in compiler.targets}
-    description = native_description(recipe, cls, indicator_count(sources[f"{recipe.name}.c"]))
+    description = native_description(recipe, cls, indicator_total(cls))
     members = documentation(recipe, description, [name for names in folders.values() for name in names], fmi)
     members |= reference_files(recipe, description)
     if fmi == 3:
         description = fmi3_description(cls, recipe.name, native=True)
         sources["buildDescription.xml"] = build_description(recipe.name)
         members["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(cls)
-    stamp(description, fingerprint)
+    stamp(description, current)
     guid = content_guid(description, members | {f"sources/{name}": data for name, data in sources.items()})
     sources = {name: data.replace(PLACEHOLDER.encode(), guid.encode()) for name, data in sources.items()}
     members |= {f"sources/{name}": data for name, data in sources.items()}
     for target in compiler.targets:
         library = compile_library(compiler, target, recipe.name, sources)
         members |= {f"binaries/{folder}/{recipe.name}{target.suffix}": library for folder in folders[target]}
-    return members | {"modelDescription.xml": final_text(description, guid)}
+    write_archive(path, members | {"modelDescription.xml": final_text(description, guid)})

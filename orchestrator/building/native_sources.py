@@ -14,6 +14,7 @@ from orchestrator.building.arrays import arrays
 from orchestrator.building.fmi3_description import INDICATOR
 from orchestrator.building.sources import Recipe
 from orchestrator.building.starts import default_starts
+from orchestrator.building.translation.kinds import Tuple, kind_of
 from orchestrator.building.translation.slave import has_states, translate_slave
 from orchestrator.errors import FmuError
 from orchestrator.shared.equation_files import members
@@ -103,7 +104,11 @@ def _state_variables(cls: Any) -> Iterator[FmuVariable]:
 
 def indicator_total(cls: Any) -> int:
     """Return how many event indicators a slave has."""
-    return len(get_type_hints(cls.indicators)["return"].__args__) if hasattr(cls, "indicators") else 0
+    if not hasattr(cls, "indicators"):
+        return 0
+    kind = kind_of(get_type_hints(cls.indicators, include_extras=True)["return"])
+    assert isinstance(kind, Tuple)
+    return len(kind.items)
 
 
 def _indicators(cls: Any) -> Iterator[FmuVariable]:
@@ -160,12 +165,6 @@ _SCALARS = {"output": 1, "input": 1 | 2, "parameter": 1 | 4}
 def _numbers(declared: str, values: list[int]) -> str:
     lines = textwrap.fill(", ".join(map(str, values)), 110, initial_indent="    ", subsequent_indent="    ")
     return f"static const {declared}[] = {{\n{lines}}};"
-
-
-def indicator_count(source: bytes) -> int:
-    """Return how many event indicators the C of a slave defines."""
-    found = re.search(rb"#define INDICATORS (\d+)", source)
-    return int(found[1]) if found else 0
 
 
 _PYTHON_ONLY = ("slave_base", "sampled_slave", "fmu_variables", "hidden_state", "model_xml", "__init__")

@@ -70,11 +70,6 @@ def _ensure(recipe: Recipe, directory: Path, force: bool) -> Path:
 
 
 def _build(recipe: Recipe, toolchain: Toolchain, path: Path, current: str) -> None:
-    write_archive(path, _members(recipe, toolchain, current))
-
-
-def _members(recipe: Recipe, toolchain: Toolchain, current: str) -> dict[str, bytes]:
-    """Return the members of the archive."""
     cls = slave_class(recipe, fmi=3)
     package, members = _modules(recipe)
     members |= documentation(recipe, native_description(recipe, cls, 0), fmi=3)
@@ -88,7 +83,7 @@ def _members(recipe: Recipe, toolchain: Toolchain, current: str) -> dict[str, by
     files = {name: (RUNTIME / name).read_bytes() for name in OF_FMI3}
     files["slave.c"] = _source(cls, package, token)
     members[f"binaries/{PLATFORM}/{recipe.name}.so"] = compile_host(toolchain, "slave.c", files)
-    return members | {"modelDescription.xml": final_text(description, token)}
+    write_archive(path, members | {"modelDescription.xml": final_text(description, token)})
 
 
 def _modules(recipe: Recipe) -> tuple[str, dict[str, bytes]]:
