@@ -115,9 +115,7 @@ static Status refuse_read(Instance *s, const Reference r[], size_t n, bool real,
     for (size_t k = 0; k < n; k++)
         if (!(real ? HAS(r[k], REAL_VALUE) : IS_WHOLE(r[k])))
             return refuse_type(s, r[k]);
-    if (fault->kind)
-        say_fault(s, fault);
-    return s->worst;
+    return concluded(s, fault);
 }
 
 EXPORT Status FMI(fmi2GetReal)(Component c, const Reference r[], size_t n, double v[])

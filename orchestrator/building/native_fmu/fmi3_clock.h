@@ -69,8 +69,7 @@ static void end_tick(Instance *s)
     recompute(s, &fault);
     if (!fault.kind)
         slave_predict(&s->slave, &fault);
-    if (fault.kind)
-        say_fault(s, &fault);
+    concluded(s, &fault);
     s->course.samples++;
     s->course.at_sample = 0;
 }

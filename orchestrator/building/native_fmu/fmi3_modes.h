@@ -36,8 +36,7 @@ static bool bring_up_to_date(Instance *s)
     Fault fault;
     fault.kind = NO_FAULT;
     recompute(s, &fault);
-    if (fault.kind)
-        say_fault(s, &fault);
+    concluded(s, &fault);
     return !fault.kind;
 }
 

@@ -141,9 +141,7 @@ static Status get_reals(Instance *s, const Reference r[], size_t n, double v[], 
         memcpy(v, r[k] == TIME ? &s->course.time : &s->slave.real[r[k]], count * sizeof *v);
         v += count;
     }
-    if (fault.kind)
-        say_fault(s, &fault);
-    return s->worst;
+    return concluded(s, &fault);
 }
 
 /* Set what is left from the variable at place `k` on; those before are scalars that have been set. */

@@ -87,6 +87,14 @@ static void say_fault(Instance *s, const Fault *fault)
     say(s, ERROR, "%s failed: %s: %s", s->function, names[fault->kind], fault->message);
 }
 
+/* The status of a call that may have raised. */
+static Status concluded(Instance *s, const Fault *fault)
+{
+    if (fault->kind)
+        say_fault(s, fault);
+    return s->worst;
+}
+
 static const char *name_of(Reference r, char text[64])
 {
     if (r < VARIABLES)
@@ -314,13 +322,11 @@ static Status exit_initialization(Instance *s)
     if (s->course.type == MODEL_EXCHANGE && !fault.kind)
         slave_update(&s->slave, s->course.time, &fault);
 #endif
-    if (fault.kind) {
-        say_fault(s, &fault);
-    } else {
+    if (!fault.kind) {
         s->fresh = true;
         s->course.phase = STEPPING;
     }
-    return s->worst;
+    return concluded(s, &fault);
 }
 
 static Status terminate(Instance *s)

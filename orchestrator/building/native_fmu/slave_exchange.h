@@ -10,13 +10,6 @@
         return s->worst; \
     }
 
-static Status concluded(Instance *s, const Fault *fault)
-{
-    if (fault->kind)
-        say_fault(s, fault);
-    return s->worst;
-}
-
 /* Settle state and mode; the slave does it by itself: one call is enough. Tell whether states have jumped. */
 static Status update_slave(Instance *s, bool *jumped)
 {

@@ -36,10 +36,8 @@ static Status save_state(Instance *s, void **x)
     if (!fault.kind)
         text = slave_hidden(&s->slave, &length, &fault);
 #endif
-    if (fault.kind) {
-        say_fault(s, &fault);
-        return s->worst;
-    }
+    if (fault.kind)
+        return concluded(s, &fault);
     const size_t size = saved_size(s) + length;
     Saved header = {GUID, size, s->course};
     char *bytes = malloc(sizeof size + size), *end = bytes;
@@ -113,10 +111,8 @@ static Status restore_state(Instance *s, const void *x)
     const size_t before = sizeof header + FIXED_BYTES;
     fault.kind = NO_FAULT;
     slave_take_hidden(&s->slave, bytes + before, header.size - before, &fault);
-    if (fault.kind) {
-        say_fault(s, &fault);
-        return s->worst;
-    }
+    if (fault.kind)
+        return concluded(s, &fault);
 #endif
     s->course = header.course;
     memcpy(&s->slave, bytes += sizeof header, FIXED_BYTES);
@@ -218,10 +214,8 @@ static Status directional_derivative(Instance *s, const Reference unknown[], siz
     recompute(s, &fault);
     if (!fault.kind)
         slave_directional(&s->slave, seeds, found, &fault);
-    if (fault.kind) {
-        say_fault(s, &fault);
-        return s->worst;
-    }
+    if (fault.kind)
+        return concluded(s, &fault);
     for (size_t k = 0; k < n; k++)
         sensitivity[k] = found[unknown[k]];
     return s->worst;
