@@ -12,7 +12,7 @@ windows grow again, no faster than the time since the event. They end where a so
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +27,7 @@ from orchestrator.master.result import Statistics
 from orchestrator.master.rollback import rollback
 from orchestrator.master.signals import GRID_SLACK, Signal
 from orchestrator.master.waveform import Waveform
-from orchestrator.master.wiring import Stage, Wiring
+from orchestrator.master.wiring import Slots, Stage, Wiring
 
 Array = NDArray[np.float64]
 
@@ -143,6 +143,33 @@ def window_end(time: float, length: float, target: float) -> float:
     return time + (min(length, 0.5 * left) if left < 2.0 * length else length)
 
 
+def next_length(length: float, error: float, largest: float) -> float:
+    """Return the length [s] to try after a window of that ``length`` with an ``error`` in multiples of the allowed."""
+    excess = max(error, 1e-12)
+    factor = SAFETY * excess ** (-1.0 / ORDER) if math.isfinite(excess) else SHRINK
+    return min(length * min(max(factor, SHRINK), GROW), largest)
+
+
+def largest_difference(values: Array, reference: Array, slots: Slots, tolerance: float) -> float:
+    """Return the largest difference of some slots as a multiple of the tolerance; shape (..., slots) each."""
+    a, b = values[..., slots], reference[..., slots]
+    error = float(np.max(np.abs(a - b) / (tolerance * np.maximum(1.0, np.abs(b))), initial=0.0))
+    return error if math.isfinite(error) else math.inf
+
+
+def source_nodes(layout: Layout, signals: Sequence[Signal], times: Array, jumps: bool, stop: float) -> Array:
+    """Return what the sources add at times, shape (rows, times): the left limit at the last where one ``jumps``."""
+    inside = times.copy()
+    if jumps:
+        # Signals take a time just before a jump for the jump itself, by up to GRID_SLACK of their period.
+        inside[-1] -= max(1e-6 * (times[-1] - times[0]), 4.0 * GRID_SLACK * max(1.0, abs(stop)))
+    table = np.zeros((len(layout.signals), len(times)))
+    for k, parts in enumerate(layout.signals):
+        for index, factor, offset, _ in parts:
+            table[k] += factor * signals[index].sample(inside) + offset
+    return table
+
+
 class _Run:
     """One run: the windows, their lengths and the recorded points."""
 
@@ -201,25 +228,20 @@ class _Run:
                     self.counts.rejected += 1
                     if event is not None or attempt.error > SUSPICIOUS:
                         event = _Event(time, attempt.trouble, attempt.error)
-                    length = self._next_length(attempt, share)
+                    length = next_length(attempt.length, attempt.error / share, self.settings.largest)
                     self._give_up(time, (event.window_end(time) - time) if event else length)
                     continue
                 row = self._write(attempt.outputs, row)
                 self.before = attempt.guess
                 self.counts.accepted += 1
                 longest = max(longest, attempt.length)
-                length = self._next_length(attempt, share)
+                length = next_length(attempt.length, attempt.error / share, self.settings.largest)
                 if event is not None and (end >= event.end or event.was_none(attempt)):
                     crossed, event = end, None
                 time = end
                 # Held inputs must not take a slave back across the event that it has just passed.
                 length = min(length, max(attempt.length, CAUTION * (time - crossed)))
         return Statistics(self.counts.accepted, self.counts.rejected, self.calls, self.counts.sweeps)
-
-    def _next_length(self, attempt: _Attempt, share: float) -> float:
-        excess = max(attempt.error / share, 1e-12)
-        factor = SAFETY * excess ** (-1.0 / ORDER) if math.isfinite(excess) else SHRINK
-        return min(attempt.length * min(max(factor, SHRINK), GROW), self.settings.largest)
 
     def _give_up(self, time: float, length: float) -> None:
         if length < self.settings.smallest:
@@ -271,11 +293,7 @@ class _Run:
         return error if math.isfinite(error) else SUSPICIOUS
 
     def _difference(self, values: Array, reference: Array) -> float:
-        """Return the largest difference of two sets of values as a multiple of the tolerance."""
-        a, b = values[self.outputs], reference[self.outputs]
-        scale = self.settings.tolerance * np.maximum(1.0, np.abs(b))
-        error = float(np.max(np.abs(a - b) / scale, initial=0.0))
-        return error if math.isfinite(error) else math.inf
+        return largest_difference(values, reference, self.outputs, self.settings.tolerance)
 
     def _sweep(self, start: float, end: float, guess: Waveform | None) -> Waveform:
         """Step all slaves from ``start`` to ``end`` [s], ``SWEEPS`` times over, and return the outputs in between."""
@@ -285,7 +303,7 @@ class _Run:
         if guess is not None:
             guessed = guess.at(times)[:, self.outputs]
             nodes[1:, self.outputs] = guessed[1:] + (initial[self.outputs] - guessed[0])
-        feeds = self._signal_nodes(times)
+        feeds = source_nodes(self.wiring.layout, self.signals, times, times[-1] in self.breaks, self.stop)
         with rollback(self.wiring) as restore:
             for sweep in range(SWEEPS):
                 if sweep:
@@ -294,18 +312,6 @@ class _Run:
                 for stage in self.wiring.stages:
                     self._advance(stage, start, end, nodes, feeds)
         return Waveform(start, end, nodes)
-
-    def _signal_nodes(self, times: Array) -> Array:
-        """Return what the sources add at the nodes, shape (rows, nodes): left limits at a window's end."""
-        inside = times.copy()
-        if times[-1] in self.breaks:
-            # Signals take a time just before a jump for the jump itself, by up to GRID_SLACK of their period.
-            inside[-1] -= max(1e-6 * (times[-1] - times[0]), 4.0 * GRID_SLACK * max(1.0, abs(self.stop)))
-        table = np.zeros((len(self.wiring.layout.signals), NODES))
-        for k, parts in enumerate(self.wiring.layout.signals):
-            for index, factor, offset, _ in parts:
-                table[k] += factor * self.signals[index].sample(inside) + offset
-        return table
 
     def _advance(self, stage: Stage, start: float, end: float, nodes: Array, feeds: Array) -> None:
         """Step one slave through the window and read its outputs at the nodes."""

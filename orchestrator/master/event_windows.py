@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import ConvergenceError, SlaveError
-from orchestrator.master.adaptive import GROW, ORDER, SAFETY, SHRINK, check_adaptive, window_end
+from orchestrator.master.adaptive import (
+    GROW,
+    check_adaptive,
+    largest_difference,
+    next_length,
+    source_nodes,
+    window_end,
+)
 from orchestrator.master.algorithms import Adaptive
 from orchestrator.master.event_stage import slack
 from orchestrator.master.event_sweeps import BRIEF, Sweeper, Swept, UnsettledError
@@ -21,7 +28,7 @@ from orchestrator.master.events import EventIteration
 from orchestrator.master.protocol import RunEndedError, StepDiscardedError
 from orchestrator.master.result import Statistics
 from orchestrator.master.rollback import rollback
-from orchestrator.master.signals import GRID_SLACK, Signal
+from orchestrator.master.signals import Signal
 from orchestrator.master.tracks import JoinedTracks, Track
 from orchestrator.master.wiring import Stage, gather
 
@@ -103,7 +110,7 @@ class EventWindows:
                 row = self._write(window.parts, rows, record, row)
             else:
                 self.rejected += 1
-            length = self._next_length(window)
+            length = next_length(window.length, window.error, self.settings.largest)
             if self._take_events(time, window, jump):
                 guess, rates, length = None, self.events.rates(), min(length, longest)
                 if row and abs(self._grid(row - 1) - time) <= slack(time):
@@ -123,13 +130,7 @@ class EventWindows:
         """Take what is due at ``time`` [s]; return whether there was anything."""
         if window.end is None:
             return False
-
-        column = np.array(
-            [
-                sum((f * s.sample(np.array([time]))[0] + o for s, f, o in self._of(parts)), 0.0)
-                for parts in self.wiring.layout.signals
-            ]
-        ).reshape(-1, 1)
+        column = source_nodes(self.wiring.layout, self.signals, np.array([time]), False, self.stop)
 
         def fill(stage: Stage) -> None:
             gather(stage, self.wiring.view, column, 0)
@@ -139,26 +140,12 @@ class EventWindows:
             self.events.jump(time, fill)
         return self.events.catch_up(time, fill, window.event) or jumps
 
-    def _of(self, parts: tuple[tuple[int, float, float, bool], ...]) -> list[tuple[Signal, float, float]]:
-        return [(self.signals[index], factor, offset) for index, factor, offset, _ in parts]
-
     def _sources(self, times: Array) -> Array:
-        """Return what the sources add at the nodes, shape (rows, nodes): left limits where one jumps at the end."""
-        inside = times.copy()
-        if min(abs(t - times[-1]) for t in self.breaks) <= slack(times[-1]):
-            inside[-1] -= max(1e-6 * (times[-1] - times[0]), 4.0 * GRID_SLACK * max(1.0, abs(self.stop)))
-        table = np.zeros((len(self.wiring.layout.signals), len(times)))
-        for k, parts in enumerate(self.wiring.layout.signals):
-            for signal, factor, offset in self._of(parts):
-                table[k] += factor * signal.sample(inside) + offset
-        return table
+        jumps = min(abs(t - times[-1]) for t in self.breaks) <= slack(times[-1])
+        return source_nodes(self.wiring.layout, self.signals, times, jumps, self.stop)
 
     def _difference(self, values: Array, reference: Array) -> float:
-        """Return the largest difference of outputs as a multiple of the tolerance; shape (..., slots) each."""
-        a, b = values[..., self.outputs], reference[..., self.outputs]
-        scale = self.settings.tolerance * np.maximum(1.0, np.abs(b))
-        error = float(np.max(np.abs(a - b) / scale, initial=0.0))
-        return error if math.isfinite(error) else math.inf
+        return largest_difference(values, reference, self.outputs, self.settings.tolerance)
 
     def _attempt(self, begin: float, end: float, rates: Array, guess: Track | None, record: Slots) -> _Window:
         """Try a window; leave the slaves at its end when its error is within the tolerance, else at its begin."""
@@ -228,11 +215,6 @@ class EventWindows:
             scale = self.settings.tolerance * np.maximum(1.0, np.abs(values))
             worst = max(worst, float(np.max((error / scale)[~held], initial=0.0)))
         return worst
-
-    def _next_length(self, window: _Window) -> float:
-        excess = max(window.error, 1e-12)
-        factor = SAFETY * excess ** (-1.0 / ORDER) if math.isfinite(excess) else SHRINK
-        return min(window.length * min(max(factor, SHRINK), GROW), self.settings.largest)
 
     def _write(self, parts: tuple[Track, ...], rows: Array, record: Slots, row: int) -> int:
         """Fill in the recorded points up to the end of the window; return the next one's number."""
