@@ -118,6 +118,35 @@ def inspected(page: Any, served: Served, log: Path) -> Any:
     return page
 
 
+def test_the_default_machine_is_shown_before_any_file_is_there(page: Any, served: Served) -> None:
+    open_workbench(page, served)
+    choose_tab(page, "machine")
+    fields = {
+        name: find(page, f"#panel-machine input[aria-label='{name}']")
+        for name in ("J_m, value in kg.m2", "J_m, off by at most, in percent", "alpha, off by at most, in percent")
+    }
+    value, off, off_of_nothing = fields.values()
+    assert float(value.get_attribute("value")) > 0.0
+    assert off.is_enabled()
+    assert not off_of_nothing.is_enabled()  # no share of a value of 0
+
+
+ADVICE = """const [name, line, done] = arguments;
+    import(new URL("static/log.js", location)).then((module) => done(module[name](line) ?? null))"""
+
+
+def test_a_line_that_names_no_unit_becomes_no_button(page: Any, served: Served, tmp_path: Path) -> None:
+    log = tmp_path / "ink.csv"
+    log.write_text("time [s],u [N.m],theta_m [Ink]\n" + "".join(f"{n / 100},{n % 7},{n}\n" for n in range(50)))
+    status, found = served.ask("POST", "columns", {"file": served.upload(log), "columns": {}})
+    assert (status, "[columns.theta_m] unit" in found["problem"]) == (200, True)
+    open_workbench(page, served)
+    advice = page.execute_async_script(ADVICE, "adviceOf", found["problem"])
+    assert (advice["column"], advice["key"], advice.get("value")) == ("theta_m", "unit", None)
+    line = 'say `[columns.theta_m] unit = "deg"` (`model`)'
+    assert page.execute_async_script(ADVICE, "adviceOf", line)["value"] == "deg"
+
+
 def test_a_log_goes_in_and_its_columns_are_named_by_clicks(inspected: Any, served: Served) -> None:
     found = json.loads((served.folder / "results" / "inspect-1" / "inspect.json").read_text())["results"]
     assert [channel["name"] for channel in found["channels"]] == ["u", "theta_m", "theta_l"]

@@ -26,8 +26,12 @@ def write_diagnosis(folder: Path, name: str, misfit: float, has: set[str]) -> No
         "name": "backlash", "site": "shaft", "grade": "certain", "family": [RIPPLE, "constant_torque@load"],
         "parameters": {"alpha": {"value": 0.013698, "interval": [0.0136921, 0.0137041], "unit": "rad"}},
     }  # fmt: skip
+    lead = {"value": 0.00097, "interval": [0.0002, 0.0017], "unit": "s"}
     found = {
-        "verdict": "effects", "effects": [play], "trust": {"level": "amber", "reasons": []}, "angle_unit": "rad",
+        "verdict": "effects", "effects": [play],
+        "summary": ["Verdict: effects. The model lacks backlash in the shaft. `u` is late.", "  Backlash: ..."],
+        "nuisances": [{"name": "early_torque", "grade": "possible", "parameters": {"lead": lead}}],
+        "trust": {"level": "amber", "reasons": []}, "angle_unit": "rad",
         "test": [{"source": "axis.csv", "rows": 100, "misfit": {"theta_m": signal}, "worse": False}],
         "library": {label: {"words": words, "in_model": label in has} for label, words in WORDS.items()},
         "candidates": [{"on_top_of": [], "taken": "", "tried": [{"effect": RIPPLE, "gain": 0.012, "t": 1.0}]}],
@@ -98,8 +102,10 @@ def test_effects_are_ticked_on_and_off(served: Served) -> None:
         gain = " (1.2 % of what is left)"
         assert boxes(page) == {WORDS[PLAY]: True, WORDS[FRICTION]: True, WORDS[RIPPLE] + gain: False}
         assert "before" not in said(page)
-        row = "backlash in the shaft certain alpha 0.013698 rad (0.0136921 to 0.0137041) "
+        row = "backlash in the shaft certain half-gap 0.013698 rad (0.0136921 to 0.0137041) "
         assert row + "torque ripple at the motor, constant torque at load" in said(page)
+        assert "early torque (in the log) possible lead 0.00097 s (0.0002 to 0.0017) none" in said(page)
+        assert "The model lacks backlash in the shaft. “u” is late. trust: amber" in said(page)
         tick(page, WORDS[RIPPLE])
         tick(page, WORDS[FRICTION])
         press(page, "Fit the model again with what is ticked")
@@ -116,6 +122,6 @@ def test_effects_are_ticked_on_and_off(served: Served) -> None:
         open_diagnosis(page, served, "diagnose-2", {"diagnose-2": "diagnose-1"})
         wait(page, lambda d: "Back to diagnose-1" in said(d))
         assert "signal as given re-fitted before with effects noise" in said(page)
-        assert "theta_m 0.02 rad 0.018 rad 0.001 rad 0.0007 rad 0.0004 rad" in said(page)
+        assert "motor angle 0.02 rad 0.018 rad 0.001 rad 0.0007 rad 0.0004 rad" in said(page)
         severe = [entry["message"] for entry in page.get_log("browser") if entry["level"] == "SEVERE"]
         assert [text for text in severe if "favicon" not in text] == []  # a browser asks for it beside JSON

@@ -51,7 +51,9 @@ class Dialect:
             {"ascii": "UTF-8", "utf-8-sig": "UTF-8 with BOM", "cp1252": "Windows-1252"}.get(encoding, encoding.upper())
         ]
         filled = sum(bool(line.strip()) for line in self.preamble)
-        words += [f"{filled} lines besides the names"] * (filled > 0) + ["a row of units"] * self.units_row
+        words += [f"{filled} line{'s' * (filled > 1)} besides the names"] * (filled > 0) + [
+            "a row of units"
+        ] * self.units_row
         words += [f"`{key}` above the names not used" for key in self._further_units()]
         return ", ".join(words + ["no names"] * (not self.named))
 

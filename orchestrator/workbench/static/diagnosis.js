@@ -4,7 +4,11 @@ import { inputs, needLog, reading, trustTag } from "./gap.js";
 import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, jobOf, start } from "./state.js";
 
+const SIZES = { alpha: "half-gap" }, SIGNALS = { theta_m: "motor angle", theta_l: "load angle" };
 const GRADES = { certain: "good", likely: "good", possible: "warn" };
+
+// The verdict in a sentence: the summary's first line without the verdict's word.
+const headline = (found) => plain(found.summary?.[0]?.split(". ").slice(1).join(". ") || `Verdict: ${found.verdict}`);
 
 export function build(panel, go) {
   const said = message(), read = reading();
@@ -22,9 +26,9 @@ export function build(panel, go) {
     const back = earlier ? action(`Back to ${from.name}`, said, () => view.show(from.name)) : null;
     if (!found) { fill(place, earlier ? refit(from, earlier) : null, back); return; }
     fill(place,
-      make("p", { class: "answer" }, `Verdict: ${found.verdict} `, trustTag(found.trust)),
+      make("p", { class: "answer" }, `${headline(found)} `, trustTag(found.trust)),
       (found.trust?.reasons ?? []).map((reason) => make("p", { class: "note" }, plain(reason))),
-      found.effects?.length ? effects(found) : make("p", {}, "No effect is named."),
+      found.effects?.length || found.nuisances?.length ? effects(found) : null,
       ...misfits(found, earlier),
       refit(job, found), back,
       (found.notes ?? []).length ? make("div", {}, make("h3", {}, "To know"), found.notes.map((text) => make("p", {}, plain(text)))) : null);
@@ -35,12 +39,13 @@ export function build(panel, go) {
     const size = ([key, one]) => {
       const { factor, name } = Units.shown(one.unit, found.angle_unit);
       const [value, between] = withInterval(one.value, one.interval, factor);
-      return `${key.replaceAll("_", " ")} ${value} ${name && name !== "1" ? name : ""}${between ? ` (${between})` : ""}`;
+      return `${SIZES[key] ?? key.replaceAll("_", " ")} ${value} ${name && name !== "1" ? name : ""}${between ? ` (${between})` : ""}`;
     };
+    const inLog = (found.nuisances ?? []).map((one) => ({ ...one, said: `${one.name.replaceAll("_", " ")} (in the log)` }));
     return make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Effects" }, make("table", { class: "stack" },
       make("thead", {}, make("tr", {}, ["effect", "grade", "size, 95 %", "not told apart from"].map((text) => make("th", { scope: "col" }, text)))),
-      make("tbody", {}, found.effects.map((one) => make("tr", {},
-        make("td", {}, words(`${one.name}@${one.site ?? ""}`)), make("td", { "data-label": "grade" }, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
+      make("tbody", {}, [...found.effects, ...inLog].map((one) => make("tr", {},
+        make("td", {}, one.said ?? words(`${one.name}@${one.site ?? ""}`)), make("td", { "data-label": "grade" }, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
         make("td", { "data-label": "size, 95 %" }, Object.entries(one.parameters).map(size).join("; ")), make("td", { "data-label": "not told apart from" }, (one.family ?? []).map(words).join(", ") || "none"))))));
   }
 
@@ -50,7 +55,7 @@ export function build(panel, go) {
       const { factor, name } = Units.shown(one.unit, found.angle_unit);
       const before = earlier?.test[n]?.misfit[signal]?.final;
       const cells = [one.nominal, one.parameters, ...(earlier ? [before] : []), one.final, one.noise];
-      return [signal, ...cells.map((value) => (value === null || value === undefined ? "none" : `${digits(factor * value)} ${name}`))];
+      return [SIGNALS[signal] ?? signal, ...cells.map((value) => (value === null || value === undefined ? "none" : `${digits(factor * value)} ${name}`))];
     }));
     const heads = ["signal", "as given", "re-fitted", ...(earlier ? ["before"] : []), "with effects", "noise"];
     return rows.length ? [make("h3", {}, "Misfit on test data (rms)"), make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Misfit on test data" }, make("table", { class: "stack" },

@@ -37,7 +37,7 @@ export const numberIn = (input) => (input.value.trim() === "" ? null : Number(in
 
 // What a page says of a field that holds no number which can be meant, null where there is none.
 export function wrongField(place) {
-  const input = [...place.querySelectorAll('[aria-invalid="true"]')].find((one) => one.offsetParent);
+  const input = [...place.querySelectorAll('[aria-invalid="true"]:enabled')].find((one) => one.offsetParent);
   if (!input) return null;
   return { input, said: `“${input.labels?.[0]?.textContent ?? input.getAttribute("aria-label")}” must hold ${input.tagName === "TEXTAREA" ? "two numbers a line" : "a number that makes sense there"}, but is “${input.value.replaceAll("\n", " / ")}”` };
 }

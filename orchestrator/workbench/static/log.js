@@ -24,7 +24,7 @@ const OF_COLUMN = {
 
 export function build(panel, go) {
   const said = message(), changes = make("p", { class: "message calm", role: "status" });
-  const body = make("div", {});
+  const body = make("div", {}), rows = make("div", {});
   let seen = null, turn = 0, looked = choices.log, came = null;
   const view = jobView("log", (job) => {
     const place = make("div", {});
@@ -46,7 +46,7 @@ export function build(panel, go) {
 
   async function look() {
     const mine = ++turn;
-    if (!choices.log) { fill(body); return; }
+    if (!choices.log) { clear(); return; }
     said.say("");
     try {
       const found = await post("columns", { file: choices.log, columns: choices.columns, ...(choices.header === null ? {} : { header: choices.header }) });
@@ -55,8 +55,13 @@ export function build(panel, go) {
       seen = found;
       draw();
     } catch (error) {
-      if (mine === turn) { said.say(error.message); if (!seen) fill(body); }
+      if (mine === turn) { said.say(error.message); if (!seen) clear(); }
     }
+  }
+
+  function clear() {
+    fill(body);
+    fill(rows);
   }
 
   function pick(log) {
@@ -103,15 +108,16 @@ export function build(panel, go) {
     const pickChannel = choice(options, stated.name && one.place !== null ? String(one.place) : "", (place) => assign(`channel-${one.column}`, one.column, place));
     pickChannel.dataset.key = `channel-${one.column}`;
     const list = `units-${one.column}`;
+    const told = adviceOf(seen.problem), wrong = told?.column === one.column && told.key === "unit";
     const unit = make("input", { value: stated.unit ?? "", placeholder: one.unit || "SI", list, "data-key": `unit-${one.column}`,
       onchange: () => state(one.column, { unit: unit.value.trim() }) });
-    const needed = new Set(one.needs), told = adviceOf(seen.problem);
+    const needed = new Set(one.needs);
     if (told?.column === one.column) needed.add(told.key);
     const numbers = OF_COLUMN[one.column].map((key) => numberField(one.column, key, stated[key], needed.has(key)));
     const asked = numbers.filter(({ open }) => open).map(({ element }) => element);
     const rest = numbers.filter(({ open }) => !open).map(({ element }) => element);
     const tag = one.how === "absent" ? ["not found", one.column === "theta_l" ? "warn" : "bad"]
-      : one.needs.length ? ["needs a number", "bad"] : one.how === "named" ? ["named", "good"] : ["recognised", "good"];
+      : wrong ? ["unit not known", "bad"] : one.needs.length ? ["needs a number", "bad"] : one.how === "named" ? ["named", "good"] : ["recognised", "good"];
     const range = one.least === null ? "" : `${digits(one.least)} to ${digits(one.most)} ${one.si}`;
     return make("div", { class: "card" },
       make("h3", {}, TITLES[one.column], " ", make("span", { class: `tag ${tag[1]}` }, tag[0])),
@@ -127,7 +133,7 @@ export function build(panel, go) {
   }
 
   function draw() {
-    const rows = Math.max(0, ...seen.channels.map((channel) => channel.rows.length));
+    const count = Math.max(0, ...seen.channels.map((channel) => channel.rows.length));
     const unused = seen.channels.filter((channel) => !channel.taken_as).map((channel) => channel.label);
     fill(body,
       make("p", { class: "note" }, plain(seen.dialect)),
@@ -135,12 +141,13 @@ export function build(panel, go) {
       follow(seen.problem),
       make("div", { class: "cards" }, seen.columns.map(card)),
       changes,
-      make("p", {}, action("Look at this log", said, inspect, "main")),
+      make("p", {}, action("Look at this log", said, inspect, "main")));
+    fill(rows,
       make("p", { class: "note" }, unused.length ? `Not used: ${unused.join(", ")}` : "Every channel is used."),
       make("h3", {}, "First rows"),
       make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "First rows" }, make("table", {},
         make("thead", {}, make("tr", {}, seen.channels.map((channel) => make("th", { class: channel.taken_as ? "" : "unused", scope: "col" }, channel.label, make("br"), useOf(channel))))),
-        make("tbody", {}, Array.from({ length: rows }, (_, n) =>
+        make("tbody", {}, Array.from({ length: count }, (_, n) =>
           make("tr", {}, seen.channels.map((channel) => make("td", { class: channel.taken_as ? "number" : "number unused" }, channel.rows[n] ?? ""))))))),
       seen.lines.length ? lines() : null);
   }
@@ -184,15 +191,15 @@ export function build(panel, go) {
   panel.append(
     dropZone("Drop a log here", pick),
     make("div", { class: "row" }, fileChoice("Log of this session", isLog, () => choices.log, pick)),
-    said.element, body, view.element);
+    said.element, body, view.element, rows);
   if (choices.log) look();
 }
 
 // What a line of the commands advises to say of a column: which, and of what; `value` where it names one.
-function adviceOf(line) {
+export function adviceOf(line) {
   const [, column, key, text] = /`\[columns\.(\w+)\] (\w+) = ([^`]+)`/.exec(line ?? "") ?? [];
   if (!(column in TITLES) || !(key in NUMBERS || key === "unit")) return null;
-  if (key === "unit") return { column, key, value: text.replace(/^"(.*)"$/, "$1") };
+  if (key === "unit") return { column, key, value: text === '"..."' ? undefined : text.replace(/^"(.*)"$/, "$1") };
   return { column, key, value: Number.isFinite(Number(text)) ? Number(text) : undefined };
 }
 

@@ -8,7 +8,7 @@ const TAGS = { assumed: "warn", "from the record": "", yours: "good", "the FMU's
 // The model file as fields: every value with unit, uncertainty and where it is from.
 export function build(panel, go) {
   const said = message(), body = make("div", {});
-  let shown = "";
+  let shown = null;
 
   async function load() {
     if (shown === choices.model) return;
@@ -41,6 +41,7 @@ export function build(panel, go) {
         if (key === "value") {
           if (one.value !== 0) changed[one.name].uncertainty = (one.uncertainty / Math.abs(one.value)) * Math.abs(number);
           changed[one.name].value = number;
+          off.disabled = number === 0;
         } else changed[one.name].uncertainty = (number / 100) * Math.abs(changed[one.name].value);
         tag.className = "tag good";
         tag.textContent = "yours";
@@ -49,6 +50,7 @@ export function build(panel, go) {
       const value = numberInput({ value: String(one.value), required: true, "aria-label": `${one.name}, value in ${one.unit || "1"}` }, (number) => set("value", number));
       const share = one.value === 0 ? 0 : (100 * one.uncertainty) / Math.abs(one.value);
       const off = numberInput({ value: digits(share), required: true, "aria-label": `${one.name}, off by at most, in percent` }, (number) => set("uncertainty", number), (number) => number >= 0);
+      off.disabled = one.value === 0;  // no share of nothing
       return make("tr", {}, make("td", {}, make("strong", {}, one.name), make("br"), make("span", { class: "note" }, one.meaning)),
         make("td", { class: "pair" }, value, " ", one.unit === "1" ? "" : one.unit), make("td", { class: "pair", "data-label": "off by at most" }, off, " %"),
         make("td", {}, tag, make("br"), make("span", { class: "note" }, one.said.replace(/^[^:]*: (?:[^;]*; )?(?=.)/, ""))));
@@ -84,7 +86,7 @@ export function build(panel, go) {
         action("Save as a new model file", said, async () => {
           const stem = (choices.model || "machine.toml").split("/").at(-1).replace(/(-yours)?(-\d+)?\.toml$/, "");
           const made = await post("models", { base: choices.model || null, name: `${stem}-yours.toml`, parameters: changed, encoders });
-          shown = "";
+          shown = null;
           choose({ model: made.file });
         }, "main"),
         action("Go on to the gap", said, () => go("gap"))));

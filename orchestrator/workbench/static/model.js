@@ -21,7 +21,7 @@ export function build(panel) {
         make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name.split("/").at(-1) }, name))))))
       : make("p", {}, "A diagnosis leaves the corrected model here."));
     simulated = names.includes(wanted) ? wanted : names.at(-1) ?? "";
-    const made = choice(names.map((name) => [name, name]), simulated, (name) => { simulated = wanted = name; });
+    const made = choice(names.length ? names.map((name) => [name, name]) : [["", "none yet"]], simulated, (name) => { simulated = wanted = name; });
     fill(which, ...field("Model of", made).children);
   };
   watch(draw);

@@ -18,8 +18,9 @@ export function filesOf(test) {
 // A place to drop a file on, with a button for those who do not drag.
 export function dropZone(text, taken, multiple = false) {
   const said = make("span", { "aria-live": "polite" });
-  const input = make("input", { type: "file", multiple, "aria-label": text });
-  const zone = make("div", { class: "drop" }, make("strong", {}, text), input, said);
+  const input = make("input", { type: "file", multiple, hidden: true, "aria-label": text });
+  const open = make("button", { type: "button", "aria-label": `${text}, or choose ${multiple ? "files" : "a file"}`, onclick: () => input.click() }, multiple ? "Choose files" : "Choose a file");
+  const zone = make("div", { class: "drop" }, make("strong", {}, text), open, input, said);
   const take = async (files) => {
     for (const file of files) {
       try {
