@@ -147,6 +147,31 @@ def test_a_line_that_names_no_unit_becomes_no_button(page: Any, served: Served, 
     assert page.execute_async_script(ADVICE, "adviceOf", line)["value"] == "deg"
 
 
+def test_channels_that_look_alike_become_a_button_each(page: Any, served: Served, tmp_path: Path) -> None:
+    log = tmp_path / "alike.csv"
+    log.write_text("time,T_cmd,phi1,phi2\n" + "".join(f"{n / 100},{n % 7},{n},{n / 9}\n" for n in range(50)))
+    file = served.upload(log)
+    problem = served.ask("POST", "columns", {"file": file, "columns": {}})[1]["problem"]
+    open_workbench(page, served)
+    rivals = page.execute_async_script(ADVICE, "rivalsOf", problem)
+    assert rivals == {"column": "theta_m", "names": ["phi1", "phi2"]}
+    columns = {"theta_m": {"name": "phi1"}, "theta_l": {"name": "phi2"}}
+    problem = served.ask("POST", "columns", {"file": file, "columns": columns})[1]["problem"]
+    assert page.execute_async_script(ADVICE, "rivalsOf", problem) is None
+
+
+def test_back_goes_to_the_tab_before(page: Any, served: Served) -> None:
+    open_workbench(page, served)
+    for name in ("machine", "gap"):
+        choose_tab(page, name)
+    page.back()
+    wait(page, lambda d: d.find_element("id", "panel-machine").is_displayed())
+    page.back()
+    wait(page, lambda d: d.find_element("id", "panel-log").is_displayed())
+    page.forward()
+    wait(page, lambda d: d.find_element("id", "panel-machine").is_displayed())
+
+
 def test_a_log_goes_in_and_its_columns_are_named_by_clicks(inspected: Any, served: Served) -> None:
     found = json.loads((served.folder / "results" / "inspect-1" / "inspect.json").read_text())["results"]
     assert [channel["name"] for channel in found["channels"]] == ["u", "theta_m", "theta_l"]
@@ -206,6 +231,7 @@ def test_a_diagnosis_is_stopped_from_the_page(inspected: Any, served: Served) ->
     wait_for_text(inspected, "panel-diagnosis", "stopped")
     job = served.job("diagnose-1")
     assert (job["state"], job["exit_code"]) == ("stopped", 130)
+    wait(inspected, lambda d: d.switch_to.active_element.get_attribute("id") == "tab-diagnosis")
 
 
 def test_outputs_are_dragged_to_inputs_of_the_same_quantity(inspected: Any, served: Served) -> None:

@@ -74,7 +74,8 @@ def judge_trust(
     if likely := [effect.label for effect in effects if effect.grade is Grade.LIKELY]:
         amber.append(f"likely, not certain: {list_effects(likely)}")
     if record.left > UNEXPLAINED:
-        amber.append(f"{100.0 * np.sqrt(record.left):.2g} % (rms) is left unexplained where the model was fitted")
+        left = number_words(100.0 * float(np.sqrt(record.left)), 2)
+        amber.append(f"{left} % (rms) is left unexplained where the model was fitted")
     for known in uncertain:
         if known.name in parameters and _is_far(parameters[known.name], known.uncertainty):
             amber.append(

@@ -1,6 +1,6 @@
 import { fileAddress, get, post, upload } from "./api.js";
-import { check, choice, field, fill, make, numberIn, numberInput, plain } from "./dom.js";
-import { Graph, fits, inputsOf, outputsOf, place } from "./graph.js";
+import { check, choice, digits, field, fill, make, numberIn, numberInput, plain } from "./dom.js";
+import { Graph, fits, inputsOf, outputsOf, place, shape } from "./graph.js";
 import { action, dropZone, fileChoice, isFmu, isLog, jobView, message } from "./parts.js";
 import { choices, choose, refresh, start } from "./state.js";
 
@@ -22,8 +22,8 @@ function pairOf(line) {
 }
 
 export function build(panel) {
-  const said = message(), graphSaid = message(), tree = make("div", {}), editor = make("div", {}), view = jobView("fmus");
-  const nodes = {}, known = new Map();
+  const said = message(), graphSaid = message(), tree = make("div", {}), editor = make("div", {}), view = jobView("fmus"), checked = jobView("fmu");
+  const nodes = {}, known = new Map(), drawings = [];
   const kept = choices.scenario ?? { nodes: {}, connections: [], sources: [], unwanted: [], run: { stop: 1, step: 0.001, algorithm: "gauss_seidel" } };
   let { connections, sources } = kept, fmu = "";
   const { run } = kept, unwanted = new Set(kept.unwanted);
@@ -63,7 +63,7 @@ export function build(panel) {
 
   function ofSystem(found) {
     const parts = Object.entries(found.components).map(([name, model]) => `${name} (${model})`);
-    return `System of ${parts.length} FMUs until ${found.stop} s: ${parts.join(", ")}`;
+    return `System of ${parts.length} FMU${parts.length === 1 ? "" : "s"} until ${found.stop} s: ${parts.join(", ")}`;
   }
 
   // Variables by the parts of their names; of a large branch what stands below it comes when it is opened.
@@ -119,6 +119,7 @@ export function build(panel) {
 
   function draw() {
     graph.draw(nodes, connections);
+    drawings.length = 0;
     const outs = Object.entries(nodes).flatMap(([name, node]) => outputsOf(node).map((one) => `${name}.${one.name}`));
     const ins = Object.entries(nodes).flatMap(([name, node]) => inputsOf(node).map((one) => `${name}.${one.name}`));
     let from = outs[0] ?? "", to = "";
@@ -156,7 +157,10 @@ export function build(panel) {
   }
 
   function number(text, table, key) {
-    return field(text, numberInput({ value: table[key] ?? "", required: true }, (value) => { table[key] = value; }));
+    return field(text, numberInput({ value: table[key] ?? "", required: true }, (value) => {
+      table[key] = value;
+      drawings.forEach((show) => show());  // over another time
+    }));
   }
 
   function parameters(name, node) {
@@ -198,20 +202,18 @@ export function build(panel) {
       source.points = points.sort((a, b) => a[0] - b[0]);
       show();
     } });
-    const box = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-    box.setAttribute("class", "draw");
-    box.setAttribute("viewBox", "0 0 400 160");
-    box.setAttribute("role", "img");
+    const box = shape("svg", { class: "draw", viewBox: "0 0 400 160", role: "img" });
     const size = () => Math.max(1e-9, ...source.points.map(([, value]) => Math.abs(value))) * 1.25;
     let scale = size();
     const show = () => {
       text.value = source.points.map(([t, v]) => `${t}, ${v}`).join("\n");
       scale = Math.max(scale, size());
-      const line = document.createElementNS("http://www.w3.org/2000/svg", "polyline");
-      line.setAttribute("points", source.points.map(([t, v]) => `${(400 * t) / run.stop},${80 - (75 * v) / scale}`).join(" "));
+      const line = shape("polyline", { points: source.points.map(([t, v]) => `${(400 * t) / run.stop},${80 - (75 * v) / scale}`).join(" ") });
       box.setAttribute("aria-label", `Drawn curve of ${source.points.length} points from ${-scale} to ${scale}; the lines beside it are the same`);
-      box.replaceChildren(line);
+      const mark = (x, y, anchor, words) => Object.assign(shape("text", { x, y, "text-anchor": anchor }), { textContent: words });
+      box.replaceChildren(shape("line", { x1: 0, y1: 80, x2: 400, y2: 80 }), mark(4, 14, "start", digits(scale, 3)), mark(4, 155, "start", digits(-scale, 3)), mark(396, 76, "end", `${run.stop} s`), line);
     };
+    drawings.push(show);
     box.addEventListener("click", (event) => {
       const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(box.getScreenCTM().inverse());
       const time = Number(((run.stop * x) / 400).toPrecision(4)), value = Number((((80 - y) * scale) / 75).toPrecision(3));
@@ -250,10 +252,10 @@ export function build(panel) {
     make("div", { class: "row" }, fileChoice("FMU or SSP file", isFmu, () => fmu, pick), field("Time limit [s]", limit)),
     said.element,
     make("div", { class: "row" },
-      action("Check this FMU", said, async () => { if (!fmu) throw new Error("choose an FMU first"); view.show(await start("check", [fmu], limited())); }),
-      action("Run this SSP file", said, async () => { if (!/\.ssp$/i.test(fmu)) throw new Error("choose an SSP file first"); view.show(await start("ssp", [fmu], limited())); }),
+      action("Check this FMU", said, async () => { if (!fmu) throw new Error("choose an FMU first"); checked.show(await start("check", [fmu], limited())); }),
+      action("Run this SSP file", said, async () => { if (!/\.ssp$/i.test(fmu)) throw new Error("choose an SSP file first"); checked.show(await start("ssp", [fmu], limited())); }),
       action("Add it to the scenario", said, add, "main")),
-    tree, make("h2", {}, "Scenario"), make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Graph of the scenario" }, graph.svg), graphSaid.element, editor,
+    tree, checked.element, make("h2", {}, "Scenario"), make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Graph of the scenario" }, graph.svg), graphSaid.element, editor,
     make("div", { class: "row" },
       action("Write it as TOML", said, async () => {
         const made = await write();

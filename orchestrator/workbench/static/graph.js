@@ -2,7 +2,7 @@
 const SPACE = "http://www.w3.org/2000/svg";
 const WIDE = 270, LINE = 22, HEAD = 30, MOST = 12, GAP = 60, ROOM = 18;
 
-function shape(tag, attributes = {}, ...children) {
+export function shape(tag, attributes = {}, ...children) {
   const made = document.createElementNS(SPACE, tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
   made.append(...children);

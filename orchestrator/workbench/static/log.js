@@ -24,7 +24,7 @@ const OF_COLUMN = {
 
 export function build(panel, go) {
   const said = message(), changes = make("p", { class: "message calm", role: "status" });
-  const body = make("div", {}), rows = make("div", {});
+  const busy = make("p", { class: "note busy", role: "status" }), body = make("div", {}), rows = make("div", {});
   let seen = null, turn = 0, looked = choices.log, came = null;
   const view = jobView("log", (job) => {
     const place = make("div", {});
@@ -46,8 +46,9 @@ export function build(panel, go) {
 
   async function look() {
     const mine = ++turn;
-    if (!choices.log) { clear(); return; }
+    if (!choices.log) { clear(); busy.textContent = ""; return; }
     said.say("");
+    busy.textContent = "Reading …";
     try {
       const found = await post("columns", { file: choices.log, columns: choices.columns, ...(choices.header === null ? {} : { header: choices.header }) });
       if (mine !== turn) return;
@@ -57,6 +58,7 @@ export function build(panel, go) {
     } catch (error) {
       if (mine === turn) { said.say(error.message); if (!seen) clear(); }
     }
+    if (mine === turn) busy.textContent = "";
   }
 
   function clear() {
@@ -138,7 +140,7 @@ export function build(panel, go) {
     fill(body,
       make("p", { class: "note" }, plain(seen.dialect)),
       seen.problem ? make("p", { class: "message", role: "alert" }, problemOf(seen)) : make("p", {}, make("span", { class: "tag good" }, "can be read")),
-      follow(seen.problem),
+      ...namesakes(seen.problem), follow(seen.problem),
       make("div", { class: "cards" }, seen.columns.map(card)),
       changes,
       make("p", {}, action("Look at this log", said, inspect, "main")));
@@ -157,6 +159,12 @@ export function build(panel, go) {
     const told = adviceOf(line);
     if (told?.value === undefined) return null;
     return action(`Set “${NUMBERS[told.key] ?? told.key}” of “${TITLES[told.column]}” to ${told.value}`, said, async () => state(told.column, { [told.key]: told.value }));
+  }
+
+  // A button for each channel of which a line says that both look like one column.
+  function namesakes(line) {
+    const { column, names } = rivalsOf(line) ?? { names: [] };
+    return names.map((name) => action(`Use “${name}” as “${TITLES[column]}”`, said, async () => state(column, { name })));
   }
 
   function useOf(channel) {
@@ -191,7 +199,7 @@ export function build(panel, go) {
   panel.append(
     dropZone("Drop a log here", pick),
     make("div", { class: "row" }, fileChoice("Log of this session", isLog, () => choices.log, pick)),
-    said.element, body, view.element, rows);
+    said.element, busy, body, view.element, rows);
   if (choices.log) look();
 }
 
@@ -203,10 +211,18 @@ export function adviceOf(line) {
   return { column, key, value: Number.isFinite(Number(text)) ? Number(text) : undefined };
 }
 
+// The two channels of which a line of the commands says that both look like one column.
+export function rivalsOf(line) {
+  const [, column, first, second] = /both look like .*`\[columns\.(\w+)\] name = "([^"]+)"` \(or `([^`]+)`\)/.exec(line ?? "") ?? [];
+  return column in TITLES ? { column, names: [first, second] } : null;
+}
+
 function problemOf(seen) {
+  const rivals = rivalsOf(seen.problem);
   const needs = seen.columns.flatMap((one) => one.needs.map((key) => `${TITLES[one.column]}: ${NUMBERS[key] ?? key}`));
-  const missing = seen.columns.filter((one) => one.how === "absent" && seen.missing.includes(one.column)).map((one) => TITLES[one.column]);
-  const asked = [...missing.map((title) => `${title}: the channel that holds it`), ...needs];
+  const missing = seen.columns.filter((one) => one.how === "absent" && seen.missing.includes(one.column));
+  const alike = (one) => (one.column === rivals?.column ? ` (${rivals.names.map((name) => `“${name}”`).join(" and ")} both look like it)` : "");
+  const asked = [...missing.map((one) => `${TITLES[one.column]}: the channel that holds it${alike(one)}`), ...needs];
   return asked.length ? `Still needed. ${asked.join("; ")}` : plain(seen.problem);
 }
 

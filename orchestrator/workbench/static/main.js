@@ -22,8 +22,11 @@ function go(key, focus = true) {
     document.getElementById(`panel-${name}`).hidden = !on;
     if (on && focus) tab.focus();
   }
-  history.replaceState(null, "", `#${key}`);
+  if (location.hash !== `#${key}`) history[focus ? "pushState" : "replaceState"](null, "", `#${key}`);
 }
+
+const asked = () => (TABS.some(([name]) => name === location.hash.slice(1)) ? location.hash.slice(1) : "log");
+addEventListener("popstate", () => go(asked(), false));  // Back: to the tab before
 
 for (const [name, title, part] of TABS) {
   tabs.append(make("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, onclick: () => go(name) }, title));
@@ -50,7 +53,9 @@ watch(() => {
   const now = JSON.stringify([session.gone, jobs]);
   if (now === shown) return;
   shown = now;
+  const held = running.contains(document.activeElement);
   fill(running, session.gone ? make("p", { class: "message", role: "alert" }, "The workbench has ended: start it again; files and results are in its directory.") : null, jobs.map(jobLine));
+  if (held && document.activeElement === document.body) tabs.querySelector("[aria-selected=true]").focus({ preventScroll: true });  // its Stop went with the job
 });
 
 const theme = document.getElementById("theme");
@@ -59,5 +64,5 @@ const label = () => { theme.textContent = dark() ? "Light" : "Dark"; theme.setAt
 theme.addEventListener("click", () => { document.documentElement.dataset.theme = dark() ? "light" : "dark"; label(); });
 label();
 
-go(TABS.some(([name]) => name === location.hash.slice(1)) ? location.hash.slice(1) : "log", false);
+go(asked(), false);
 refresh();

@@ -64,7 +64,7 @@ export async function sliders(job) {
     });
     home();
     Units.listeners.push(() => show(values[slider.name] ?? slider.value));
-    return { home, element: make("div", { class: "field" }, make("span", {}, slider.name.startsWith("effects.") ? slider.name.slice(8).replaceAll("_", " ") : slider.name), input, shown) };
+    return { home, element: make("div", { class: "field" }, make("span", {}, slider.name.startsWith("effects.") ? slider.name.slice(8).replace(/[._]/g, " ") : slider.name), shown, input) };
   });
   const units = choice(["rad", "deg", "arcmin", "turns"].map((unit) => [unit, unit]), Units.chosen, (unit) => Units.choose(unit));
   const place = make("div", {});
