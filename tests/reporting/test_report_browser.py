@@ -318,6 +318,30 @@ def shown_texts(driver):
     return driver.execute_script(script)
 
 
+def test_numbers_below_a_million_have_no_exponent(opened):
+    numbers = [[88799, 4], [-150000, 3], [0.00012345, 3], [2.5, 5], [1234567, 3], [0.00001, 2]]
+    assert opened.execute_script("return arguments[0].map((one) => number(...one))", numbers) == [
+        "88800",
+        "-150000",
+        "0.000123",
+        "2.5",
+        "1.23e6",
+        "1e-5",
+    ]
+    assert opened.execute_script("return tickText(-100000, 50000, 0)") == "-100000"
+
+
+def test_a_converted_number_has_no_digit_that_its_rounding_has_spoilt(opened):
+    script = "return arguments[0].map((text) => number(Number(text) * 10800 / Math.PI, converted(text)))"
+    # of 0.00600098240, whose table says 20.6299
+    assert opened.execute_script(script, ["0.00600098", "0.006001", "0.02", "5e-05"]) == [
+        "20.63",
+        "20.63",
+        "69",
+        "0.17",
+    ]
+
+
 def test_angles_are_shown_in_the_log_s_unit_until_another_is_chosen(long_opened):
     from selenium.webdriver.common.by import By
     from selenium.webdriver.support.ui import Select

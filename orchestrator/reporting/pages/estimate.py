@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.effects.words import list_words, place_words
 from orchestrator.reporting.model import (
     Badge,
     Cell,
@@ -67,8 +68,8 @@ def _diagnosis_sections(results: EstimateFound) -> list[Section]:
     diagnosis, why = results.diagnosis, results.undiagnosed
     if diagnosis is None:
         return [Text(UNEXPLAINED, (f"No diagnosis says what it lacks: {why}.",))] if why else []
-    named = [f"{words(e.name)} ({e.site})" for e in diagnosis.effects]
-    said = f"It lacks {', '.join(named)}." if named else f"The diagnosis says: {diagnosis.verdict}."
+    named = [place_words(e.name, e.site) for e in diagnosis.effects]
+    said = f"It lacks {list_words(named)}." if named else f"The diagnosis says: {diagnosis.verdict}."
     place = "The folder diagnosis beside this page has its report and the corrected FMU."
     return [Text(UNEXPLAINED, (said, place))]
 

@@ -18,10 +18,10 @@ def build(source: ResultDocument) -> Report:
     )
 
 
-def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
+def sections_of(title: str, value: Mapping[str, Any], units: Mapping[str, str] | None = None) -> list[Section]:
     """Return an object's plain values as facts, its lists of objects as tables, its objects as further sections.
 
-    What is absent (null) is left out.
+    What is absent (null) is left out. ``units``: of plain values, by name.
     """
     facts: list[tuple[str, Any]] = []
     further: list[Section] = []
@@ -34,7 +34,8 @@ def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
         elif isinstance(item, Mapping):
             further += sections_of(sentence(heading), item)
         elif item is not None and not (isinstance(item, Sequence) and not isinstance(item, str) and len(item) > 12):
-            facts.append((heading, plain(item)))
+            unit = (units or {}).get(name, "1")
+            facts.append((heading if unit == "1" else f"{heading} [{unit}]", plain(item)))
     return [*([Facts(title, tuple(facts))] if facts else []), *further]
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.errors import ScenarioError
+from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.reporting.model import (
     POINT_LIMIT,
     ROW_LIMIT,
@@ -23,6 +24,10 @@ from orchestrator.shared.results import SweepFound, TrustFound, as_plain, read
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
+EXPERIMENT_UNITS = {
+    "amplitude": "rad", "frequency": "Hz", "duration": "s", "sample_time": "s", "torque_limit": "N.m",
+    "assumed_encoder_noise": "rad", "encoder_noise": "rad", "smallest": "rad", "largest": "rad",
+}  # fmt: skip
 MOST_PLOTS = 12
 OWN = frozenset({"alpha", "noise", "repetition"})
 SUMMARIES = frozenset({"last", "min", "max", "mean", "rms"})
@@ -229,8 +234,8 @@ def _provenance(results: SweepFound) -> list[Section]:
     if results.experiment is not None:
         settings = dict(results.experiment)
         plant = settings.pop("values", None)
-        made += sections_of("Experiment", settings)
-        made += sections_of("Plant", plant) if plant else []
+        made += sections_of("Experiment", settings, EXPERIMENT_UNITS)
+        made += sections_of("Plant", plant, {entry.name: entry.unit for entry in DRIVETRAIN.table}) if plant else []
     if results.fmus is not None:
         made += sections_of("FMUs by content", results.fmus)
     return made

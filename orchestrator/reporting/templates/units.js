@@ -39,14 +39,16 @@ function followUnits(element) {
     if (factor === 1) element.textContent = original;
     else if (value !== undefined) element.textContent = number(Number(value) * factor, Number(digits));
     else {
-      const converted = original.replace(AMOUNT, (text) => number(Number(text) * factor, significant(text)));
-      element.textContent = converted.replace(unit, name);
+      const amounts = original.replace(AMOUNT, (text) => number(Number(text) * factor, converted(text)));
+      element.textContent = amounts.replace(unit, name);
     }
   });
 }
 
-function significant(text) {
-  return Math.max(2, text.replace(/e.*$/i, "").replace(/^[-+]?0*\.?0*/, "").replace(".", "").length);
+// Digits of a number that was rounded to those of `text` and is then converted: the last of many would not be right.
+function converted(text) {
+  const significant = text.replace(/e.*$/i, "").replace(/^[-+]?0*\.?0*/, "").replace(".", "").length;
+  return Math.max(2, significant > 4 ? significant - 1 : significant);
 }
 
 // The switch; a page without angles has none.
