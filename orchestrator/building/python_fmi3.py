@@ -92,7 +92,7 @@ def _modules(recipe: Recipe) -> tuple[str, dict[str, bytes]]:
     sources = source_members(recipe.module) | source_members(BRIDGE)
     sources |= {f"pythonfmu/{name}": data for name, data in runtime_files().items()}
     content = [part for name in sorted(sources) for part in (name.encode(), sources[name])]
-    identity = digest([json.dumps([recipe.name, sorted(starts.items())]).encode(), *content])
+    identity = digest([json.dumps([recipe.name, sorted(starts.items())]).encode(), ENTRY.encode(), *content])
     package = f"pyfmu_{identity[:16]}"
     named = {"module": recipe.module, "class_name": recipe.class_name, "name": recipe.name, "starts": starts}
     entry = ENTRY.format(**named, build=identity[:16], learn="")

@@ -26,19 +26,17 @@ ENTRY = '''"""The class that PythonFMU instantiates, with the name and the start
 from .{module} import {class_name} as Model
 
 {learn}Model.customise({name!r}, {build!r}, {starts!r})
-_dictionaries = []
-
-
-def keep(dictionary):
-    """Own one more reference to the loading module: PythonFMU gives back one too many for every instance."""
-    _dictionaries.append(dictionary)
 '''
-LOADED = '''"""Loaded by PythonFMU, which runs this file again for every instance."""
+OWNED = """import ctypes
 
+if locals() is not globals():  # for an instance: PythonFMU then gives back a reference that it never took
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+"""
+"""Head of an FMU's module, which PythonFMU imports once, and then runs for every instance with locals of its own."""
+LOADED = '''"""Loaded by PythonFMU."""
+
+{owned}
 from {package}.entry import Model as {name}
-from {package}.entry import keep
-
-keep(globals())
 '''
 
 
@@ -49,7 +47,7 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
     sources = source_members(recipe.module)
     content = [part for name in sorted(sources) for part in (name.encode(), sources[name])]
     options = json.dumps([recipe.name, sorted(starts.items()), recipe.law]).encode()
-    identity = digest([options, *runtime.values(), *content])
+    identity = digest([options, ENTRY.encode(), *runtime.values(), *content])
     package = f"pyfmu_{identity[:16]}"
     learn = "" if recipe.law is None else f"Model.learn({recipe.law!r})\n"
     entry = ENTRY.format(
@@ -57,7 +55,7 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
         learn=learn,
     )  # fmt: skip
     sources |= {"entry.py": entry.encode(), "__init__.py": b'"""The sources of one FMU."""\n'}
-    loaded = LOADED.format(package=package, name=recipe.class_name)
+    loaded = LOADED.format(owned=OWNED, package=package, name=recipe.class_name)
     with tempfile.TemporaryDirectory() as folder:
         members = _build_by_pythonfmu(Path(folder), package, sources, loaded, recipe.name)
     write_archive(target, _complete(members, package, runtime, fingerprint, recipe))

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.building.launcher import find_toolchain
+from orchestrator.diagnosis.fmu.corrected_ssp import build_effect_fmu
 from tests.support.fmu_calls import DISCARD, ERROR, OK, RawFmu
 from tests.support.waiting import HANGS
 
@@ -207,7 +208,20 @@ def stock(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "Drivetrain.fmu"
 
 
-# In processes of their own: at each instance PythonFMU's library drops a reference to the module's names too many.
+@pytest.mark.parametrize("library", ["ours", "PythonFMU's", "effect"])
+def test_an_instance_owns_as_many_references_as_it_gives_back(
+    library: str, stock: Path, fmus: dict[str, Path], tmp_path: Path
+) -> None:
+    """PythonFMU's library gives back one reference to the module's names that it has not taken, at each instance."""
+    path = {"ours": fmus["Drivetrain"], "PythonFMU's": stock}.get(library) or build_effect_fmu(tmp_path)
+    module = f"attachment_{library}" if library == "effect" else "Drivetrain_pyfmu"
+    words = [sys.executable, "-m", "tests.support.reference_counts", str(path), f"{module}_"]
+    root = Path(__file__).parents[2]
+    run = subprocess.run(words, cwd=root, capture_output=True, text=True, timeout=HANGS, check=True)
+    assert run.stdout.splitlines() == ["3 ['dict', 'module']"] * 4  # the third is the call's own
+
+
+# In processes of their own, as hosts run it.
 STEPS = """
 import sys
 from pathlib import Path

@@ -12,6 +12,7 @@ from lxml import etree
 
 from orchestrator.building.archive import write_archive
 from orchestrator.building.sources import digest
+from orchestrator.building.worker import OWNED
 from orchestrator.diagnosis.fmu.coupled_fmus import split_name
 from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem
 from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
@@ -75,7 +76,7 @@ def write_corrected(path: Path, problem: FmuProblem, model: FmuModel) -> Deliver
     attachment = ""
     if parts:
         with tempfile.TemporaryDirectory() as folder:
-            built = _build_effect_fmu(Path(folder)).read_bytes()
+            built = build_effect_fmu(Path(folder)).read_bytes()
         attachment = f"AttachedEffect_{digest([built])[:8]}.fmu"
         members[f"resources/{attachment}"] = built
     starts: dict[str, dict[str, Value]] = {name: {} for name in system.members}
@@ -126,7 +127,7 @@ def effect_parts(problem: FmuProblem, model: FmuModel) -> tuple[Part, ...]:
     return tuple(parts)
 
 
-def _build_effect_fmu(folder: Path) -> Path:
+def build_effect_fmu(folder: Path) -> Path:
     """Return the effect FMU, built in ``folder`` from the laws' own source, its package named by their content."""
     sources = members("attachment")
     package = folder / f"effect_{digest(part for name in sources for part in (name.encode(), sources[name]))[:16]}"
@@ -134,7 +135,7 @@ def _build_effect_fmu(folder: Path) -> Path:
         (package / name).parent.mkdir(parents=True, exist_ok=True)
         (package / name).write_bytes(content)
     script = folder / f"attachment_{package.name}.py"
-    script.write_text(f"from {package.name}.attachment import AttachedEffect\n", encoding="utf-8")
+    script.write_text(f"{OWNED}\nfrom {package.name}.attachment import AttachedEffect\n", encoding="utf-8")
     target = folder / "built"
     target.mkdir()
     run = subprocess.run(
