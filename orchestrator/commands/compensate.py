@@ -1,4 +1,4 @@
-"""``compensate``: plain LQR, shifted LQR and compensator of the gap on the same plants."""
+"""``compensate``: plain LQR, shifted LQR, an MPC if wanted, and compensator of the gap on the same plants."""
 
 import argparse
 
@@ -18,6 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(flag, type=float, default=default, metavar=unit, help=f"{text} (default: %(default)s)")
     parser.add_argument("--plants", type=int, default=5, metavar="N", help="how many plants (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of plants and noise (default: %(default)s)")
+    parser.add_argument("--mpc", action="store_true", help="a model predictive controller too (extra `mpc`)")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -30,6 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
             friction=arguments.friction,
             plants=arguments.plants,
             seed=arguments.seed,
+            mpc=arguments.mpc,
         )
         result.write(folder, arguments.out)
     print_blocks(result.blocks())

@@ -16,8 +16,7 @@ from orchestrator.scenarios.definition import Scenario
 
 Array = NDArray[np.float64]
 
-LQR, SHIFTED, COMPENSATOR = "LQR", "shifted LQR", "compensator"
-LAWS = (LQR, SHIFTED, COMPENSATOR)
+LQR, SHIFTED, MPC, COMPENSATOR = "LQR", "shifted LQR", "MPC", "compensator"
 FMUS = ("Drivetrain", "BacklashEstimator", "BacklashCompensator")
 RECORDED = ("plant.theta_m", "plant.omega_m", "plant.theta_l", "plant.omega_l", "plant.contact", "controller.u")
 COUNTS = (10_000, 20_000)  # of the encoders at motor and load, in one turn
@@ -80,7 +79,10 @@ class ControlTask:
 
 
 def make_loop(task: ControlTask, fmus: Mapping[str, Path], law: str, seed: Sequence[int]) -> Scenario:
-    """Return the loop under one of ``LAWS``; plant, noise and half-gap that is given follow from ``seed`` alone."""
+    """Return the loop under the LQR, shifted or not, or the compensator.
+
+    Plant, noise and half-gap that is given follow from ``seed`` alone.
+    """
     rng = np.random.default_rng(seed)
     nominal = task.nominal
     names = ("J_m", "J_l", "k", "c", "b_m", "b_l", "tau")

@@ -62,10 +62,21 @@ def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
 def bound_time(task: ControlTask, impact_speed: float) -> float:
     """Return the least time [s] of a traversal from rest that lands at ``impact_speed`` [rad/s] without torque.
 
-    See :mod:`pyfmu_sources.gap_traversal`: it is reached by the whole torque in three parts.
+    See :mod:`pyfmu_sources.gap_traversal`: it is reached by the whole torque in three parts. It is 0 where no traversal
+    ends so quickly.
     """
     t = _best(task, impact_speed)
     return t.first + t.second + t.third
+
+
+def quickest_landing(task: ControlTask) -> float:
+    """Return the largest speed [rad/s] with which a traversal from rest can end without torque, to a thousandth."""
+    possible = 0.0
+    width = 0.5 * task.impact_speed
+    while width > 1e-3 * possible:
+        possible += width if bound_time(task, possible + width) > 0.0 else 0.0
+        width *= 0.5
+    return possible
 
 
 def bound_path(task: ControlTask, impact_speed: float) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.control.loops import ControlTask
-from orchestrator.control.measures import bound_path, bound_time, first_path, measure_loop
+from orchestrator.control.measures import bound_path, bound_time, first_path, measure_loop, quickest_landing
 from orchestrator.master.result import Recording
 from tests.support.c_fmu import have_compiler
 
@@ -59,6 +59,18 @@ def test_a_path_goes_from_one_flank_to_the_other():
 
 def test_a_harder_landing_has_a_shorter_bound():
     assert bound_time(TASK, 0.3) < bound_time(TASK, 0.1) == pytest.approx(0.0360, abs=1e-4)
+
+
+def test_an_impact_speed_that_no_traversal_reaches_is_refused_with_one_that_can_be_had(capsys):
+    words = ["compensate", "--alpha", "0.002", "--tau", "0.2", "--impact-speed", "0.3"]
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert "`--impact-speed` must be at most 0.24" in error
+    assert "but is 0.3 rad/s" in error
+    told = float(error.split("at most ")[1].split()[0])
+    task = ControlTask(alpha=0.002, tau=0.2, impact_speed=0.3)
+    assert bound_time(task, told) > 0.0 == bound_time(task, 1.02 * told)
+    assert quickest_landing(task) == pytest.approx(told / 0.99, rel=5e-3)
 
 
 @pytest.mark.skipif(not have_compiler(), reason="Python FMUs take half a minute")
