@@ -8,20 +8,25 @@ the same name that others have. Afterwards what is this process's own is back; o
 """
 
 import builtins
+import functools
 import importlib
+import importlib.util
 import os
+import pkgutil
 import sys
 import threading
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Any
 
 _lock = threading.RLock()
 _live: list["PythonModules"] = []
 _owners: dict[int, "PythonModules"] = {}  # by the identity of a module's namespace
-_import, _import_module = builtins.__import__, importlib.import_module
+_import = builtins.__import__
+# What finds modules by their names, besides ``import``: data files of packages are read through these.
+_LOOKUPS = {importlib: ("import_module", "reload"), importlib.util: ("find_spec",), pkgutil: ("get_data",)}
 
 
 class PythonModules:
@@ -124,9 +129,22 @@ def _places(module: ModuleType) -> list[str]:
 
 def _watch_imports() -> None:
     """Look at who imports, from now on in this process."""
-    if builtins.__import__ is not _import_for_owner:
-        builtins.__import__ = _import_for_owner
-        importlib.import_module = _import_module_for_owner
+    if builtins.__import__ is _import_for_owner:
+        return
+    builtins.__import__ = _import_for_owner
+    for module, names in _LOOKUPS.items():
+        for name in names:
+            setattr(module, name, _look_up_for_owner(getattr(module, name)))
+
+
+def _owner_of(frame: FrameType | None) -> PythonModules | None:
+    """Return whose code runs in a frame, or has called it: a library may import on behalf of an FMU."""
+    while frame is not None:
+        owner = _owners.get(id(frame.f_globals))
+        if owner is not None:
+            return owner
+        frame = frame.f_back
+    return None
 
 
 def _import_for_owner(
@@ -136,16 +154,20 @@ def _import_for_owner(
     fromlist: Any = (),
     level: int = 0,
 ) -> Any:
-    owner = _owners.get(id(sys._getframe(1).f_globals if globals is None else globals))
+    owner = _owners.get(id(globals)) or _owner_of(sys._getframe(1))
     if owner is None or not (level or owner.needs_place(name, fromlist or ())):
         return _import(name, globals, locals, fromlist, level)
     with owner.place():
         return _import(name, globals, locals, fromlist, level)
 
 
-def _import_module_for_owner(name: str, package: str | None = None) -> ModuleType:
-    owner = _owners.get(id(sys._getframe(1).f_globals))
-    if owner is None:
-        return _import_module(name, package)
-    with owner.place():
-        return _import_module(name, package)
+def _look_up_for_owner(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that looks among the modules of whoever calls it."""
+
+    @functools.wraps(function)
+    def look_up(*arguments: Any, **named: Any) -> Any:
+        owner = _owner_of(sys._getframe(1))
+        with nullcontext() if owner is None else owner.place():
+            return function(*arguments, **named)
+
+    return look_up

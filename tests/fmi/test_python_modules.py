@@ -34,6 +34,7 @@ def two_helpers(factor: float) -> dict[str, str]:
 
 FROM_HELPER = STEP.format(factor="helper.FACTOR")
 PATH = "import os, sys\nsys.path.insert(0, os.path.join(os.path.dirname(__file__), 'lib'))\nimport helper\n"
+PACKAGE_DATA = "float(r.files('parts').joinpath('factor.txt').read_text())"
 KINDS: dict[str, Callable[[float], tuple[str, Mapping[str, str]]]] = {
     "module": lambda f: (slave_source(STEP.format(factor="FACTOR"), f"FACTOR = {f}"), {}),
     "helper": lambda f: (slave_source(FROM_HELPER, "import helper"), helper(f)),
@@ -46,6 +47,22 @@ KINDS: dict[str, Callable[[float], tuple[str, Mapping[str, str]]]] = {
         helper(f),
     ),
     "folder on the path": lambda f: (slave_source(FROM_HELPER, PATH), {f"lib/{n}": t for n, t in helper(f).items()}),
+    "data of a package": lambda f: (
+        slave_source("import importlib.resources as r\n" + STEP.format(factor=PACKAGE_DATA), "import parts"),
+        {"parts/__init__.py": "", "parts/factor.txt": str(f)},
+    ),
+    "data by pkgutil": lambda f: (
+        slave_source(STEP.format(factor="float(pkgutil.get_data('parts', 'factor.txt'))"), "import parts, pkgutil"),
+        {"parts/__init__.py": "", "parts/factor.txt": str(f)},
+    ),
+    "loaded anew": lambda f: (
+        slave_source(f"importlib.reload(helper)\n{FROM_HELPER}", "import importlib, helper"),
+        helper(f),
+    ),
+    "in a text that is run": lambda f: (
+        slave_source("space = {}\nexec('import helper', space)\n" + STEP.format(factor="space['helper'].FACTOR")),
+        helper(f),
+    ),
     "name of a loaded module": lambda f: (
         slave_source(STEP.format(factor="fractions.FACTOR"), "import fractions"),
         {"fractions.py": f"FACTOR = {f}\n"},
