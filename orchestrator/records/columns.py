@@ -170,3 +170,12 @@ def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, sou
             "(`model`)"
         )
     return unit.factor * factor
+
+
+def scale_values(values: Array, factor: float, offset: float) -> Array:
+    """Return ``values * factor + offset``: the values themselves where that is the same."""
+    if factor == 1.0 and offset == 0.0:
+        return values
+    out = values * factor
+    out += offset
+    return out

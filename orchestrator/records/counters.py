@@ -87,8 +87,8 @@ def check_whole(values: Array, name: str, label: str, source: str) -> None:
     # From 2**53 on all numbers are whole.
     if good.size and 2.0 < np.ptp(good) < 2.0**53 and np.all(good == np.rint(good)):
         raise RecordError(
-            f"{source}: column `{label}` must have a unit, as it holds whole numbers: say `[columns.{name}] unit = "
-            f'"counts"` with `counts_per_rev = ...` (or "deg") in the model file (`model`)'
+            f"{source}: column `{label}` must not be taken as rad, as it holds whole numbers: say `[columns.{name}] "
+            'unit = "counts"` with `counts_per_rev = ...` (or "deg", or "rad") in the model file (`model`)'
         )
 
 
@@ -123,8 +123,6 @@ def _check_unwrapped(steps: Array, rows: NDArray[np.int64], time: Array, modulo:
             f"{where} must move by less than half of its `modulo`, {exact_text(modulo)}, from row to row, but does not "
             f"at row {int(rows[fast[0] + 2]) + 1}: state the right `modulo`, or log faster or with a wider counter"
         )
-    if time.size <= rows.max(initial=0):
-        return
     lengths = np.diff(time[rows])
     usual = float(np.median(lengths)) if lengths.size else 0.0
     for gap in np.flatnonzero(lengths > 1.5 * usual).tolist():
@@ -141,8 +139,8 @@ def _check_unwrapped(steps: Array, rows: NDArray[np.int64], time: Array, modulo:
 
 def check_wraps(values: Array, name: str, label: str, source: str, turn: float | None = None) -> None:
     """Refuse an angle that starts again at an end of its range; ``turn``: counts of a revolution, where stated."""
-    finite = np.isfinite(values)
-    good = values if finite.all() else values[finite]
+    rows = np.flatnonzero(np.isfinite(values))
+    good = values[rows]
     steps = np.diff(good)
     span = float(np.ptp(good)) if steps.size else 0.0
     far = np.abs(steps) > 0.8 * span
@@ -158,7 +156,7 @@ def check_wraps(values: Array, name: str, label: str, source: str, turn: float |
         raise RecordError(
             f"{source}: column `{label}` must go on over a full turn, but jumps by "
             f"{float(np.abs(steps[far]).max()):.10g} at row "
-            f"{int(np.flatnonzero(np.abs(np.diff(values)) > 0.8 * span)[0]) + 2}: say {say}"
+            f"{int(rows[np.flatnonzero(far)[0] + 1]) + 1}: say {say}"
             + ("" if known else f": the number at which it starts again from zero, near {size:.9g}")
         )
 

@@ -1,6 +1,5 @@
 """From an opened file to the columns of a record in SI: which channels, which units, which time."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
+from orchestrator.records.clocks import Clock, read_clock, read_own_time
 from orchestrator.records.columns import (
     COLUMNS,
     KINDS,
@@ -18,15 +18,15 @@ from orchestrator.records.columns import (
     Column,
     check_numbers,
     scale_of,
+    scale_values,
     unit_of,
 )
-from orchestrator.records.counters import check_sign, check_whole, check_wraps, decode_sign, unwrap, unwrap_time
+from orchestrator.records.counters import check_sign, check_whole, check_wraps, decode_sign, unwrap
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, find_channels
 from orchestrator.records.rasters import bring_to_motor, make_uniform
 from orchestrator.records.requests import SAMPLED
-from orchestrator.records.stamps import seconds_of
 from orchestrator.records.topics import has_topics, split_topics
 from orchestrator.records.units import angle_unit, parse_unit
 from orchestrator.shared.numbers import exact_text
@@ -75,23 +75,6 @@ class Loaded:
     angle_unit: str = "rad"
 
 
-@dataclass(frozen=True)
-class _Clock:
-    """The time of the motor's rows.
-
-    Attributes:
-        time: (n,) [s].
-        spoken: words that say what it was.
-        factor: seconds in the file's numbers; None: it was not made from these.
-        start: what the file says at 0 s.
-    """
-
-    time: Array
-    spoken: str
-    factor: float | None = None
-    start: float = 0.0
-
-
 def load(
     source: RecordSource, path: Path, columns: Mapping[str, Column], further: Sequence[str], reading: Reading
 ) -> Loaded:
@@ -106,7 +89,6 @@ def load(
     labels = {name: source.heads[c.place].full or source.heads[c.place].name for name, c in chosen.items()}
     labels.setdefault("time", "time")
     values, clock = _in_part(source, places, chosen, columns.get("time", Column()), labels["time"], path, reading)
-    time = clock.time
     wanted = [choice.place for name, choice in chosen.items() if name != "time"]
     if "time" in chosen and len({head.raster for head in source.heads}) == 1 and has_topics(values, wanted):
         topics = split_topics(source, chosen["time"].place, wanted, chosen["theta_m"].place)
@@ -120,22 +102,24 @@ def load(
 
     if "time" in chosen and chosen["time"].place not in shared:
         values.pop(chosen["time"].place, None)
-    table: dict[str, Array] = {"time": time}
+    table: dict[str, Array] = {"time": clock.time}
     notes = [source.dialect, *(choice.assumed for choice in chosen.values() if choice.assumed)]
-    units = [clock.spoken]
+    units, motor = [clock.spoken], chosen["theta_m"].place
+    own: dict[str, Array] = {}
     for name in COLUMNS[1:]:
         if name in chosen:
-            written = source.heads[chosen[name].place].unit
-            raw = take(chosen[name].place)
-            table[name], said = _convert(name, raw, columns.get(name, Column()), written, labels[name], path, time)
+            place = chosen[name].place
+            head = source.heads[place]
+            if head.raster != source.heads[motor].raster:
+                own[name] = read_own_time(source, place, clock, columns.get("time", Column()), motor, path)
+            rows = own.get(name, clock.time)
+            raw = take(place)
+            table[name], said = _convert(name, raw, columns.get(name, Column()), head.unit, labels[name], path, rows)
             units.append(said)
-    table |= {name: values[place].astype(float) for name, place in extra.items() if name not in table}
-
-    def own_time(place: int) -> Array:
-        return _time_alike(source, place, columns.get("time", Column()), clock, labels["u"], path)
-
-    at = {name: choice.place for name, choice in chosen.items()} | extra
-    table, raster, more = bring_to_motor(table, at, source, path, reading.resample, own_time)
+    for name, place in extra.items():
+        if name not in table and source.heads[place].raster == source.heads[motor].raster:
+            table[name] = values[place].astype(float)
+    table, raster, more = bring_to_motor(table, own, labels, path, reading.resample)
     notes += [", ".join(units), *_unused(source, places), *more]
     drive = columns.get("u", Column())
     unit = None
@@ -171,17 +155,17 @@ def _in_part(
     label: str,
     path: Path,
     reading: Reading,
-) -> tuple[dict[int, NDArray[Any]], "_Clock"]:
+) -> tuple[dict[int, NDArray[Any]], Clock]:
     """Return the channels and their time; of a part nothing outside is looked at but the time."""
     raster = source.heads[chosen["theta_m"].place].raster
     if reading.part is not None and "time" in chosen:
         place = chosen["time"].place
-        clock = _time(source, chosen, {place: source.times(place)}, column, label, path, 0, False)
+        clock = read_clock(source, chosen, {place: source.times(place)}, column, label, path, 0, False)
         rows = _rows_of(clock.time, reading.part, path)
         values = dict(zip(places, source.within(rows, raster).load(places), strict=True))
         return values, replace(clock, time=clock.time[rows])
     values = dict(zip(places, source.load(places), strict=True))
-    clock = _time(source, chosen, values, column, label, path, values[chosen["theta_m"].place].size)
+    clock = read_clock(source, chosen, values, column, label, path, values[chosen["theta_m"].place].size)
     if reading.part is not None:
         rows = _rows_of(clock.time, reading.part, path)
         clock = replace(clock, time=clock.time[rows])
@@ -232,108 +216,6 @@ def find_all_channels(
     return find_channels(heads, columns, where, (), rated, torque_needed)
 
 
-def _time(
-    source: RecordSource,
-    chosen: Mapping[str, Choice],
-    values: Mapping[int, NDArray[Any]],
-    column: Column,
-    label: str,
-    path: Path,
-    rows: int,
-    whole: bool = True,
-) -> "_Clock":
-    """Return the time; ``whole``: nothing of it will be left out."""
-    rate = column.rate if column.rate is not None else source.rate
-    if "time" not in chosen:
-        assert rate is not None
-        _refuse_broken(source, path)
-        return _Clock(np.arange(rows) / rate, f"time from the row and {rate:.12g} Hz")
-    choice = chosen["time"]
-    raw = values[choice.place]
-    if column.rate is not None and not _are_sample_numbers(raw):
-        _refuse_broken(source, path)
-        said = _rate_of(raw, column, source.heads[choice.place].unit)
-        differs = math.isfinite(said) and abs(said / column.rate - 1.0) > 0.01
-        spoken = f"time from the row and {column.rate:.12g} Hz, `{label}` not used"
-        spoken += f" though it says {said:.6g} Hz" if differs else ""
-        return _Clock(np.arange(raw.size) / column.rate, spoken)
-    if raw.dtype.kind == "M":
-        return _Clock(seconds_of(raw, label, path), f"{label} as date and time")
-    numbers = np.asarray(raw, dtype=float)
-    if whole or column.modulo is not None:
-        numbers = unwrap_time(numbers, column, label, str(path))
-    numbers = _scale(numbers, column.factor, column.offset)
-    written = source.heads[choice.place].unit
-    if choice.numbered or column.rate is not None:
-        if rate is None:
-            raise RecordError(
-                f"{path}: column `{label}` is a sample number: say `[columns.time] rate = ...` [Hz] in the model file "
-                "(`model`)"
-            )
-        return _Clock(numbers / rate, f"{label} as sample number at {rate:g} Hz", 1.0 / rate)
-    unit = unit_of("time", column, written, label, str(path))
-    factor, spoken = (unit.factor, column.unit or written) if unit is not None else _epoch(numbers)
-    first = float(numbers[np.isfinite(numbers)][0]) if np.isfinite(numbers).any() else 0.0
-    start = first if abs(first * factor) > 1e6 else 0.0
-    return _Clock(_scale(numbers, factor, -start * factor), f"{label} in {spoken or 's'}", factor, start)
-
-
-def _rate_of(raw: NDArray[Any], column: Column, written: str) -> float:
-    """Return the mean rate that stamps say [Hz]; NaN: none."""
-    stamps = raw[~np.isnat(raw)].astype("datetime64[ns]").astype(float) if raw.dtype.kind == "M" else raw
-    stamps = stamps[np.isfinite(stamps)].astype(float)
-    unit = parse_unit("ns" if raw.dtype.kind == "M" else column.unit or written, KINDS["time"])
-    away = float(stamps[-1] - stamps[0]) * (unit.factor if unit is not None else 1.0) if stamps.size > 1 else 0.0
-    return (stamps.size - 1) / away if away > 0.0 else math.nan
-
-
-def _time_alike(source: RecordSource, place: int, column: Column, clock: "_Clock", label: str, path: Path) -> Array:
-    """Return the time [s] of another raster, from its own stamps, as that of the motor's was made from its stamps."""
-    if clock.factor is None:
-        raise RecordError(
-            f"{path}: column `{label}` has time stamps of its own, so the angles must have theirs too, but "
-            f"{clock.spoken}: leave `[columns.time] rate` out, or name channels of one raster"
-        )
-    numbers = np.asarray(source.load([place])[0], dtype=float) * column.factor + column.offset
-    return np.asarray((numbers - clock.start) * clock.factor)
-
-
-def _scale(values: Array, factor: float, offset: float) -> Array:
-    """Return ``values * factor + offset``: the values themselves where that is the same."""
-    if factor == 1.0 and offset == 0.0:
-        return values
-    out = values * factor
-    out += offset
-    return out
-
-
-def _refuse_broken(source: RecordSource, path: Path) -> None:
-    """Refuse rows without times between which a line says something: samples may be lost there."""
-    if source.broken:
-        raise RecordError(
-            f"{path}: {source.broken}, but without time stamps nobody knows whether samples are lost there: delete "
-            "such lines where none are, else keep the rows before or behind them in a file of their own"
-        )
-
-
-def _are_sample_numbers(raw: NDArray[Any]) -> bool:
-    """Return whether a column counts samples: whole numbers that rise; stamps that repeat do not."""
-    if raw.dtype.kind == "M":
-        return False
-    good = raw[np.isfinite(raw)]
-    return bool(np.all(good == np.rint(good)) and np.all(np.diff(good) > 0.0))
-
-
-def _epoch(numbers: Array) -> tuple[float, str]:
-    """Return factor and unit of times without one: seconds, or what makes a date of this century of them."""
-    good = numbers[np.isfinite(numbers)]
-    first = abs(float(good[0])) if good.size else 0.0
-    for unit, factor in (("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3)):
-        if 9e8 < first * factor < 4e9:
-            return factor, unit
-    return 1.0, ""
-
-
 def _convert(
     name: str, raw: Array, column: Column, written: str, label: str, path: Path, time: Array
 ) -> tuple[Array, str]:
@@ -342,11 +224,12 @@ def _convert(
     unit = unit_of(name, column, written, label, where)
     check_numbers(name, column, unit, label, where)
     scale = scale_of(name, column, unit, label, where)
-    if unit is None and name != "u" and column.factor == 1.0:
+    in_rad = unit is None or (unit.kind == "angle" and unit.factor == 1.0)
+    if in_rad and not column.unit and name != "u" and column.factor == 1.0:
         check_whole(raw, name, label, where)
     if column.sign_bit is None and column.modulo is None:
         check_sign(raw, name, label, where)
-    values = _scale(decode_sign(raw, column, label, where), column.factor, column.offset)
+    values = scale_values(decode_sign(raw, column, label, where), column.factor, column.offset)
     del raw
     spoken = f"{label} in {(column.unit or written) if unit is not None else SI[KINDS[name][0]]}"
     if unit is None and not written and not column.unit:
@@ -357,8 +240,6 @@ def _convert(
                 f"{path}: column `{label}` is a speed, but `[columns.{name}] modulo` is for an angle: leave it out in "
                 "the model file (`model`)"
             )
-        if time.size != values.size:
-            raise RecordError(f"{path}: column `{label}` must have the rows of the time, but has {values.size}")
         steps = np.diff(time, prepend=time[0] - float(np.nanmedian(np.diff(time))))
         summed = np.cumsum(
             np.where(np.isfinite(values), values, 0.0) * scale * np.where(np.isfinite(steps), steps, 0.0)
@@ -368,7 +249,7 @@ def _convert(
         values = unwrap(values, column, time, label, where)
         turn = column.counts_per_rev if unit is not None and unit.kind == "counts" else None
         check_wraps(values, name, label, where, turn)
-    return _scale(values, scale, 0.0), spoken
+    return scale_values(values, scale, 0.0), spoken
 
 
 def _rows_of(time: Array, part: tuple[float, float], path: Path) -> slice:

@@ -4,14 +4,13 @@ The torque is held from its own row to the next, whatever is asked for; what was
 for.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from orchestrator.errors import RecordError
 from orchestrator.records.columns import COLUMNS, Array
-from orchestrator.records.formats.source import Head, RecordSource
 from orchestrator.records.requests import SAMPLED, hold_request
 from orchestrator.records.timing import INTERPOLATION, has_gap, interpolate, interpolation_cost, resample_grid
 
@@ -19,59 +18,38 @@ Table = dict[str, Array]
 
 
 def bring_to_motor(
-    table: Table, places: Mapping[str, int], source: RecordSource, path: Path, how: str | None,
-    clock: Callable[[int], Array],
-) -> tuple[Table, float, list[str]]:  # fmt: skip
+    table: Table, own_times: Mapping[str, Array], labels: Mapping[str, str], path: Path, how: str | None
+) -> tuple[Table, float, list[str]]:
     """Return columns of other rasters at the rows of the motor's.
 
     Args:
         table: columns in SI, ``time`` that of the motor's raster.
-        places: of the columns in the file, by name.
+        own_times: times [s] of the columns whose rows are others, on the clock of ``time``.
+        labels: names in the file.
         how: to interpolate angles: "linear" or "cubic"; else they are refused.
-        clock: place of the time stamps of a raster -> these, in s, as ``time`` has them.
 
     Returns:
         The columns, the step of the torque's own rows [s] where they are rarer (else 0.0), and what was done.
     """
-    main, raster, notes = source.heads[places["theta_m"]], 0.0, []
+    raster, notes = 0.0, []
     table = dict(table)
-    for name in sorted(table, key=lambda name: name == "u"):  # rows without a torque go once all columns have them
-        place = places.get(name)
-        if place is None or (source.heads[place].raster == main.raster and table[name].size == table["time"].size):
-            continue
-        if name not in COLUMNS:
-            del table[name]
-            continue
-        head = source.heads[place]
-        stamps = _own_time(source, head, main, table[name].size, table["theta_m"].size, path, clock)
+    for name in sorted(own_times, key=lambda name: name == "u"):  # rows without a torque go once all columns have them
+        stamps, label = own_times[name], labels[name]
         if stamps.size == table["time"].size and np.array_equal(stamps, table["time"]):
             continue
         if name == "u":
-            table, raster, note = _hold(table, stamps, head.full or head.name, path)
+            table, raster, note = _hold(table, stamps, label, path)
             notes.append(note)
             continue
         if how not in INTERPOLATION:
             raise RecordError(
-                f"{path}: column `{head.full}` has time stamps of its own: say how to bring it to those of "
-                f"`{main.full}`: `resample` linear or cubic"
+                f"{path}: column `{label}` has time stamps of its own: say how to bring it to those of "
+                f"`{labels['theta_m']}`: `resample` linear or cubic"
             )
         cost = interpolation_cost(stamps, table[name], how)
         table[name] = interpolate(table["time"], stamps, table[name], how)
-        notes.append(f"{head.full} resampled ({how}), error about {cost:.2g} rad (rms)")
+        notes.append(f"{label} resampled ({how}), error about {cost:.2g} rad (rms)")
     return table, raster, notes
-
-
-def _own_time(
-    source: RecordSource, head: Head, main: Head, rows: int, motor_rows: int, path: Path,
-    clock: Callable[[int], Array],
-) -> Array:  # fmt: skip
-    place = next((n for n, h in enumerate(source.heads) if h.raster == head.raster and h.name == "time"), None)
-    if place is None:
-        raise RecordError(
-            f"{path}: column `{head.full}` must have as many rows as `{main.full}` and the time, but has {rows}, not "
-            f"{motor_rows}: name channels of one raster"
-        )
-    return clock(place)
 
 
 def _hold(table: Table, stamps: Array, label: str, path: Path) -> tuple[Table, float, str]:

@@ -34,13 +34,13 @@ def is_stamp(cell: str) -> bool:
     return any(pattern.fullmatch(plain) for pattern in _PATTERNS)
 
 
-def seconds_of(stamps: NDArray[Any], label: str, path: Path) -> NDArray[np.float64]:
-    """Return stamps (n,), datetime64, as seconds (n,) from the first one on; NaN where there is none."""
+def seconds_of(stamps: NDArray[Any], label: str, path: Path, start: np.datetime64 | None = None) -> NDArray[np.float64]:
+    """Return stamps (n,), datetime64, as seconds (n,) from ``start``, or from the first one on; NaN: there is none."""
     stamps = stamps.astype("datetime64[ns]")
     good = ~np.isnat(stamps)
     if not good.any():
         raise RecordError(f"{path}: column `{label}` must hold times, but is empty")
-    away = (stamps - stamps[good][0]).astype(np.int64).astype(float) * 1e-9
+    away = (stamps - (stamps[good][0] if start is None else start)).astype(np.int64).astype(float) * 1e-9
     return np.where(good, away, np.nan)
 
 

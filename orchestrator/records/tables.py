@@ -66,17 +66,27 @@ def read_columns(
         header: line of the names in a text, from 1; 0: there are none; None: found.
     """
     with open_source(path, header) as source:
-        places = [_place(source.heads, entry, path, time) for entry in (time, *wanted)]
-        distinct = sorted(set(places))
+        places = [_place(source.heads, entry, path, time) for entry in wanted]
+        places = [_time_place(source.heads, time, places, path), *places]
+        others = {head.raster for head in source.heads} - {source.heads[places[0]].raster}
+        clocks = {
+            head.raster: n for n, head in enumerate(source.heads) if head.name == "time" and head.raster in others
+        }
+        distinct = sorted({*places, *clocks.values()})
         loaded = dict(zip(distinct, source.load(distinct), strict=True))
         heads, dialect = [source.heads[place] for place in places], source.dialect
     labels = tuple(head.full or head.name for head in heads)
     arrays = [loaded[place] for place in places]
-    for values, label in zip(arrays, labels, strict=True):
+    for values, head, label in zip(arrays, heads, labels, strict=True):
         if values.size != arrays[0].size:
             raise RecordError(
                 f"{path}: column `{label}` must have as many rows as `{labels[0]}`, but has {values.size}, not "
                 f"{arrays[0].size}: name channels of one raster"
+            )
+        if head.raster in clocks and not np.array_equal(loaded[clocks[head.raster]], arrays[0]):
+            raise RecordError(
+                f"{path}: column `{label}` must have the times of `{labels[0]}`, but has those of "
+                f"`{source.heads[clocks[head.raster]].full}`: name channels of one raster"
             )
     seconds, said = _seconds(arrays[0], heads[0], time, time_factor, path)
     numbers = []
@@ -117,6 +127,16 @@ def _place(heads: Sequence[Head], wanted: Wanted, path: Path, time: Wanted) -> i
         f"{path}: {wanted.where} must name a column, but there is {count}: {wanted.column!r} of "
         f"{list_names(heads)}{near(wanted.column, heads)}"
     )
+
+
+def _time_place(heads: Sequence[Head], wanted: Wanted, columns: Sequence[int], path: Path) -> int:
+    """Return the place of the time: where it is not named, that of the first column's raster."""
+    if wanted.column == "time" and columns and len({head.raster for head in heads}) > 1:
+        raster = heads[columns[0]].raster
+        inside = [n for n, head in enumerate(heads) if head.raster == raster and head.name == "time"]
+        if len(inside) == 1:
+            return inside[0]
+    return _place(heads, wanted, path, wanted)
 
 
 def _seconds(raw: NDArray[Any], head: Head, wanted: Wanted, factor: float, path: Path) -> tuple[Array, str]:

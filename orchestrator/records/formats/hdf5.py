@@ -36,7 +36,7 @@ def open_file(path: Path) -> ArraySource:
             "MAT version 7 (MATLAB: save('record.mat', '-v7', ...))"
         )
     words = ", ".join([found.describe("MAT 7.3 / HDF5 file"), *reader.unpacked])
-    return ArraySource(path, found.arrays, words, found.units)
+    return ArraySource(path, found, words)
 
 
 class _Reader:

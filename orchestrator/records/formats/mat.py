@@ -41,7 +41,7 @@ def open_file(path: Path) -> ArraySource:
             f"{path}: a MAT file must hold vectors of numbers, but this one holds none: save arrays, not timeseries or "
             "tables (MATLAB: s = struct('time', t, 'u', u, ...); save('record.mat', '-struct', 's'))"
         )
-    return ArraySource(path, found.arrays, found.describe(kind), found.units)
+    return ArraySource(path, found, found.describe(kind))
 
 
 def _is_5(path: Path) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.records.formats.numpy_file import columns_of
+from orchestrator.records.words import TIME
 
 DEEPEST = 6
 _UNITS = ("unit", "units")
@@ -25,10 +25,15 @@ class PassedOver:
 
 @dataclass
 class Vectors:
-    """Vectors by name, their units where they are stated, and what was passed over."""
+    """Vectors by name, their units where they are stated, and what was passed over.
+
+    ``times`` has for each the place in ``clocks`` of the name of its time; -1: it has none.
+    """
 
     arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    times: dict[str, int] = field(default_factory=dict)
+    clocks: list[str] = field(default_factory=list)
     passed_over: list[str] = field(default_factory=list)
 
     def describe(self, kind: str) -> str:
@@ -46,48 +51,96 @@ def vectors_of(variables: Mapping[str, Any]) -> Vectors:
 
     A field that is called ``values`` or ``data`` has the name of its structure, or of the field ``label`` or ``name``
     beside it; other fields have their own names where that is unique. Of an array of structures each one counts, and
-    numbers that each of them has are a vector.
+    numbers that each of them has are a vector. The time of a vector is that of the nearest structure around it that
+    has one.
     """
-    found = Vectors()
-    for name, value in variables.items():
-        _collect(name, value, "", found, 0)
-    return found
+    vectors = Vectors()
+    _collect_fields(variables, "", vectors, 0, -1)
+    return vectors
 
 
-def _collect(name: str, value: Any, place: str, channels: Vectors, depth: int) -> None:
+def _collect_fields(
+    fields: Mapping[str, Any], place: str, vectors: Vectors, depth: int, time: int, label: str = "", unit: str = ""
+) -> None:
+    """Collect the fields of a structure, its time first.
+
+    Args:
+        place: name of the structure.
+        time: place in ``clocks`` of the time of the structure around it; -1: there is none.
+        label: name of its data; empty: the field's own.
+        unit: what its data are in; empty: nothing is said.
+    """
+    times = [key for key in fields if key.lower() in TIME and _is_vector(fields[key])]
+    own = next((key for key in times if key.lower() == "time"), times[0] if len(times) == 1 else None)
+    if own is not None:
+        time = len(vectors.clocks)
+        vectors.clocks.append("")
+    for key, value in fields.items():
+        is_data = bool(label) and key.lower() in _DATA and isinstance(value, np.ndarray)
+        known = len(vectors.arrays)
+        _collect(label if is_data else key, value, place, vectors, depth, time)
+        added = list(vectors.arrays)[known:] if key == own or unit else []
+        if key == own:
+            vectors.clocks[time] = "".join(added)
+        elif is_data:
+            vectors.units |= dict.fromkeys(added, unit)
+
+
+def _is_vector(value: Any) -> bool:
+    value = value.get("values") if isinstance(value, Mapping) else value
+    return (
+        isinstance(value, np.ndarray) and value.dtype.kind in "fiuM" and max(value.shape, default=0) == value.size > 1
+    )
+
+
+def _collect(name: str, value: Any, place: str, vectors: Vectors, depth: int, time: int) -> None:
+    if isinstance(value, np.ndarray) and value.dtype.names:
+        value = {field: value[field] for field in value.dtype.names}
     if isinstance(value, PassedOver):
-        channels.passed_over.append(f"`{name}` ({value.kind})")
+        vectors.passed_over.append(f"`{name}` ({value.kind})")
     elif isinstance(value, Mapping):
-        _collect_structure(name, value, channels, depth)
+        _collect_structure(name, value, vectors, depth, time)
     elif isinstance(value, Sequence) and not isinstance(value, str):
         for number, entry in enumerate(_columns(value), start=1):
-            _collect_structure(f"{name}({number})", entry, channels, depth)
-    elif isinstance(value, np.ndarray) and (value.dtype.names or value.dtype.kind in "fiubM"):
-        key = name if name not in channels.arrays else f"{place}.{name}"
-        channels.arrays |= {k: v for k, v in columns_of(key, value).items() if k not in channels.arrays}
+            _collect_structure(f"{name}({number})", entry, vectors, depth, time)
+    elif isinstance(value, np.ndarray):
+        key = name if name not in vectors.arrays else f"{place}.{name}"
+        arrays = {k: v for k, v in _columns_of(key, value).items() if k not in vectors.arrays}
+        vectors.arrays |= arrays
+        vectors.times |= dict.fromkeys(arrays, time)
 
 
-def _collect_structure(name: str, fields: Mapping[str, Any], channels: Vectors, depth: int) -> None:
+def _collect_structure(name: str, fields: Mapping[str, Any], vectors: Vectors, depth: int, time: int) -> None:
     lists = {key: value for key, value in fields.items() if isinstance(value, list)}
     if len(lists) > 1 and len(lists) == len(fields) and len({len(value) for value in lists.values()}) == 1:
         # MAT 7.3 writes an array of structures as a structure of arrays.
         entries = [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
-        _collect(name, entries, "", channels, depth)
+        _collect(name, entries, "", vectors, depth, time)
         return
     if depth >= DEEPEST:
-        channels.passed_over.append(f"`{name}` (structure)")
+        vectors.passed_over.append(f"`{name}` (structure)")
         return
     texts = {key.lower(): value for key, value in fields.items() if isinstance(value, str) and value}
-    label = next((texts[key] for key in _LABELS if key in texts), "")
+    label = next((texts[key] for key in _LABELS if key in texts), name)
     unit = next((texts[key] for key in _UNITS if key in texts), "")
-    for key, value in fields.items():
-        if key.lower() in _DATA and isinstance(value, np.ndarray):
-            before = set(channels.arrays)
-            _collect(label or name, value, name, channels, depth + 1)
-            if unit:
-                channels.units |= dict.fromkeys(set(channels.arrays) - before, unit)
-        elif not isinstance(value, str):
-            _collect(key, value, name, channels, depth + 1)
+    _collect_fields(fields, name, vectors, depth + 1, time, label, unit)
+
+
+def _columns_of(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Return the columns of an array: itself, or the columns of a table, numbered from 1.
+
+    Args:
+        array: of any shape.
+    """
+    if array.dtype.kind not in "fiubM" or array.size < 2:
+        return {}
+    if array.ndim == 1 or (array.ndim == 2 and 1 in array.shape):
+        return {name: array}
+    if array.ndim != 2:
+        return {}
+    table = array if array.shape[0] >= array.shape[1] else array.T
+    prefix = f"{name}#" if name else "#"
+    return {f"{prefix}{n + 1}": table[:, n] for n in range(table.shape[1])}
 
 
 def _columns(entries: Sequence[Any]) -> list[Any]:

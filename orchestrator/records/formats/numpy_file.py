@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.heads import head_of
+from orchestrator.records.formats.nested import Vectors, vectors_of
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
     MAXIMUM_CHANNELS,
@@ -26,16 +27,26 @@ _MODELS = {"modelDescription.xml": ("an FMU", "fmu"), "SystemStructure.ssd": ("a
 class ArraySource(RecordSource):
     """Arrays in memory, by name."""
 
-    def __init__(self, path: Path, arrays: dict[str, NDArray[Any]], dialect: str, units: dict[str, str]) -> None:
-        self._path = path
-        self._arrays = [np.ravel(values) for values in arrays.values()]
-        if len(arrays) > MAXIMUM_CHANNELS:
-            raise RecordError(f"{path}: a record must have at most {MAXIMUM_CHANNELS} columns, but has {len(arrays)}")
-        lengths = {values.size: n for n, values in enumerate(self._arrays)}
-        self.heads: Sequence[Head] = [
-            _head(name, units.get(name, ""), values, lengths[values.size])
-            for name, values in zip(arrays, self._arrays, strict=True)
-        ]
+    def __init__(self, path: Path, vectors: Vectors, dialect: str) -> None:
+        self._path, names = path, list(vectors.arrays)
+        self._arrays = [np.ravel(values) for values in vectors.arrays.values()]
+        if len(names) > MAXIMUM_CHANNELS:
+            raise RecordError(f"{path}: a record must have at most {MAXIMUM_CHANNELS} columns, but has {len(names)}")
+        clocks = _distinct_clocks(vectors)
+        by_size: dict[int, set[str]] = {}
+        for clock in filter(None, clocks):
+            by_size.setdefault(vectors.arrays[clock].size, set()).add(clock)
+        several = len(set(clocks)) > 1
+        rasters: dict[tuple[str, int], int] = {}
+        heads = []
+        for name, values in zip(names, self._arrays, strict=True):
+            place, alike = vectors.times.get(name, -1), by_size.get(values.size, set())
+            clock = clocks[place] if place >= 0 else next(iter(alike)) if len(alike) == 1 else ""
+            raster = rasters.setdefault((clock, values.size), len(rasters))
+            head = head_of(name, vectors.units.get(name, ""))
+            kind = "stamp" if values.dtype.kind == "M" else "number"
+            heads.append(Head("time" if several and name == clock else head.name, head.unit, kind, raster, head.full))
+        self.heads: Sequence[Head] = heads
         self.dialect = dialect
         self.rate = None
 
@@ -44,29 +55,13 @@ class ArraySource(RecordSource):
         return [as_numbers(self._arrays[place], self.heads[place].name, self._path) for place in places]
 
 
-def _head(name: str, unit: str, values: NDArray[Any], raster: int) -> Head:
-    kind = "stamp" if values.dtype.kind == "M" else "number"
-    head = head_of(name, unit)
-    return Head(head.name, head.unit, kind, raster, head.full)
-
-
-def columns_of(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Return the columns of an array: itself, its named fields, or the columns of a table, numbered from 1.
-
-    Args:
-        array: of any shape.
-    """
-    if array.dtype.names:
-        return {field: array[field] for field in array.dtype.names if array[field].dtype.kind in "fiubM"}
-    if array.dtype.kind not in "fiubM" or array.size < 2:
-        return {}
-    if array.ndim == 1 or (array.ndim == 2 and 1 in array.shape):
-        return {name: array}
-    if array.ndim != 2:
-        return {}
-    table = array if array.shape[0] >= array.shape[1] else array.T
-    prefix = f"{name}#" if name else "#"
-    return {f"{prefix}{n + 1}": table[:, n] for n in range(table.shape[1])}
+def _distinct_clocks(vectors: Vectors) -> list[str]:
+    """Return the name of each time, that of the first one for those that are equal to it; empty: it is none."""
+    first: dict[bytes, str] = {}
+    return [
+        first.setdefault(np.ascontiguousarray(vectors.arrays[name]).astype("f8").tobytes(), name) if name else ""
+        for name in vectors.clocks
+    ]
 
 
 def open_file(path: Path) -> ArraySource:
@@ -77,7 +72,7 @@ def open_file(path: Path) -> ArraySource:
                 return _npz(path)
             _check_npy(path)
             array = np.load(path, allow_pickle=False)
-        return ArraySource(path, columns_of("", array), f"NumPy array of {' x '.join(map(str, array.shape))}", {})
+        return ArraySource(path, vectors_of({"": array}), f"NumPy array of {' x '.join(map(str, array.shape))}")
     except RecordError:
         raise
     except Exception as error:  # numpy's and zip's readers raise whatever a broken file makes them meet
@@ -105,11 +100,9 @@ def _npz(path: Path) -> ArraySource:
             )
         if sum(entry.file_size for entry in entries) > MAXIMUM_BYTES or len(names) > MAXIMUM_CHANNELS:
             raise RecordError(f"{path}: must unpack to at most {MAXIMUM_BYTES // 10**6} MB, but would to more")
-    arrays: dict[str, NDArray[Any]] = {}
     with np.load(path, allow_pickle=False) as content:
-        for name in content.files:
-            arrays |= columns_of(name, content[name])
-    return ArraySource(path, arrays, f"NumPy archive of {len(names)} arrays", {})
+        vectors = vectors_of({name: content[name] for name in content.files})
+    return ArraySource(path, vectors, f"NumPy archive of {len(names)} arrays")
 
 
 def _check_npy(path: Path) -> None:

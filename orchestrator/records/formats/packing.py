@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.records.words import words_of
+
 Array = NDArray[Any]
 
-# Attributes of other conventions, which mean one thing here and another there.
-UNKNOWN = frozenset(("scale", "scaling", "factor", "gain", "slope", "offset", "intercept", "multiplier"))
+# Words in attributes of other conventions, which mean one thing here and another there.
+UNKNOWN = frozenset(["scale", "scaling", "factor", "gain", "slope", "offset", "intercept", "multiplier", "lsb"])
 
 
 def unpack(values: Array, attributes: Mapping[str, Any], fill: Any = None) -> tuple[Array, str]:
@@ -50,7 +52,8 @@ def unpack(values: Array, attributes: Mapping[str, Any], fill: Any = None) -> tu
         out = out.astype(float)
         out[missing] = np.nan
         said.append(f"{np.count_nonzero(missing)} missing")
-    said += [f"attribute `{key}` not used" for key in attributes if key.lower() in UNKNOWN]
+    others = [key for key in attributes if key not in ("scale_factor", "add_offset") and UNKNOWN & set(words_of(key))]
+    said += [f"attribute `{key}` not used" for key in others]
     return out, ", ".join(said)
 
 
