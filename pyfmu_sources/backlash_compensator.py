@@ -39,6 +39,7 @@ HORIZON = 1.5  # of a crossing, over which the load is foreseen: it is to be bra
 DEAD_BAND = 2.0  # margins, within which the load is where it should be
 REFERENCE_LAG = 0.25  # of a crossing: time constant of the reference's acceleration; steps of its speed last so long
 PER_CROSSING = 5.0  # poles of the feedback times the duration of a crossing
+OWN_POLE = 0.4  # share of the drive's own pole that the feedback leaves to its torque at least
 PER_SAMPLE = 0.085  # largest poles of the feedback times the sample time
 BARRED = 0.75  # of the half-gap, by which a way that stands still is behind its line: a flank is where none is known
 TURNING = 2  # samples before the end of a plan's first part, from which it is too late to turn back
@@ -143,8 +144,9 @@ def impact_speed(reference: float, reference_speed: float, x: Estimate, alpha: f
 def follow(state: CrossingState, duration: float, end: float, x: Estimate, d: Train, s: Tuning) -> float:
     """Return the request [N.m] along the plan of a crossing; from the way ``end`` [rad] on the teeth may touch.
 
-    With ``e`` the error of the way the gains make ``e''' + 2.4 p e'' + 2.4 p^2 e' + p^3 e = 0`` of the chain of way,
-    speed and torque. What else accelerates the twist, friction and load, is a torque that the request cancels.
+    The gains give the error of the chain of way, speed and torque the poles of ``(s + r) (s^2 + 1.4 p s + p^2)``, where
+    ``r`` is ``p``, but not much slower than a quick drive is by itself. What else accelerates the twist, friction and
+    load, is a torque that the request cancels.
     """
     t = state.traversal
     side = float(state.flank)
@@ -157,8 +159,9 @@ def follow(state: CrossingState, duration: float, end: float, x: Estimate, d: Tr
     behind = aim[0] - side * (x[0] / d.i - x[2])
     if t.third == 0.0 and side * (x[0] / d.i - x[2]) > end:
         behind = min(behind, s.margin)  # the teeth may touch: no push for the way that they bar
-    u += d.tau * M * p * p * (p * behind + 2.4 * (aim[1] - side * (x[1] / d.i - x[3])))
-    u += (2.4 * p * d.tau - 1.0) * (aim[2] - side * x[5] - extra)
+    r = max(p, OWN_POLE / d.tau)
+    u += d.tau * M * p * (r * p * behind + (1.4 * r + p) * (aim[1] - side * (x[1] / d.i - x[3])))
+    u += ((r + 1.4 * p) * d.tau - 1.0) * (aim[2] - side * x[5] - extra)
     return side * max(-s.u_max, min(s.u_max, u))
 
 

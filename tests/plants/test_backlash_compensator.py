@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from orchestrator.plants.design import DrivetrainValues, discretise, six_state_model
 from pyfmu_sources.backlash_compensator import (
     CROSS,
     HOLD,
@@ -127,6 +128,25 @@ def test_too_quick_for_a_plan_it_brakes_and_does_not_turn_round():
         state, u = act(state, 0.5, 0.0, x, Gap(0.02, 1e-4), GAINS, TRAIN, TUNING)
         assert state.phase == CROSS
         assert u == -300.0 if speed > 1.0 else state.traversal.third > 0.0
+
+
+@pytest.mark.parametrize("share", [0.95, 1.0, 1.05], ids="motor {:g}".format)
+@pytest.mark.parametrize("tau", [5e-4, 1e-3, 5e-3, 1.0], ids="drive {:g}".format)
+def test_a_drive_as_quick_as_the_samples_lands_softly_too(tau, share):
+    apart = six_state_model(DrivetrainValues(tau=tau, J_m=0.4 * share, k=0.0, c=0.0))
+    A, B = discretise(apart, 5e-5)
+    x = np.array([-0.02 * 3.984, 0.0, 0.0, 0.0, 0.0, 0.0])
+    state = start_state(tuple(x), 0.0, 3.984)
+    train = TRAIN._replace(tau=tau)
+    samples = 0
+    while x[0] / 3.984 - x[2] < 0.02:
+        if samples % 20 == 0:
+            state, u = act(state, 0.25, 0.0, tuple(x), Gap(0.02, 1e-4), GAINS, train, TUNING)
+        x = A @ x + B[:, 0] * u
+        samples += 1
+        assert samples < 10_000
+    assert x[1] / 3.984 - x[3] < 2.5 * TUNING.impact_speed
+    assert samples * 5e-5 < 1.5 * crossing_time(0.02, train, TUNING)
 
 
 def test_a_crossing_begins_only_if_the_load_would_be_ahead_when_left_alone():
