@@ -1,8 +1,9 @@
 """Files that an FMU of FMI 3.0 has beside its model description: how its sources are compiled, its terminals."""
 
 from typing import Any
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
+
+from orchestrator.building.stamping import xml_text
 
 
 def build_description(name: str) -> bytes:
@@ -12,7 +13,7 @@ def build_description(name: str) -> bytes:
     files = SubElement(build, "SourceFileSet", {"language": "C99"})
     SubElement(files, "SourceFile", {"name": f"{name}.c"})
     SubElement(build, "Library", {"name": "m", "external": "true", "description": "Mathematics of the C library"})
-    return _xml(root)
+    return xml_text(root)
 
 
 def terminals_and_icons(cls: Any) -> bytes:
@@ -35,9 +36,4 @@ def terminals_and_icons(cls: Any) -> bytes:
                 kind = flow if member == "torque" else "signal"
                 names = {"variableName": variable, "memberName": member, "variableKind": kind}
                 SubElement(terminal, "TerminalMemberVariable", names)
-    return _xml(root)
-
-
-def _xml(root: Element) -> bytes:
-    ElementTree.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root) + b"\n"
+    return xml_text(root)

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.building.sources import Recipe
+from orchestrator.building.stamping import xml_text
 
 DATA = Path(__file__).parent / "data"
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -78,7 +79,7 @@ def _manifest() -> bytes:
     ]
     for kind, source, role, text in related:
         SubElement(root, "Related", {"type": kind, "source": source, "role": role, "description": text})
-    return _xml(root)
+    return xml_text(root)
 
 
 def _experiments(rows: list[list[str]], step: float) -> bytes:
@@ -94,7 +95,7 @@ def _experiments(rows: list[list[str]], step: float) -> bytes:
     SubElement(experiment, "Parameters", {"source": "parameters.ssv"})
     SubElement(experiment, "Stimuli", {"source": "stimuli.csv"})
     SubElement(experiment, "References", {"source": "reference.csv"})
-    return _xml(root)
+    return xml_text(root)
 
 
 def _parameter_set(parameters: dict[str, float]) -> bytes:
@@ -103,9 +104,4 @@ def _parameter_set(parameters: dict[str, float]) -> bytes:
     entries = SubElement(root, f"{{{SSV}}}Parameters")
     for name, value in parameters.items():
         SubElement(SubElement(entries, f"{{{SSV}}}Parameter", {"name": name}), f"{{{SSV}}}Real", {"value": repr(value)})
-    return _xml(root)
-
-
-def _xml(root: Element) -> bytes:
-    ElementTree.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root) + b"\n"
+    return xml_text(root)

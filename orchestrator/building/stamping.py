@@ -32,5 +32,10 @@ def final_text(description: Element, guid: str) -> bytes:
     description.set("guid" if description.attrib["fmiVersion"] == "2.0" else "instantiationToken", guid)
     for element in description.iter():
         element.text = element.tail = None
-    ElementTree.indent(description)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(description) + b"\n"
+    return xml_text(description)
+
+
+def xml_text(root: Element) -> bytes:
+    """Return an indented document."""
+    ElementTree.indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root) + b"\n"

@@ -7,8 +7,12 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-_PROBE = 1 << 16
-"""Bytes that must find room: an empty file can be made on a full disk, too."""
+
+def require_room(folder: Path) -> None:
+    """Write a file and remove it; raise ``OSError`` where that fails. An empty one can be made on a full disk, too."""
+    with tempfile.NamedTemporaryFile(dir=folder) as probe:
+        probe.write(bytes(1 << 16))
+        probe.flush()
 
 
 @cache
@@ -21,9 +25,7 @@ def cache_directory(name: str) -> Path:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         folder = Path(base) / "backlash-cosim" / name
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=folder) as probe:
-            probe.write(bytes(_PROBE))
-            probe.flush()
+        require_room(folder)
     except (OSError, RuntimeError):  # the latter where the user has no home
         return _temporary()
     return folder

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import OutputError
+from orchestrator.shared.cache import require_room
 from orchestrator.shared.operating_system import PLAIN_FILE, alive
 from orchestrator.shared.results import as_plain
 from orchestrator.shared.version import __version__
 
 STAGING = ".partial-"
-_PROBE = 1 << 16
 _LONGEST_PREFIX = 32  # letters: the name beside a file must fit where the file's own does
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by writes, which name no file
 
@@ -55,9 +55,7 @@ def stage_output(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path
 def _full(folder: Path) -> bool:
     """Whether no more can be written to ``folder``."""
     try:
-        with tempfile.NamedTemporaryFile(dir=folder) as probe:
-            probe.write(bytes(_PROBE))
-            probe.flush()
+        require_room(folder)
     except OSError:
         return True
     return False
