@@ -5,7 +5,7 @@ import re
 from functools import cache
 
 from orchestrator.cli import COMMANDS, build_parser
-from tests.support.sources import ROOT, SOURCES, tree_of
+from tests.support.sources import ROOT, SOURCES, nodes_of, tree_of
 
 # Words without which a command line is refused.
 NEEDED = {
@@ -72,7 +72,7 @@ def words_of(path):
 
 def imports(path):
     """Full names of the project's modules that a file imports, function bodies included."""
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_of(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
@@ -114,7 +114,7 @@ def test_imports_point_one_way():
 def sources_of(path, known):
     """The files that a file imports, by module name, imports within the package of the FMUs' sources included."""
     package = path.relative_to(ROOT).with_suffix("").parts[:-1]
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_of(path):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = ".".join((*package[: len(package) - node.level + 1], *([node.module] if node.module else [])))
             yield from (name for name in (base, *(f"{base}.{alias.name}" for alias in node.names)) if name in known)
@@ -148,7 +148,7 @@ def test_only_commands_print():
     for path in SOURCES:
         if "commands" in path.parts:
             continue
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             called = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print"
             assert not called, f"{path} prints"
 
@@ -175,10 +175,10 @@ def test_flags_are_named_in_commands_alone():
     assert not wrong
 
 
-def sizes(text):
+def sizes(text, nodes):
     """(name, lines) of each function, and of the module under the name of "". Docstrings of functions do not count."""
     documented = 0
-    for node in ast.walk(ast.parse(text)):
+    for node in nodes:
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             if ast.get_docstring(node):
                 documented += node.body[0].end_lineno - node.body[0].lineno
@@ -188,14 +188,14 @@ def sizes(text):
 
 
 def test_modules_and_functions_stay_small():
-    found = [(path, *size) for path in SOURCES for size in sizes(path.read_text(encoding="utf-8"))]
+    found = [(path, *size) for path in SOURCES for size in sizes(path.read_text(encoding="utf-8"), nodes_of(path))]
     large = [(path, name, n) for path, name, n in found if n > (MOST_FUNCTION_LINES if name else MOST_LINES)]
     assert not [f"{path.relative_to(ROOT)} {name}: {n} lines" for path, name, n in large]
 
 
 def test_sizes_leave_docstrings_of_functions_out():
     text = '"""Module."""\n\n\ndef f(x):\n    """One.\n\n    Two.\n    """\n    y = x\n    return y\n'
-    assert list(sizes(text)) == [("f", 2), ("", 7)]
+    assert list(sizes(text, ast.walk(ast.parse(text)))) == [("f", 2), ("", 7)]
 
 
 def undocumented(path):

@@ -5,7 +5,7 @@ import re
 from functools import cache
 
 import orchestrator
-from tests.support.sources import ROOT, SOURCES, tree_of
+from tests.support.sources import ROOT, SOURCES, nodes_of, tree_of
 
 # What others build on: base classes and protocols, beside all that `orchestrator` exports.
 PROTOCOLS = (
@@ -107,9 +107,9 @@ def entries(text):
             section = ""
 
 
-def empty_words(tree):
+def empty_words(nodes):
     """Lines on arguments, attributes and results that say no more than their names do."""
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
             for section, entry in entries(ast.get_docstring(node) or ""):
                 text = entry.split(": ", 1)[-1] if section in ("Args", "Attributes") else entry
@@ -119,10 +119,13 @@ def empty_words(tree):
 
 
 def test_lines_on_arguments_say_more_than_the_name():
-    assert not [f"{module}: {line}" for module, tree in trees().items() for line in empty_words(tree)]
+    assert not [f"{path.name}: {line}" for path in SOURCES for line in empty_words(nodes_of(path))]
 
 
 def test_lines_that_repeat_a_name_are_found():
     lines = ["Open.", "", "Args:", "    path: the file.", "    step: [s].", "", "Returns:", "    True when it does."]
-    function = ast.parse("def open_it(path, step):\n    '" + "\\n".join(lines) + "'")
-    assert list(empty_words(function)) == ["open_it, Args: path: the file.", "open_it, Returns: True when it does."]
+    nodes = ast.walk(ast.parse("def open_it(path, step):\n    '" + "\\n".join(lines) + "'"))
+    assert list(empty_words(nodes)) == [
+        "open_it, Args: path: the file.",
+        "open_it, Returns: True when it does.",
+    ]

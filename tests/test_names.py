@@ -6,27 +6,26 @@ from pathlib import Path
 
 import pytest
 
-from tools.readability import files_of, functions_of, is_participle, levels
+from tests.support.sources import ROOT, SOURCES, nodes_of
+from tools.readability import is_participle, levels
 
-ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = [ROOT / "orchestrator", ROOT / "pyfmu_sources"]
 RULES = (ROOT / "docs" / "naming.md").read_text(encoding="utf-8").partition("## Words that are not names")[2]
 NO_NAMES = frozenset(re.search(r"```text\n(.+?)\n```", RULES, re.DOTALL)[1].split())
 LARGEST_SHARE = 0.03  # of participles among the names of functions
 
 
-def names(path, tree):
+def names(path, nodes):
     """Names of the module, its classes and functions, and their parameters, with their lines."""
     yield 1, path.stem
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
             yield node.lineno, node.name
         elif isinstance(node, ast.arg):
             yield node.lineno, node.arg
 
 
-def riddles(path, tree):
-    return [f"{path.name}:{n} {name}" for n, name in names(path, tree) if name.strip("_").lower() in NO_NAMES]
+def riddles(path, nodes):
+    return [f"{path.name}:{n} {name}" for n, name in names(path, nodes) if name.strip("_").lower() in NO_NAMES]
 
 
 def test_words_that_are_not_names_are_read_from_the_page():
@@ -34,22 +33,23 @@ def test_words_that_are_not_names_are_read_from_the_page():
 
 
 def test_names_are_no_riddles():
-    assert not [name for path, tree in files_of(PACKAGES) for name in riddles(path, tree)]
+    assert not [name for path in SOURCES for name in riddles(path, nodes_of(path))]
 
 
 def test_no_product_name_looks_like_a_test():
-    known = [(path, name) for path, tree in files_of(PACKAGES) for _, name in names(path, tree)]
+    known = [(path, name) for path in SOURCES for _, name in names(path, nodes_of(path))]
     assert not [f"{path.relative_to(ROOT)}: {name}" for path, name in known if name.startswith("test_")]
 
 
 def test_riddles_are_found():
-    tree = ast.parse("def kept(found):\n    pass\n\nclass Subject:\n    def _own(self):\n        pass\n")
-    found = {text.split()[1] for text in riddles(Path("finer.py"), tree)}
+    nodes = ast.walk(ast.parse("def kept(found):\n    pass\n\nclass Subject:\n    def _own(self):\n        pass\n"))
+    found = {text.split()[1] for text in riddles(Path("finer.py"), nodes)}
     assert found == {"finer", "kept", "found", "Subject", "_own"}
 
 
 def test_few_functions_are_named_by_participles():
-    functions = [function.name for _, tree in files_of(PACKAGES) for function in functions_of(tree)]
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef)
+    functions = [node.name for path in SOURCES for node in nodes_of(path) if isinstance(node, kinds)]
     assert sum(map(is_participle, functions)) <= LARGEST_SHARE * len(functions)
 
 

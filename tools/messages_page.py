@@ -7,6 +7,7 @@ import ast
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 
 from tools import refuse_arguments
@@ -61,16 +62,14 @@ def page() -> str:
 
 def collect(paths: list[Path]) -> dict[str, list[tuple[str, str]]]:
     """Return the messages of files by the title of their section, each with its room."""
-    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in paths}
-    titles = _titles(trees.values())
-    functions = {
-        node.name: node for tree in trees.values() for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)
-    }
+    read = {path: [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))] for path in paths}
+    titles = _titles(chain(*read.values()))
+    functions = {node.name: node for node in chain(*read.values()) if isinstance(node, ast.FunctionDef)}
     collected: dict[str, list[tuple[str, str]]] = defaultdict(list)
-    for path, tree in trees.items():
+    for path, nodes in read.items():
         package, room = path.relative_to(ROOT).parts[:2]
         room = room.removesuffix(".py") if package == "orchestrator" else "FMU"
-        for scope in (node for node in ast.walk(tree) if isinstance(node, (ast.Module, ast.FunctionDef))):
+        for scope in (node for node in nodes if isinstance(node, (ast.Module, ast.FunctionDef))):
             for title, value in _messages(scope, titles, TAKERS | FINDING_TAKERS if room == "checking" else TAKERS):
                 texts = list(_texts(value, scope))
                 for call in ast.walk(value) if title == NOTES else ():
@@ -81,12 +80,11 @@ def collect(paths: list[Path]) -> dict[str, list[tuple[str, str]]]:
     return collected
 
 
-def _titles(trees: Iterable[ast.Module]) -> dict[str, str]:
+def _titles(nodes: Iterable[ast.AST]) -> dict[str, str]:
     """Return the title of each class of errors; a class without one of its own has that of its base."""
     bases = {
         node.name: [base.id for base in node.bases if isinstance(base, ast.Name)]
-        for tree in trees
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.ClassDef)
     }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.example_record import copy_examples
-from tests.support.sources import tree_of
+from tests.support.sources import nodes_of
 
 ROOT = Path(__file__).resolve().parents[2]
 OF_ONE_SYSTEM = {
@@ -80,7 +80,7 @@ def test_the_main_commands_give_the_same_numbers(tmp_path: Path) -> None:
 def test_one_module_alone_imports_what_one_system_has() -> None:
     found = {}
     for path in sorted((ROOT / "orchestrator").rglob("*.py")):
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             if OF_ONE_SYSTEM & set(names):
