@@ -120,7 +120,7 @@ def _report_hidden_gap(workings: Workings, gap: HiddenGap, model: Model, setting
 def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Diagnosis:
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
     searched = workings.search
-    record = record_evidence(searched)
+    record = record_evidence(searched, _dependences(workings, model, settings))
     evidence = effect_evidence(searched)
     workings, evidence, test = _test(workings, evidence, record, model, settings)
     while any(one.label in workings.search.final.labels for one in possible_effects(evidence, record, settings)):
@@ -135,10 +135,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     effects = tuple(sorted((effect for effect in graded if not effect.of_log), key=lambda effect: -effect.grade))
     parameters = parameter_estimates(result.problem, result.final, settings.report.level)
     parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}
-    arguments = law_arguments(
-        workings.balances, result.problem.record_points(result.final.point), metric=in_metres(model)
-    )
-    remaining = find_dependences(result, arguments, settings.selection)
+    remaining = _dependences(workings, model, settings)
     left = torque_shares(result.problem, result.final.point)
     record = replace(record, left=float(left.max()))  # that of the model as it is reported
     verdict = form_verdict(result, graded, remaining, record, settings)
@@ -150,6 +147,14 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
         notes=_notes(result, record, test, settings), settings=settings, searched=searched.searched,
         model=model, workings=workings,
     )  # fmt: skip
+
+
+def _dependences(workings: Workings, model: Model, settings: DiagnosisSettings) -> tuple[Dependence, ...]:
+    """Return which signals what the final model leaves follows."""
+    result = workings.search
+    points = result.problem.record_points(result.final.point)
+    arguments = law_arguments(workings.balances, points, metric=in_metres(model))
+    return find_dependences(result, arguments, settings.selection)
 
 
 def _test(

@@ -80,7 +80,9 @@ class GradeSettings(Settings, frozen=True):
 
     certain_t: Annotated[float, setting("paired errors of a certain effect")] = 5.0
     likely_t: Annotated[float, setting("paired errors of a likely one")] = 3.0
-    certain_share: Annotated[float, share("of the missing torque that a certain effect explains")] = 0.08
+    certain_share: Annotated[
+        float, share("of the missing torque that a certain effect explains; most that a curve may still take of it")
+    ] = 0.08
     likely_share: Annotated[float, share("of the missing torque that a likely one explains")] = 0.03
     likely_gain: Annotated[float, share("or of what is left without it; a learned law takes as much")] = 0.2
     certain_size_t: Annotated[float, setting("sizes over their errors of a certain effect")] = 4.0

@@ -183,6 +183,17 @@ def test_a_limit_that_is_reached_in_one_stretch_is_not_told_from_a_push() -> Non
     assert found.evidence.family == ("outside_torque@motor",)
 
 
+def test_a_load_that_doubles_is_no_certain_constant() -> None:
+    case = led_axis(9013, "load that doubles")
+    found = diagnose(case.record, model_of(case))
+    (load,) = found.effects
+    assert (load.name, "sure size" in load.lowered_by, load.grade < Grade.CERTAIN) == ("load_torque", True, True)
+    assert load.evidence.size_t < SETTINGS.grades.certain_size_t - 0.4
+    low, high = (one / load.parameters["torque"].value for one in load.parameters["torque"].interval)
+    assert (low < 0.6, high > 1.4) == (True, True)  # either load is inside
+    assert found.record.follows == pytest.approx(found.remaining[0].comparison.gain, rel=1e-9)  # what is left counts
+
+
 def test_a_limit_that_is_reached_at_times_is_certain() -> None:
     case = led_axis(7613, "saturation")
     found = {one.name: one for one in diagnose(case.record, model_of(case)).effects}["torque_saturation"]

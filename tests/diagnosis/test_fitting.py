@@ -54,6 +54,22 @@ def test_errors_of_values_are_those_of_repeated_records():
     assert np.median(jackknifed) == pytest.approx(np.std(sizes), rel=0.4)
 
 
+def test_a_value_that_changes_slowly_is_no_surer_than_its_parts(fitted):
+    _, model = fitted
+    count = len(model.block_shifts)
+    sizes = np.random.default_rng(2).permutation(np.repeat([1.0, 3.0], count // 2))  # of each block, by itself
+
+    def error_of(sizes, covariance):
+        shifts = np.zeros_like(model.block_shifts)
+        shifts[:, 1] = (sizes.mean() - sizes) / (count - 1)
+        other = replace(model, block_shifts=shifts, covariance=covariance * np.eye(2))
+        return np.sqrt(other.jackknife[1, 1])
+
+    assert error_of(sizes, 1e-4) == pytest.approx(1.0 / np.sqrt(count), rel=0.2)  # those of a sample, spread 1
+    assert error_of(np.sort(sizes), 1e-4) == pytest.approx(1.0, rel=0.1)  # it was half as large until half-way
+    assert error_of(np.sort(sizes), 1.0) == pytest.approx(1.0 / np.sqrt(count), rel=0.2)  # as much is noise
+
+
 def test_of_a_value_that_changes_nothing_nothing_is_known(fitted, monkeypatch):
     problem, model = fitted
     whole = type(problem).jacobian

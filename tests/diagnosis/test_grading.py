@@ -43,6 +43,12 @@ def test_each_rule_lowers_the_grade(rule):
     assert grade <= rule.highest < highest_grade([])
 
 
+@pytest.mark.parametrize(("gain", "follows", "lowered"), [(0.9, 0.6, ()), (0.5, 0.15, ("large share",))])
+def test_nothing_is_certain_beside_a_curve_that_takes_a_part_of_what_it_takes(gain, follows, lowered):
+    effect, record = replace(EFFECT, gain=gain), replace(RECORD, follows=follows)
+    assert grade_effect(effect, record, SETTINGS) == ((Grade.LIKELY if lowered else Grade.CERTAIN), lowered)
+
+
 def test_a_limit_leaves_little_of_its_own_torque_where_it_acts():
     effect = replace(EFFECT, left_where_it_acts=0.3)
     assert grade_effect(effect, RECORD, SETTINGS)[0] is Grade.CERTAIN

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 STEP, ROWS = 1e-3, 12000
 HIDDEN = ("none", "friction", "gravity", "friction and gravity", "drag", "by hand", "growing friction", "ripple")
-FURTHER = ("saturation", "one push")  # not in the round of seeds
+FURTHER = ("saturation", "one push", "load that doubles")  # not in the round of seeds
 CYCLES = 17  # of the ripple, a turn
 RIGHT: dict[str, set[str]] = {
     "friction": {"coulomb_friction"}, "gravity": {"gravity_load"}, "drag": {"quadratic_drag"},
@@ -114,6 +114,8 @@ def led_axis(seed: int, hidden: str = "") -> LedAxis:
             push += size * rng.normal() * np.exp(-0.5 * ((time - middle) / width) ** 2)
     if hidden == "one push":
         push = size * np.exp(-0.5 * ((time - rng.uniform(0.0, time[-1])) / rng.uniform(0.1, 1.0)) ** 2)
+    if hidden == "load that doubles":
+        push = -size * np.where(time > rng.uniform(0.3, 0.7) * time[-1], 1.0, 0.5)
     if hidden == "growing friction":
         push -= size * np.sign(speed) * (time / time[-1]) ** 2
     share = float(rng.choice([0.003, 0.02, 0.08]))

@@ -130,7 +130,8 @@ def _grow_fit(model: FmuResiduals, settings: FitSettings) -> ModelPoint | None:
 def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSettings) -> FmuDiagnosis:
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
     searched, problem = workings.search, workings.problem
-    record = record_evidence(searched)
+    arguments = port_arguments(workings.residuals)
+    record = record_evidence(searched, find_dependences(searched, arguments, settings.selection))
     evidence = effect_evidence(searched)
     found = searched
     while True:  # until test data refute none of what is left
@@ -146,7 +147,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
         source, units = found if in_model else searched, effect_units(problem, effect)
         graded.append(report_effect(source, one, effect.values_by_name, units, record, settings, in_model))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
-    remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection)
+    remaining = find_dependences(found, arguments, settings.selection)
     left = torque_shares(found.problem, found.final.point)
     record = replace(record, left=float(left.max()))  # that of the model as it is reported
     verdict = form_verdict(found, graded, remaining, record, settings)

@@ -54,8 +54,18 @@ class FittedModel:
 
     @property
     def jackknife(self) -> Array:
-        """Return the covariance (coordinates, coordinates) of the values by what blocks differ by."""
-        return jackknife_covariance(self.block_shifts)
+        """Return the covariance (coordinates, coordinates) of the values by what blocks differ by.
+
+        Blocks are a sample of one value where they differ by chance. Of a value that changes slowly along the record
+        they are not, and their mean is no surer than each: what neighbours have in common counts in full, as far as
+        blocks differ by more than white residuals say.
+        """
+        blocks, count = jackknife_covariance(self.block_shifts), len(self.block_shifts)
+        off, own = self.block_shifts - self.block_shifts.mean(axis=0), np.diag(blocks)
+        common = (count - 1) ** 2 / count * np.sum(off[1:] * off[:-1], axis=0)
+        slow = np.clip(common, 0.0, np.maximum(count * (own - np.diag(self.covariance)), 0.0))
+        wider = np.sqrt(1.0 + slow / np.maximum(own, 1e-300))
+        return np.asarray(blocks * np.outer(wider, wider))
 
 
 def jackknife_covariance(shifts: Array) -> Array:
@@ -164,7 +174,7 @@ def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
     places = [
         n for n, one in enumerate(fitted.coordinates) if isinstance(one, int) and not problem.parameters[one].local
     ]
-    variance = np.diag(fitted.jackknife)
+    variance = np.diag(jackknife_covariance(fitted.block_shifts))
     normal = fitted.jacobian.T @ fitted.jacobian
     white = np.diag(np.linalg.pinv(normal + 1e-9 * np.eye(len(normal)), hermitian=True))
     seen = [n for n in places if white[n] < problem.parameters[fitted.coordinates[n]].spread ** 2]  # type: ignore[index]

@@ -11,7 +11,13 @@ from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.selection.grading import grade_effect
-from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence, SearchResult
+from orchestrator.diagnosis.selection.outcome import (
+    Dependence,
+    EffectEvidence,
+    Grade,
+    RecordEvidence,
+    SearchResult,
+)
 from orchestrator.diagnosis.selection.search import leave_out
 from orchestrator.diagnosis.settings import DiagnosisSettings
 
@@ -24,15 +30,16 @@ ONE_STRETCH = 0.95  # share of a torque's power that is in one stretch of a reco
 ONE_WAY = 0.05  # share of a torque's power that varies, up to which it is a constant: one row of eighty the other way
 
 
-def record_evidence(result: SearchResult) -> RecordEvidence:
-    """Return what the record says of the final model as a whole."""
+def record_evidence(result: SearchResult, dependences: Sequence[Dependence]) -> RecordEvidence:
+    """Return what the record says of the final model as a whole; ``dependences`` are of what it leaves."""
     problem = result.problem
     left = torque_shares(problem, result.final.point)
     inertia, error, spread, asked = inertia_of_record(problem, result.final)
     if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
         spread = np.inf
     torque = missing_torque(problem, result.final.point, asked)
-    return RecordEvidence(float(left.max()), inertia, error, spread, torque)
+    follows = max((curve.comparison.gain for curve in dependences), default=0.0)
+    return RecordEvidence(float(left.max()), inertia, error, spread, torque, follows)
 
 
 def effect_evidence(result: SearchResult) -> list[EffectEvidence]:

@@ -37,9 +37,14 @@ def _explains_enough(effect: EffectEvidence, s: GradeSettings) -> bool:
     return effect.share >= share or (effect.share > 0.0 and effect.gain > gain)
 
 
-def _explains_much(effect: EffectEvidence, s: GradeSettings) -> bool:
+def _explains_much(effect: EffectEvidence, record: RecordEvidence, s: GradeSettings) -> bool:
+    """Tell whether an effect explains much, also beside what no effect does: a curve would still take hardly as much.
+
+    What is left and follows a signal is another law that is missing, and it repeats in every block and on test data.
+    """
     alone = effect.kind not in FOLLOWING and effect.share > 0.0 and effect.gain > s.most_gain
-    return effect.share >= s.certain_share or alone
+    missing = record.follows * (1.0 - effect.gain)
+    return (effect.share >= s.certain_share or alone) and missing <= s.certain_share * effect.gain
 
 
 def _foretells_torque(effect: EffectEvidence, s: GradeSettings) -> bool:
@@ -76,9 +81,10 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "its gain comes from few blocks and may be chance",
     ),
     GradeRule(
-        "large share", Grade.LIKELY, lambda e, r, s: _explains_much(e, s.grades),
-        "share of the missing torque, or of what is left without it",
-        "grades.certain_share", "it explains little and may stand for what another law leaves",
+        "large share", Grade.LIKELY, lambda e, r, s: _explains_much(e, r, s.grades),
+        "share of the missing torque, or of what is left without it; what a curve still takes over what it takes",
+        "grades.certain_share",
+        "it explains little, or little beside what follows a signal: it may stand for part of another law",
     ),
     GradeRule(
         "enough share", Grade.POSSIBLE, lambda e, r, s: _explains_enough(e, s.grades),
@@ -91,7 +97,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "size", Grade.POSSIBLE, lambda e, r, s: e.size_t >= s.grades.likely_size_t, "size over its error",
-        "grades.likely_size_t", "its size may be zero",
+        "grades.likely_size_t", "its size may be zero, or changes along the record so that none holds for all of it",
     ),
     GradeRule(
         "inertia seen", Grade.LIKELY, lambda e, r, s: r.inertia_error < s.grades.inertia_error,

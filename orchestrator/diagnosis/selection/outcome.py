@@ -92,6 +92,7 @@ class RecordEvidence:
         inertia_spread: how far the model file lets it be off, as a share.
         inertia_torque: power of the torque by which it differs from that of the fit, in shares of what the nominal
             model misses.
+        follows: share of the squared error of what is left that the strongest curve of one signal takes.
     """
 
     left: float
@@ -99,6 +100,7 @@ class RecordEvidence:
     inertia_error: float
     inertia_spread: float
     inertia_torque: float = np.inf
+    follows: float = 0.0
 
     @property
     def shows_inertia(self) -> bool:
