@@ -131,8 +131,13 @@ def test_the_default_machine_is_shown_before_any_file_is_there(page: Any, served
     assert not off_of_nothing.is_enabled()  # no share of a value of 0
 
 
-ADVICE = """const [name, line, done] = arguments;
-    import(new URL("static/log.js", location)).then((module) => done(module[name](line) ?? null))"""
+CALL = """const [file, name, given, done] = arguments;
+    import(new URL(`static/${file}`, location)).then((module) => done(module[name](given) ?? null))"""
+
+
+def call(driver: Any, file: str, name: str, given: Any) -> Any:
+    """Return what a function of the page's own modules gives."""
+    return driver.execute_async_script(CALL, file, name, given)
 
 
 def test_a_line_that_names_no_unit_becomes_no_button(page: Any, served: Served, tmp_path: Path) -> None:
@@ -141,10 +146,10 @@ def test_a_line_that_names_no_unit_becomes_no_button(page: Any, served: Served, 
     status, found = served.ask("POST", "columns", {"file": served.upload(log), "columns": {}})
     assert (status, "[columns.theta_m] unit" in found["problem"]) == (200, True)
     open_workbench(page, served)
-    advice = page.execute_async_script(ADVICE, "adviceOf", found["problem"])
+    advice = call(page, "log.js", "adviceOf", found["problem"])
     assert (advice["column"], advice["key"], advice.get("value")) == ("theta_m", "unit", None)
     line = 'say `[columns.theta_m] unit = "deg"` (`model`)'
-    assert page.execute_async_script(ADVICE, "adviceOf", line)["value"] == "deg"
+    assert call(page, "log.js", "adviceOf", line)["value"] == "deg"
 
 
 def test_channels_that_look_alike_become_a_button_each(page: Any, served: Served, tmp_path: Path) -> None:
@@ -153,11 +158,21 @@ def test_channels_that_look_alike_become_a_button_each(page: Any, served: Served
     file = served.upload(log)
     problem = served.ask("POST", "columns", {"file": file, "columns": {}})[1]["problem"]
     open_workbench(page, served)
-    rivals = page.execute_async_script(ADVICE, "rivalsOf", problem)
+    rivals = call(page, "log.js", "rivalsOf", problem)
     assert rivals == {"column": "theta_m", "names": ["phi1", "phi2"]}
     columns = {"theta_m": {"name": "phi1"}, "theta_l": {"name": "phi2"}}
     problem = served.ask("POST", "columns", {"file": file, "columns": columns})[1]["problem"]
-    assert page.execute_async_script(ADVICE, "rivalsOf", problem) is None
+    assert call(page, "log.js", "rivalsOf", problem) is None
+
+
+def test_an_estimate_says_whether_a_gap_is_seen(page: Any, served: Served) -> None:
+    open_workbench(page, served)
+    found = {"alpha": 0.006, "interval": [0.005, 0.007], "visible": True, "record": {"angle_unit": "deg"}}
+    assert call(page, "gap.js", "answerOf", found) == "Half-gap 0.3438 deg, 95 %: 0.2865 to 0.4011 deg"
+    unseen = found | {"alpha": 0.0, "interval": [0.0, 0.0001], "visible": False}
+    said = "No gap is seen: the half-gap is, with 95 %, 0 to 0.00573 deg"
+    assert call(page, "gap.js", "answerOf", unseen) == said
+    assert call(page, "gap.js", "answerOf", {"alpha": None, "message": "no `u`"}) == "no “u”"
 
 
 def test_back_goes_to_the_tab_before(page: Any, served: Served) -> None:

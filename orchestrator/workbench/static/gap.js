@@ -27,6 +27,15 @@ export function trustTag(trust) {
   return trust ? make("span", { class: `tag ${{ green: "good", amber: "warn", red: "bad" }[trust.level]}` }, `trust: ${trust.level}`) : null;
 }
 
+// What an estimate says, in a line, with angles in the log's unit.
+export function answerOf(found) {
+  const alpha = found.alpha ?? null, { factor, name } = Units.shown("rad", found.record?.angle_unit);
+  if (alpha === null) return plain(found.not_applicable ?? found.message ?? "no half-gap");
+  const [size, between] = withInterval(alpha, found.interval, factor);
+  if (found.visible === false && between) return `No gap is seen: the half-gap is, with 95 %, ${between} ${name}`;
+  return `Half-gap ${size} ${name}${between ? `, 95 %: ${between} ${name}` : ""}`;
+}
+
 export function build(panel) {
   const said = message(), cost = make("p", { role: "status" });
   const read = reading(), motorOnly = check("leave the load encoder out", false, () => {});
@@ -40,12 +49,7 @@ export function build(panel) {
         place.append(make("p", { class: "answer" }, best ? `Best: ${best.name}, bound ${digits(best.bound)} rad, up to ${digits(best.peak_torque)} N.m` : "no excitation within these limits shows it"));
       }
       if (!found.record && found.design) return;
-      const alpha = found.alpha ?? null, { factor, name } = Units.shown("rad", found.record?.angle_unit);
-      const [size, between] = withInterval(alpha, found.interval, factor);
-      const lines = alpha === null
-        ? [plain(found.not_applicable ?? found.message ?? "no half-gap")]
-        : [`Half-gap ${size} ${name}` + (between ? `, 95 %: ${between} ${name}` : "")];
-      place.append(make("p", { class: "answer" }, lines.join(" "), " ", trustTag(found.trust)));
+      place.append(make("p", { class: "answer" }, answerOf(found), " ", trustTag(found.trust)));
       for (const reason of found.trust?.reasons ?? []) place.append(make("p", { class: "note" }, plain(reason)));
     });
     return place;
