@@ -19,6 +19,8 @@ MOST_BYTES = 50_000_000  # of a result file that is compared
 SAME = 1e-9  # relative difference of numbers without an interval that is rounding
 # What says how a result was made, and nothing of the machine.
 _BESIDE = ("settings", "schema_version", "seconds", "block_values", "candidates", "live", "arcmin")
+# Numbers that are in the unit beside them: of misfits and of channels.
+_IN_ITS_UNIT = ("nominal", "parameters", "final", "noise", "least", "most")
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,10 @@ def quantities(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber
         for name, entry in results.items():
             if name in _BESIDE or (value is not None and name in ("value", "alpha", "interval", "standard_error")):
                 continue
-            yield from quantities(entry, f"{path} {name}")
+            if name in _IN_ITS_UNIT and _is_number(entry):
+                yield f"{path} {name}".strip(), ResultNumber(float(entry), None, str(results.get("unit") or ""))
+            else:
+                yield from quantities(entry, f"{path} {name}")
     elif isinstance(results, list):
         for place, entry in enumerate(results):
             named = entry.get("name") or entry.get("source") if isinstance(entry, Mapping) else None
