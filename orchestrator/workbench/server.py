@@ -83,6 +83,8 @@ class Workbench:
         asked = await self._asked(request)
         words = ["inspect", "--columns"]
         log = command_line(self.session, "inspect", [asked.get("file")], {})[-1]
+        if Path(log).suffix.lower() in (".fmu", ".ssp"):
+            raise InputError(f"`file` must be a log, but {log} is an FMU or SSP file")
         chosen = self._scratch(model_text(None, {key: asked[key] for key in ("columns", "header") if key in asked}))
         try:
             code, out, said = await self.jobs.answer([*words, "--model", str(chosen), log])
@@ -104,7 +106,10 @@ class Workbench:
         """Return a model file as fields; of no file the default model."""
         reference = request.query_params.get("file", "")
         path = self.session.path_of(reference) if reference else None
-        return JSONResponse(await run_in_threadpool(model_fields, path))
+        try:
+            return JSONResponse(await run_in_threadpool(model_fields, path))
+        except OrchestratorError as error:
+            raise InputError(str(error).replace(f"{self.session.folder}/", "")) from None
 
     async def write_model(self, request: Request) -> Response:
         """Write a model file of changed fields, once the command's own reader takes it."""

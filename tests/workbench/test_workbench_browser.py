@@ -175,6 +175,17 @@ def test_an_estimate_says_whether_a_gap_is_seen(page: Any, served: Served) -> No
     assert call(page, "gap.js", "answerOf", {"alpha": None, "message": "no `u`"}) == "no “u”"
 
 
+def test_a_file_dropped_in_another_tab_is_told_where_it_goes(page: Any, served: Served, tmp_path: Path) -> None:
+    open_workbench(page, served)
+    for tab, name in (("log", "axis.toml"), ("log", "axis.fmu"), ("machine", "axis.trc"), ("fmus", "axis2.toml")):
+        (tmp_path / name).write_text("1")
+        choose_tab(page, tab)
+        find(page, f"#panel-{tab} input[type=file]").send_keys(str(tmp_path / name))
+        wait_for_text(page, f"panel-{tab}", f"not taken {name}: logs go into the tab Log, model files (.toml) into")
+        assert not (served.folder / "files" / name).exists()
+    assert [call(page, "parts.js", "isLog", name) for name in ("a.trc", "a.CSV", "a.fmu")] == [True, True, False]
+
+
 def test_back_goes_to_the_tab_before(page: Any, served: Served) -> None:
     open_workbench(page, served)
     for name in ("machine", "gap"):

@@ -291,3 +291,15 @@ def test_a_look_at_a_log_speaks_of_no_file_that_nobody_has_written(served: Serve
         "POST", "columns", {"file": "files/look.csv", "columns": {"theta_m": {"unit": "furlong"}}}
     )
     assert (status, said["error"].startswith("`columns.theta_m.unit` must be one of rad")) == (422, True), said
+
+
+def test_an_fmu_is_no_log_and_a_log_no_model(served: Served, tmp_path: Path) -> None:
+    for name in ("tank.fmu", "tank.SSP", "tank.csv"):
+        (tmp_path / name).write_text(LOG)
+    fmu, system, log = (served.upload(tmp_path / name) for name in ("tank.fmu", "tank.SSP", "tank.csv"))
+    for file in (fmu, system):
+        status, found = served.ask("POST", "columns", {"file": file, "columns": {}})
+        assert (status, found["error"]) == (400, f"`file` must be a log, but {file} is an FMU or SSP file")
+    status, found = served.ask("GET", f"model?file={log}")
+    assert status == 400
+    assert found["error"].startswith(f"{log}: must be TOML")

@@ -248,7 +248,7 @@ export function build(panel) {
   const limited = () => ({ time_limit: numberIn(limit) });
   const written = make("p", { class: "note", role: "status" });
   panel.append(
-    dropZone("Drop FMUs, SSP files or tables here", (file) => (isFmu(file) ? pick(file) : undefined), true),
+    dropZone("Drop FMUs, SSP files or tables here", (name) => isFmu(name) || isLog(name), (file) => (isFmu(file) ? pick(file) : undefined), true),
     make("div", { class: "row" }, fileChoice("FMU or SSP file", isFmu, () => fmu, pick), field("Time limit [s]", limit)),
     said.element,
     make("div", { class: "row" },

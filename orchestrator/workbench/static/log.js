@@ -197,7 +197,7 @@ export function build(panel, go) {
   }
 
   panel.append(
-    dropZone("Drop a log here", pick),
+    dropZone("Drop a log here", isLog, pick),
     make("div", { class: "row" }, fileChoice("Log of this session", isLog, () => choices.log, pick)),
     said.element, busy, body, view.element, rows);
   if (choices.log) look();

@@ -94,7 +94,7 @@ export function build(panel, go) {
   }
 
   panel.append(
-    dropZone("Drop a model file here", (file) => choose({ model: file })),
+    dropZone("Drop a model file here", isModel, (file) => choose({ model: file })),
     make("div", { class: "row" }, fileChoice("Model file of this session", isModel, () => choices.model, (model) => choose({ model }), "the default machine")),
     said.element, body);
   watch(load);

@@ -2,9 +2,10 @@ import { fileAddress, upload } from "./api.js";
 import { choice, fill, field, make, plain, wrongField } from "./dom.js";
 import { choices, choose, isOver, jobOf, refresh, session, stop, watch } from "./state.js";
 
-const LOGS = /\.(csv|txt|tsv|dat|lvm|log|asc|npz|npy|mat|h5|hdf5|hdf|nc|parquet|pq|mf4|mdf)$/i;
+const NO_LOGS = /\.(toml|fmu|ssp|json|html|png)$/i;
 const OUTPUT = "output.txt";  // what a job has printed
-export const isLog = (name) => LOGS.test(name);
+const PLACES = "logs go into the tab Log, model files (.toml) into Machine, FMUs and SSP files into FMUs";
+export const isLog = (name) => !NO_LOGS.test(name);
 export const isModel = (name) => /\.toml$/i.test(name);
 export const isFmu = (name) => /\.(fmu|ssp)$/i.test(name);
 
@@ -15,8 +16,8 @@ export function filesOf(test) {
   return [...uploads, ...results];
 }
 
-// A place to drop a file on, with a button for those who do not drag.
-export function dropZone(text, taken, multiple = false) {
+// A place to drop a file on, with a button for those who do not drag; `able` says which names are meant for it.
+export function dropZone(text, able, taken, multiple = false) {
   const said = make("span", { "aria-live": "polite" });
   const input = make("input", { type: "file", multiple, hidden: true, "aria-label": text });
   const open = make("button", { type: "button", "aria-label": `${text}, or choose ${multiple ? "files" : "a file"}`, onclick: () => input.click() }, multiple ? "Choose files" : "Choose a file");
@@ -24,6 +25,7 @@ export function dropZone(text, taken, multiple = false) {
   const take = async (files) => {
     for (const file of files) {
       try {
+        if (!able(file.name)) throw new Error(`${file.name}: ${PLACES}`);
         const found = await upload(file, (share) => { said.textContent = `${file.name}: ${Math.round(100 * share)} %`; });
         said.textContent = `${found.name} is here`;
         await refresh();
