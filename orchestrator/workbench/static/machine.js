@@ -14,6 +14,7 @@ export function build(panel, go) {
     if (shown === choices.model) return;
     const asked = shown = choices.model;
     said.say("");
+    fill(body, make("p", { class: "note", role: "status" }, "Reading …"));  // no field of the model before is typed into
     try {
       const model = await get(`model?file=${encodeURIComponent(asked)}`);
       if (asked === choices.model) draw(model);
