@@ -42,20 +42,24 @@ def check_sign(values: Array, name: str, label: str, source: str) -> None:
     if np.fmin.reduce(values) < 0.0 or np.isnan(values).all():
         return
     rows = np.flatnonzero(np.isfinite(values))
-    bit = _sign_bit(values[rows])
-    if bit is None:
+    found = _sign_bit(values[rows], name == "u")
+    if found is None:
         return
+    bit, key = found
     place = int(np.flatnonzero(np.diff((values[rows] >= (1.0 - 1e-6) * bit).astype(int)))[0])
     before, after = (exact_text(float(values[row])) for row in rows[place : place + 2])
     raise RecordError(
         f"{source}: row {rows[place + 1] + 1}, column `{label}` must go on through zero, but jumps from {before} to "
-        f"{after}: a bit seems to be its sign; say `[columns.{name}] sign_bit = {exact_text(bit)}` in the model file "
-        "(`model`)"
+        f"{after}: a bit seems to be its sign; say `[columns.{name}] {key} = "
+        f"{exact_text(bit if key == 'sign_bit' else 2.0 * bit)}` in the model file (`model`)"
     )
 
 
-def _sign_bit(good: Array) -> float | None:
-    """Return what negative numbers have in addition; None: nothing."""
+def _sign_bit(good: Array, is_torque: bool) -> tuple[float, str] | None:
+    """Return the bit that negative numbers have, and the key that says how they are written; None: there is none.
+
+    Of an angle that is written as a two's complement nobody can tell more than that it starts again from zero.
+    """
     if good.size < 2 or np.abs(np.diff(good)).max() < LEAST_JUMP * good.max() or np.ptp(good) == 0.0:
         return None
     unit = 1.0 if np.all(good == np.rint(good)) else quantisation_step(good)
@@ -67,18 +71,44 @@ def _sign_bit(good: Array) -> float | None:
     high = good >= bit - 0.5 * unit
     if good.max() >= 2.0 * bit or good[~high].max(initial=0.0) >= bit - 0.5 * unit:
         return None
-    signed, crossing = np.where(high, bit - good, good), np.diff(high.astype(int)) != 0
+    crossing = np.diff(high.astype(int)) != 0
     if not crossing.any():
         return None
+    ways = {"sign_bit": np.where(high, bit - good, good), "modulo": np.where(high, good - 2.0 * bit, good)}
     within = float(np.abs(np.diff(good))[~crossing].max(initial=0.0))
-    across = float(np.abs(np.diff(signed))[crossing].max())
-    goes_on = across <= 1.5 * within + unit and 4.0 * within < min(bit, float(np.ptp(signed)))
-    # A request may jump from one sign to the other: then both have the same largest value, to the count.
-    mirrored = abs(float(signed.max() + signed.min())) <= 0.5 * unit and signed.max() > 2.0 * unit
-    if not (goes_on or mirrored):
+    if _goes_on(ways["sign_bit"], crossing, within, bit, unit):
+        key = "sign_bit"
+    elif is_torque and (_goes_on(ways["modulo"], crossing, within, bit, unit) or _is_small(ways["modulo"], bit)):
+        key = "modulo"
+    else:
         return None
     short = (float(f"{bit:.{digits}g}") for digits in range(1, 18))  # a file of scaled counts tells the bit nearly
-    return next(number for number in short if abs(number - bit) < 0.01 * unit)
+    return next(number for number in short if abs(number - bit) < 0.01 * unit), key
+
+
+def _goes_on(signed: Array, crossing: NDArray[np.bool_], within: float, bit: float, unit: float) -> bool:
+    """Return whether numbers (n,) with their signs go on where the sign changes: ``crossing`` (n - 1,)."""
+    usual, span = 1.5 * within + unit, float(np.ptp(signed))
+    across = np.abs(np.diff(signed))[crossing]
+    # An angle that wraps goes over its whole range there, or through zero.
+    steady = np.all((across <= usual) | (across >= span - usual)) and np.any(across <= usual)
+    if steady and 4.0 * within < min(bit, span):
+        return True
+    # A request may jump from one sign to the other: then both have the same largest value, to the count.
+    return abs(float(signed.max() + signed.min())) <= 0.5 * unit and float(signed.max()) > 2.0 * unit
+
+
+def _is_small(signed: Array, bit: float) -> bool:
+    """Return whether numbers of both signs stay near zero, about as far on either side."""
+    high, low = float(signed.max()), -float(signed.min())
+    return max(high, low) <= 0.25 * bit and min(high, low) >= 0.25 * max(high, low)
+
+
+def wrap_signed(values: Array, column: Column) -> Array:
+    """Return a torque whose negative numbers are written as two's complements, as its ``modulo`` says."""
+    if column.modulo is None:
+        return values
+    return np.asarray((values + 0.5 * column.modulo) % column.modulo - 0.5 * column.modulo)
 
 
 def check_whole(values: Array, name: str, label: str, source: str) -> None:

@@ -126,7 +126,7 @@ COLUMN_NUMBERS = {
     "factor": COLUMNS,
     "offset": COLUMNS,
     "counts_per_rev": ("theta_m", "theta_l"),
-    "modulo": ("time", "theta_m", "theta_l"),
+    "modulo": ("time", "u", "theta_m", "theta_l"),
     "sign_bit": ("u", "theta_m", "theta_l"),
     "rated_value": ("u",),
     "torque_constant": ("u",),

@@ -98,3 +98,41 @@ def test_values_that_are_right_are_left_alone(tmp_path: Path) -> None:
 def test_a_sign_bit_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match="must be 0 or more and below twice its `sign_bit`, 32768, but is -"):
         _read(tmp_path / "log.csv", COUNTS, theta_m=Column(unit="counts", counts_per_rev=4096.0, sign_bit=32768.0))
+
+
+def _levels(torque: np.ndarray) -> np.ndarray:
+    """A request of random levels in place of a smooth one."""
+    return np.repeat(np.random.default_rng(3).integers(-3000, 3000, torque.size // 40), 40).astype(float)
+
+
+@pytest.mark.parametrize("size", [2**16, 2**32])
+@pytest.mark.parametrize("kind", ["smooth", "two levels", "many levels"])
+def test_a_torque_written_as_a_twos_complement_is_told_and_read(kind: str, size: int, tmp_path: Path) -> None:
+    whole = np.rint(1000.0 * TORQUE)
+    torque = {"smooth": whole, "two levels": 2500.0 * np.sign(whole + 0.5), "many levels": _levels(whole)}[kind]
+    unsigned = torque % size
+    rows = np.column_stack([TIME, unsigned, ANGLE])
+    path = tmp_path / "log.csv"
+    np.savetxt(path, rows, delimiter=",", header="time,u,theta_m", comments="", fmt="%.12g")
+    stated = {"unit": "0.1 %", "rated_value": 2.0}
+    with pytest.raises(RecordError, match=rf"say `\[columns.u\] modulo = {size}`"):
+        read_record(path, {"u": Column(**stated)})  # type: ignore[arg-type]
+    record = read_record(path, {"u": Column(modulo=float(size), **stated)})  # type: ignore[arg-type]
+    np.testing.assert_allclose(record.u, 0.002 * torque, atol=1e-12)
+
+
+def test_a_torque_of_two_levels_and_one_sign_is_left_alone(tmp_path: Path) -> None:
+    torque = np.where(np.sin(5.0 * TIME) > 0.0, 65_000.0, 0.0)
+    np.testing.assert_array_equal(_read(tmp_path / "log.csv", ANGLE, torque).u, torque)
+
+
+def test_an_angle_that_wraps_with_its_sign_in_a_bit(tmp_path: Path) -> None:
+    hundredths = np.rint(np.rad2deg(ANGLE) * 100.0)
+    wrapped = (hundredths + 18_000.0) % 36_000.0 - 18_000.0
+    motor = np.where(wrapped < 0.0, 32_768.0 - wrapped, wrapped)
+    assert _advice(tmp_path / "log.csv", "sign_bit", motor, theta_m=Column(unit="0.01 deg")) == "32768"
+    signed = Column(unit="0.01 deg", sign_bit=32_768.0)
+    assert _advice(tmp_path / "log.csv", "modulo", motor, theta_m=signed) == "36000"
+    right = Column(unit="0.01 deg", sign_bit=32_768.0, modulo=36_000.0)
+    record = _read(tmp_path / "log.csv", motor, theta_m=right)
+    np.testing.assert_allclose(np.diff(record.theta_m), np.diff(np.deg2rad(hundredths / 100.0)), atol=1e-9)

@@ -320,3 +320,18 @@ def test_a_torque_without_dimension_asks_for_what_one_is(
     for given, factor in ((Column(rated_value=20.0), 20.0), (Column(unit="mN.m"), 1e-3)):
         record = read_record(tmp_path / "log.csv", {"u": given})
         np.testing.assert_allclose(record.u, factor * columns["u"], rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("fraction", [".", ","])
+def test_a_date_between_tabs_is_no_column_more(fraction: str, tmp_path: Path) -> None:
+    """The blank within the date would give as many values, in more cells."""
+    rows = [
+        f"04.05.2026 11:59:5{n // 200}{fraction}{5 * (n % 200):03d}\t{np.cos(0.02 * n):.6f}\t{np.sin(0.02 * n):.6f}"
+        for n in range(800)
+    ]
+    path = tmp_path / "log.txt"
+    text = "\n".join(row if fraction == "." else row.replace(".", ",").replace("04,05,", "04.05.") for row in rows)
+    path.write_text("Zeit\tu\ttheta_m\n" + text + "\n", encoding="utf-8")
+    record = read_record(path)
+    assert record.step == pytest.approx(0.005)
+    np.testing.assert_allclose(record.theta_m, np.sin(0.02 * np.arange(800)), atol=1e-6)

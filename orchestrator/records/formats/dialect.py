@@ -87,8 +87,8 @@ def detect(file: TextFile, header: int | None = None) -> Dialect:
     found = [entry for s in SEPARATORS if s in signs for d in decimals if (entry := _block(lines, s, d)) is not None]
     if not found:
         raise _no_table(file)
-    # More values tell the right separator; a decimal point is preferred where both fit.
-    _, width, first, separator, decimal = max(found, key=lambda e: (e[0], e[1], e[4] == "."))
+    # More values and fewer words tell the right separator; a decimal point is preferred where both fit.
+    _, _, width, first, separator, decimal = max(found, key=lambda e: (*e[:3], e[5] == "."))
     if decimal == "." and separator != "," and _only_commas(lines[first:], file.last_comma > skipped, separator):
         decimal = ","
     if width > MAXIMUM_CHANNELS:
@@ -116,21 +116,25 @@ def detect(file: TextFile, header: int | None = None) -> Dialect:
     )
 
 
-def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int, str, str] | None:
-    """Return (values, width, first line, separator, decimal) of the longest run of rows of numbers, or None."""
-    best: tuple[int, int, int] | None = None
-    width = start = count = 0
+def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int, int, str, str] | None:
+    """Return the longest run of rows of numbers, or None.
+
+    Returns:
+        Values, minus the number of words, width, first line, separator, decimal.
+    """
+    best: tuple[int, int, int, int] | None = None
+    width = start = count = words = 0
     for n, line in enumerate(lines):
         if not line.strip():
             continue
         cells = cells_of(line, separator)
-        good = sum(is_value(cell, decimal) for cell in cells)
-        now = len(cells) if good >= 2 and 2 * good >= sum(cell != "" for cell in cells) else 0
+        good, filled = sum(is_value(cell, decimal) for cell in cells), sum(cell != "" for cell in cells)
+        now = len(cells) if good >= 2 and 2 * good >= filled else 0
         if now != width:
-            width, start, count = now, n, 0
-        count += good
+            width, start, count, words = now, n, 0, 0
+        count, words = count + good, words + filled - good
         if width >= 2 and (best is None or count > best[0]):
-            best = count, width, start
+            best = count, -words, width, start
     return None if best is None else (*best, separator, decimal)
 
 

@@ -18,7 +18,7 @@ const NUMBERS = {
   sign_bit: "one bit is the sign; its value",
 };
 const OF_COLUMN = {
-  time: ["rate"], u: ["torque_constant", "rated_value", "resistance", "back_emf_constant", "sign_bit", "factor"],
+  time: ["rate"], u: ["torque_constant", "rated_value", "resistance", "back_emf_constant", "sign_bit", "modulo", "factor"],
   theta_m: ["counts_per_rev", "modulo", "sign_bit", "factor"], theta_l: ["counts_per_rev", "modulo", "sign_bit", "factor"],
 };
 
