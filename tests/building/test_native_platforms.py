@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -43,8 +44,8 @@ def everywhere(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return ensure_native(NAMES, tmp_path_factory.mktemp("native_here"), here=True)
+def here(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
+    return build_native(NAMES)
 
 
 def slices(library: bytes) -> list[bytes]:

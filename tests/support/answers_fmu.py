@@ -1,12 +1,10 @@
 """A co-simulation FMU in C whose answers a test chooses: warnings, discarded steps, an early end, a step of its own."""
 
-import subprocess
 import zipfile
 from pathlib import Path
 
-import fmpy
+from tests.support.c_library import compile_source
 
-HERE = Path(__file__).parent
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Answers" guid="{{answers}}" generationTool="by hand"
     generationDateAndTime="2026-01-01T00:00:00Z" variableNamingConvention="flat" numberOfEventIndicators="0">
@@ -59,11 +57,6 @@ def build_answers_fmu(
         relative: whether these are differences.
         name: stem of the file.
     """
-    library = folder / "Answers.so"
-    headers = Path(fmpy.__file__).parent / "c-code"
-    defined = [f"-D{macro}" for macro in macros]
-    command = ["cc", "-shared", "-fPIC", "-Wall", "-I", str(headers), *defined, str(HERE / "answers_fmu.c"), "-o"]
-    subprocess.run([*command, str(library), "-lm"], check=True, capture_output=True)
     attributes = f'canHandleVariableCommunicationStepSize="{str(varies).lower()}" {more}'
     attributes += f' canGetAndSetFMUstate="{str(saves).lower()}"'
     mode, held = ("parameter", "fixed") if parameters else ("input", "discrete")
@@ -83,5 +76,5 @@ def build_answers_fmu(
         archive.writestr(
             "modelDescription.xml", DESCRIPTION.format(attributes=attributes, units=units, variables="".join(variables))
         )
-        archive.write(library, "binaries/linux64/Answers.so")
+        archive.writestr("binaries/linux64/Answers.so", compile_source("answers_fmu.c", *macros))
     return path

@@ -1,12 +1,12 @@
 """A co-simulation FMU of FMI 3.0 in C with time events and a clock that it times itself, built by the tests."""
 
-import subprocess
 import zipfile
 from pathlib import Path
 
 import fmpy
 
-HERE = Path(__file__).parent
+from tests.support.c_library import compile_source
+
 LIBRARY = f"binaries/{fmpy.platform_tuple}/Events{fmpy.sharedLibraryExtension}"
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="Events" instantiationToken="{events}">
@@ -41,20 +41,12 @@ def build_event3_fmu(folder: Path, *macros: str, clock: str = "countdown", saves
         saves: whether it declares that it saves its state.
         more: attributes of the element CoSimulation.
     """
-    library = folder / Path(LIBRARY).name
     kind = {"countdown": "d", "changing": "c", "fixed": "f"}[clock]
-    command = ["cc", "-shared", "-fPIC", "-w", "-I", str(Path(fmpy.__file__).parent / "c-code"), f"-DKIND='{kind}'"]
-    source = str(HERE / "event3_fmu.c")
-    subprocess.run(
-        [*command, *(f"-D{macro}" for macro in macros), source, "-o", str(library), "-lm"],
-        check=True,
-        capture_output=True,
-    )
     attributes = f'canGetAndSetFMUState="{str(saves).lower()}" {more}'
     path = folder / "Events.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(
             "modelDescription.xml", DESCRIPTION.replace("ATTRIBUTES", attributes).replace("VARIABILITY", clock)
         )
-        archive.write(library, LIBRARY)
+        archive.writestr(LIBRARY, compile_source("event3_fmu.c", f"KIND='{kind}'", *macros))
     return path

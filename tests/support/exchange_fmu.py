@@ -1,13 +1,13 @@
 """FMUs for model exchange alone: one in C, built by the tests, and any FMU without its other interfaces."""
 
 import re
-import subprocess
 import zipfile
 from pathlib import Path
 
 import fmpy
 
-HERE = Path(__file__).parent
+from tests.support.c_library import compile_source
+
 DESCRIPTION2 = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Ball" guid="{ball}" numberOfEventIndicators="1">
   <ModelExchange modelIdentifier="Ball" canGetAndSetFMUstate="SAVES" MORE/>
@@ -67,16 +67,13 @@ def build_exchange_fmu(folder: Path, version: int, *macros: str, saves: bool = T
         saves: whether it declares that it saves its state.
         more: attributes of the element ModelExchange.
     """
-    library = folder / f"Ball{fmpy.sharedLibraryExtension}"
-    place = f"binaries/{fmpy.platform if version == 2 else fmpy.platform_tuple}/{library.name}"
-    command = ["cc", "-shared", "-fPIC", "-w", "-I", str(Path(fmpy.__file__).parent / "c-code"), f"-DFMI={version}"]
-    source = [str(HERE / "exchange_fmu.c"), "-o", str(library), "-lm"]
-    subprocess.run([*command, *(f"-D{macro}" for macro in macros), *source], check=True, capture_output=True)
+    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
+    library = compile_source("exchange_fmu.c", f"FMI={version}", *macros)
     text = (DESCRIPTION2 if version == 2 else DESCRIPTION3).replace("SAVES", str(saves).lower()).replace("MORE", more)
     path = folder / "Ball.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", text)
-        archive.write(library, place)
+        archive.writestr(f"binaries/{platform}/Ball{fmpy.sharedLibraryExtension}", library)
     return path
 
 

@@ -1,12 +1,12 @@
 """A co-simulation FMU of FMI 3.0 in C with variables of every numeric type and arrays, built by the tests."""
 
-import subprocess
 import zipfile
 from pathlib import Path
 
 import fmpy
 
-HERE = Path(__file__).parent
+from tests.support.c_library import compile_source
+
 LIBRARY = f"binaries/{fmpy.platform_tuple}/Typed{fmpy.sharedLibraryExtension}"
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="Typed" instantiationToken="{typed}">
@@ -54,13 +54,9 @@ def build_typed3_fmu(folder: Path, *macros: str, saves: bool = True, attributes:
         saves: whether it declares that it saves its state.
         attributes: more of the element CoSimulation.
     """
-    library = folder / Path(LIBRARY).name
-    headers = Path(fmpy.__file__).parent / "c-code"
-    command = ["cc", "-shared", "-fPIC", "-w", "-I", str(headers), *(f"-D{macro}" for macro in macros)]
-    subprocess.run([*command, str(HERE / "typed3_fmu.c"), "-o", str(library), "-lm"], check=True, capture_output=True)
     path = folder / "Typed.fmu"
     text = DESCRIPTION.replace("ATTRIBUTES", f'canGetAndSetFMUState="{str(saves).lower()}" {attributes}')
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", text)
-        archive.write(library, LIBRARY)
+        archive.writestr(LIBRARY, compile_source("typed3_fmu.c", *macros))
     return path
