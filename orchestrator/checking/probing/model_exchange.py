@@ -28,10 +28,10 @@ class ModelExchange(EventDriver):
     """Model exchange of FMI 2.0 and 3.0.
 
     Attributes:
-        watched: discrete variables that are to be looked at between events; most runs have none.
+        watched: discrete variables that are to be looked at between events, with the states; None in most runs.
     """
 
-    watched: Sequence[ProbedVariable] = ()
+    watched: Sequence[ProbedVariable] | None = None
 
     @classmethod
     def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
@@ -130,12 +130,12 @@ class ModelExchange(EventDriver):
             h = min(h, goal - t) if x else goal - t
             if h > slack:
                 x, t, h, signs = self._try(t, x, h, when)
-                before = self.read(self.watched, when)
+                before = self.read(self.watched, when) if self.watched else []
                 entered, terminate = self.complete_step(when)
                 if terminate:
                     raise TerminatedError
                 crossed = signs != self.memory["signs"]
-                if self.watched and not (entered or crossed):
+                if self.watched is not None and not entered:
                     self._judge_quiet_step(x, before, when)
             else:
                 t, entered, crossed = goal, False, False
@@ -208,14 +208,15 @@ class ModelExchange(EventDriver):
         return found, high * h, signs
 
     def _judge_quiet_step(self, x: Sequence[float], before: Sequence[Any], when: str) -> None:
-        """A completed step that leads to no event leaves states and discrete variables as they are."""
+        """A completed step leaves states and discrete variables as they are; events change them."""
         function = f"{self.library.names.prefix}CompletedIntegratorStep"
         text = ""
         for i, (a, b, n) in enumerate(zip(x, self.continuous_states(), self.memory["nominals"], strict=True)):
             if abs(a - b) > _JUMP * max(abs(a), n):
                 text = f"but {function} changes number {i + 1} from {a:.6g} to {b:.6g}"
                 self.report("event.states-changed", f"states must change in event mode only, {text}", when=when)
-        for v, a, b in zip(self.watched, before, self.read(self.watched, when), strict=True):
+        watched = self.watched or ()
+        for v, a, b in zip(watched, before, self.read(watched, when) if watched else (), strict=True):
             if a != b and finite(a) and finite(b):
                 text = f"but {function} changes it from {shown(a)} to {shown(b)}"
                 self.report(
@@ -223,7 +224,7 @@ class ModelExchange(EventDriver):
                 )
                 break
         if text:
-            self.watched = ()
+            self.watched = None
 
     def _event(self, t: float, when: str) -> list[float]:
         """Handle an event; the states after it."""

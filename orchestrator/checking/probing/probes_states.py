@@ -5,9 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.model_exchange import ModelExchange
-from orchestrator.checking.probing.movement import distinct
 from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context, SkippedError
 from orchestrator.checking.probing.probes_exchange import judge_completed_step, judge_following
@@ -41,7 +39,6 @@ def _exchange(context: Context) -> None:
         if driver.memory["states"] != sum(v.size for v in variables):
             raise SkippedError("the number of states is not that of the description")
         _nominals(context, driver, variables)
-        driver.watched = _discrete(job)
         last = None
         for last in points(bench, driver):
             if not _vector(context, last, driver, variables):
@@ -51,12 +48,6 @@ def _exchange(context: Context) -> None:
                 return
         if last is not None:
             judge_completed_step(context, last)
-
-
-def _discrete(job: ProbeJob) -> list[ProbedVariable]:
-    """What events alone may change, as far as it can be read."""
-    found = [v for v in distinct(job.event_variables()) if v.variability == "discrete" and v.base != "Binary"]
-    return [v for v in found if v.size == 1][:_MOST]
 
 
 def _others(driver: ModelExchange, variables: Sequence[ProbedVariable]) -> list[float]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.movement import distinct
 from orchestrator.checking.probing.statuses import StatusError, TerminatedError
 from orchestrator.checking.probing.trajectory import Bench
@@ -12,6 +13,7 @@ from orchestrator.checking.probing.variables import ProbedVariable
 
 _MOST = 500
 _MOST_STATES = 20
+_MOST_DISCRETE = 200
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ def _run(bench: Bench, variables: tuple[ProbedVariable, ...]) -> WatchedRun:
     bench.library.notes()
     with bench.instance(initialised=False, logging=False) as driver:
         driver.driven = True
+        if isinstance(driver, ModelExchange):
+            driver.watched = _discrete(job)
         bench.place(driver, inputs=False)
         driver.enter_initialisation(job.start, job.stop)
         bench.place(driver, inputs=True)
@@ -79,6 +83,12 @@ def _run(bench: Bench, variables: tuple[ProbedVariable, ...]) -> WatchedRun:
         except TerminatedError:
             pass  # what was seen before is what there is to see
         return WatchedRun(variables, initial, rows, bench.library.notes())
+
+
+def _discrete(job: ProbeJob) -> list[ProbedVariable]:
+    """What events alone may change, as far as it can be read."""
+    found = [v for v in distinct(job.event_variables()) if v.variability == "discrete" and v.base != "Binary"]
+    return [v for v in found if v.size == 1][:_MOST_DISCRETE]
 
 
 def _times(job: ProbeJob) -> list[ProbedVariable]:
