@@ -26,10 +26,12 @@ class Movement:
     Attributes:
         values: of parameters and start values, which are set before the run.
         inputs: that move in the run.
+        share: of their usual size by which continuous inputs move.
     """
 
     values: Mapping[ProbedVariable, Values] = field(default_factory=dict)
     inputs: tuple[ProbedVariable, ...] = ()
+    share: float = 1.0
 
     def of_type(self, base: str, inputs: bool) -> list[ProbedVariable]:
         """The variables of a type that are set, inputs or all others."""

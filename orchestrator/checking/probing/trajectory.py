@@ -111,7 +111,8 @@ class Bench:
         inputs = [v for v in self.job.inputs() if v.key not in self.held] if self.excited else []
         for base in dict.fromkeys(v.base for v in inputs):
             group = [v for v in inputs if v.base == base]
-            values = [x for v in group for x in excitation(v, t - self.job.start, self.duration, phase)]
+            share = self.movement.share
+            values = [x for v in group for x in excitation(v, t - self.job.start, self.duration, phase, share)]
             driver.set(group, values, f"at t = {t:g}")
         self._switch(driver, t, phase)
 
@@ -151,17 +152,18 @@ class Bench:
         return rows
 
 
-def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0) -> list[float]:
+def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0, share: float = 1.0) -> list[float]:
     """A sine of nearly two periods over the run beside each start value, a tenth of the nominal value high.
 
     It is beside the start value so that what integrates an input is not back where it began at any time.
 
     Args:
         duration: of the run [s].
+        share: of the usual height.
     """
     low = -math.inf if v.minimum is None else v.minimum
     high = math.inf if v.maximum is None else v.maximum
-    wave = 0.4 + math.sin(3.7 * math.pi * t / duration + phase + 0.3)
+    wave = share * (0.4 + math.sin(3.7 * math.pi * t / duration + phase + 0.3))
     if low >= high:
         return [low] * v.size
     starts = [float(x) for x in v.start or (0.0,) * v.size]
