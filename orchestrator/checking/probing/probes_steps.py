@@ -30,13 +30,21 @@ def own_time(context: Context) -> None:
         raise SkippedError("the time inside cannot be read")
     found = job.start
     for n, found in enumerate(context.observation.values_of(v)):
-        t = job.start + (n + 1) * job.step
-        if found > t + _TIME * job.step:
-            text = f"`{v.name}` must not be later than the communication point after a step, but is"
-            context.report("steps.time", text, v.name, f"({found:.9g} at t = {t:.9g})")
+        if not _judge_time(context, v, found, job.start + (n + 1) * job.step):
             return
     if not found > job.start:
         context.report("steps.time", f"`{v.name}` must be later after {job.steps} steps, but is not", v.name)
+
+
+def _judge_time(context: Context, v: ProbedVariable, found: float, t: float) -> bool:
+    """Whether the independent variable is not later than the communication point ``t`` [s]; it is reported if it is."""
+    if found <= t + _TIME * context.bench.job.step:
+        return True
+    if "steps.time" not in context.remarked:
+        context.remarked.add("steps.time")
+        text = f"`{v.name}` must not be later than the communication point after a step, but is"
+        context.report("steps.time", text, v.name, f"({found:.9g} at t = {t:.9g})")
+    return False
 
 
 def inner_steps(context: Context) -> None:
@@ -173,6 +181,8 @@ def variable_steps(context: Context) -> None:
 def _run_in_pairs(context: Context, outputs: list[ProbedVariable], sizes: tuple[float, ...]) -> list[list[Any]]:
     """Outputs after every two communication steps, which are done in steps of ``sizes`` times the usual one."""
     bench, job = context.bench, context.bench.job
+    v = job.time_variable
+    clock = v if v is not None and context.observation.values_of(v) else None
     rows = []
     with bench.instance() as driver:
         for n in range(job.steps // 2):
@@ -181,5 +191,7 @@ def _run_in_pairs(context: Context, outputs: list[ProbedVariable], sizes: tuple[
                 goal = end if i == len(sizes) else t + size * job.step
                 driver.advance(t, goal - t, f"with {size:g} times the usual step at t = {t:g}")
                 t = goal
+                if clock is not None and n < _LENGTH:
+                    _judge_time(context, clock, float(driver.get([clock])[0]), t)
             rows.append(driver.read(outputs))
     return rows
