@@ -31,7 +31,7 @@ class Measured:
         self.context = context
         self.missing: dict[tuple[str, str], dict[str, str]] = {}
         self.tried: dict[tuple[str, str, str], int] = {}
-        self.reacted: set[tuple[str, str, str]] = set()
+        self.reacted: dict[tuple[str, str, str], int] = {}
         self.quotients: dict[tuple[str, str, str], list[tuple[float, float, str]]] = {}
 
     def look(
@@ -52,12 +52,15 @@ class Measured:
             self.tried[name] = self.tried.get(name, 0) + 1
             listed = u.knowns is None or v.key in {k.key for k in u.knowns}
             if any(_reacts(u.variable, a, b) for a, b in zip(before, during, strict=True)):
-                self.reacted.add(name)
+                self.reacted[name] = self.reacted.get(name, 0) + 1
                 if not listed:
                     self.missing.setdefault((u.section, u.variable.name), {}).setdefault(v.name, at)
-            if listed and change and u.variable.real and u.variable.size == 1 and math.isfinite(during[0]):
-                noise = 1e-12 * max(abs(before[0]), abs(during[0])) / abs(change)
-                self.quotients.setdefault(name, []).append(((during[0] - before[0]) / change, noise, at))
+            if listed and change and u.variable.real:
+                for label, a, b in zip(u.variable.labels, before, during, strict=True):
+                    if math.isfinite(b):
+                        noise = 1e-12 * max(abs(a), abs(b)) / abs(change)
+                        key = (u.section, label, v.name)
+                        self.quotients.setdefault(key, []).append(((b - a) / change, noise, at))
 
     def report(self) -> None:
         """Hold what was seen against the description."""
@@ -70,22 +73,47 @@ class Measured:
             self.context.report(rule, text, unknown, f"({_WHERE[section]}, {next(iter(found.values()))})")
         for u in self.context.bench.job.unknowns:
             for known, kind in zip(u.knowns or (), u.kinds, strict=False):
-                self._judge_kind(u, known.name, kind)
+                for label in u.variable.labels:
+                    if self._judge_kind(u, label, known.name, kind):
+                        break
+        self._report_unmoved()
         self._report_silent()
 
-    def _judge_kind(self, u: ProbedUnknown, known: str, kind: str) -> None:
-        """A factor is as constant as its kind says: in the whole run, or at one point."""
-        name = u.variable.name
-        found = self.quotients.get((u.section, name, known), [])
+    def _report_unmoved(self) -> None:
+        """Name outputs that react to a known whenever it changes in a run, and in initialisation mode to nothing."""
+        if "value.stale" in self.context.remarked:
+            return
+        moving = {unknown for section, unknown, _ in self.reacted if section == "initial"}
+        smooth = {u.variable.name for u in self.context.bench.job.unknowns if u.variable.variability == "continuous"}
+        for (section, unknown, known), count in self.reacted.items():
+            first = self.tried.get(("initial", unknown, known), 0)
+            always = section == "output" and count == self.tried[section, unknown, known] >= _OFTEN <= first
+            if always and unknown in smooth - moving:
+                moving.add(unknown)
+                text = f"`{unknown}` must follow `{known}` in initialisation mode too, but reacts to it only afterwards"
+                self.context.report("value.stale", text, unknown)
+
+    def _judge_kind(self, u: ProbedUnknown, label: str, known: str, kind: str) -> bool:
+        """Whether a factor is not as constant as its kind says: in the whole run, at one point, or for all parameters.
+
+        Args:
+            label: of the unknown, or of an element of it.
+        """
+        found = self.quotients.get((u.section, label, known), [])
+        states = self.context.bench.job.state_variables
+        if kind == "constant" and states and all(v.initial == "exact" for v in states):
+            # Then nothing is solved for in initialisation, which is looked at with other parameters too.
+            found = [*found, *(q for q in self.quotients.get(("initial", label, known), []) if q[0])]
         groups = [found] if kind in _ALWAYS else []
         if kind in _AT_A_POINT:
             groups = [[q for q in found if q[2] == at] for at in dict.fromkeys(at for _, _, at in found)]
         for group in groups:
             if _spread(group):
                 low, high = min(q for q, _, _ in group), max(q for q, _, _ in group)
-                text = f"`{name}` must follow `{known}` by a {kind} factor, as dependenciesKind says"
-                self.context.report("dependency.kind", f"{text}, but by {low:.4g} to {high:.4g}", name)
-                return
+                text = f"`{label}` must follow `{known}` by a {kind} factor, as dependenciesKind says"
+                self.context.report("dependency.kind", f"{text}, but by {low:.4g} to {high:.4g}", u.variable.name)
+                return True
+        return False
 
     def _report_silent(self) -> None:
         """Name knowns that are listed and change nothing: at no point, and in no run."""
@@ -99,7 +127,9 @@ class Measured:
         states = {v.key for v in bench.job.state_variables or ()}
         silent: list[str] = []
         for v in movement.values:
-            if v.name in heard or v.name not in often or v.key not in listed or v.key in states or not v.real:
+            told = v.name in heard or v.name not in often or v.key not in listed
+            chosen = v.real or (v.causality == "parameter" and v.base not in ("String", "Binary"))
+            if told or v.key in states or not chosen:
                 continue
             if trace is None or len(silent) >= _MOST_SILENT:
                 return

@@ -83,7 +83,7 @@ def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Value
     if not chosen or context.trace is None:
         return
     watch = [v for v in readable(job) if v.base != "Binary"]
-    rows, outputs = [], []
+    early, rows, outputs = [], [], []
     try:
         for late in (False, True):
             with bench.instance(initialised=False) as driver:
@@ -91,8 +91,10 @@ def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Value
                     bench.place(driver, inputs=False)
                 driver.enter_initialisation(job.start, job.stop)
                 if late:
+                    driver.read(watch, "in initialisation mode")
                     bench.place(driver, inputs=False)
                 bench.place(driver, inputs=True)
+                early.append(driver.read(watch, "in initialisation mode"))
                 driver.exit_initialisation()
                 driver.driven = True
                 rows.append(driver.read(watch, "after initialisation"))
@@ -103,12 +105,17 @@ def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Value
     recorded = job.outputs()
     for first, second in zip(*outputs, strict=True):
         off += [v for v, a, b in _pairs(recorded, first, second) if not equal(v, b, a, _SAME) and v not in off]
+    when = ""
+    if not off:
+        off = [v for v, a, b in _pairs(watch, *early) if not equal(v, b, a, _SAME)]
+        when = " while that lasts"
     if off:
         names = ", ".join(f"`{v.name}`" for v in off[:_MOST_NAMED]) + (" and others" if off[_MOST_NAMED:] else "")
         verb = "differs" if len(off) == 1 else "differ"
         rule = "value.kept" if any(v in chosen for v in off) else "value.stale"
         text = "parameters that are set in initialisation mode must act as those that are set before it"
-        context.report(rule, f"{text}, but {names} {verb}", off[0].name)
+        context.report(rule, f"{text}, but {names} {verb}{when}", off[0].name)
+        context.remarked.add(rule)
 
 
 def _pairs(
