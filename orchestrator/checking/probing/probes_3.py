@@ -1,15 +1,21 @@
 """Probes of what FMI 3.0 brings: early return, intermediate updates, clocks, structural parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from orchestrator.checking.host import Update
+from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.events import EventDriver
+from orchestrator.checking.probing.movement import moved, settable
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
 from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
+from orchestrator.checking.probing.values import equal
 
 _SMALL = 1e-9
 _FEW_STEPS = 20
+_STEPS_RESIZED = 3
+_MOST_NAMED = 5
 _LARGEST = 8
 _LEAVING = {"CoSimulation": "EnterStepMode", "ModelExchange": "EnterContinuousTimeMode"}
 
@@ -167,10 +173,45 @@ def structure(context: Context) -> None:
                 arrays = [v for v in job.variables if v.extents and not v.clocks and v.base != "Binary"]
                 for v in arrays:
                     driver.get([v.resize(sizes)], f"for `{v.name}` of the new size")
+                if change and job.interface != "ScheduledExecution":
+                    _live(context, driver, sizes)
             except (StatusError, TerminatedError) as error:
-                context.report("configuration.status", str(error))
+                rule = error.rule if isinstance(error, StatusError) else ""
+                context.report(rule or "configuration.status", str(error))
                 return
     _probe_reconfiguration(context)
+
+
+def _live(context: Context, driver: Driver, sizes: Mapping[int, int]) -> None:
+    """Arrays of other sizes keep what is set, and the run begins with as many states as there are then.
+
+    Args:
+        driver: after configuration mode.
+        sizes: values of the structural parameters by their value references.
+    """
+    job = context.bench.job
+    states = None if job.state_variables is None else sum(v.resize(sizes).size for v in job.state_variables)
+    driver.job = replace(
+        job,
+        variables=tuple(v.resize(sizes) if v.extents else v for v in job.variables),
+        states=states,
+        indicators=None,
+        state_variables=None,
+    )
+    driver.enter_initialisation(job.start, job.stop)
+    arrays = [v for v in driver.job.variables if v.extents and settable(v) and v.base not in ("Binary", "Clock")]
+    wanted = {v: x for v in arrays if (x := moved(v, driver.get([v]))) is not None}
+    for v, x in wanted.items():
+        driver.set([v], x, f"for `{v.name}` of the new size")
+    lost = [v.name for v, x in wanted.items() if not equal(v, driver.get([v]), x)]
+    if lost:
+        names = ", ".join(f"`{name}`" for name in lost[:_MOST_NAMED])
+        context.report("value.kept", f"arrays of other sizes must stay as they were set, but {names} do not", lost[0])
+        return
+    driver.exit_initialisation()
+    for n in range(min(_STEPS_RESIZED, job.steps)):
+        driver.advance(job.start + n * job.step, job.step, "with arrays of other sizes")
+        driver.read([v for v in driver.job.outputs() if v.base != "Binary"], "with arrays of other sizes")
 
 
 def _probe_reconfiguration(context: Context) -> None:

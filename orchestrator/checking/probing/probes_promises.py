@@ -5,11 +5,12 @@ What is promised is a table: of each line the flag, the versions, where it is ca
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.events import EventDriver
-from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.job import ProbedUnknown, ProbeJob
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import StatusError
@@ -207,7 +208,7 @@ def _elements(context: Context) -> None:
     """Dependencies of each element are those of ModelStructure, where both are told."""
     job = context.bench.job
     with context.bench.instance() as driver:
-        for u in _scalar_unknowns(job):
+        for u in _unknowns(job):
             try:
                 ((count,),) = driver.call(
                     "GetNumberOfVariableDependencies", ("uint32", u.variable.reference), ("out", "size", 1)
@@ -233,10 +234,7 @@ def _elements(context: Context) -> None:
                 context.report("promise.dependencies", message, u.variable.name)
 
 
-def _scalar_unknowns(job: ProbeJob) -> Iterator[Any]:
-    seen = 0
-    for u in job.unknowns:
-        scalar = u.variable.size == 1 and all(k.size == 1 for k in u.knowns or ())
-        if u.section != "initial" and u.knowns is not None and scalar and seen < _MOST:
-            seen += 1
-            yield u
+def _unknowns(job: ProbeJob) -> Iterator[ProbedUnknown]:
+    """The first unknowns of continuous time and of outputs that list what they depend on."""
+    found = (u for u in job.unknowns if u.section != "initial" and u.knowns is not None)
+    return islice(found, _MOST)

@@ -19,7 +19,7 @@ Rows = list[list[float]]
 def judge_outputs(context: Context, outputs: Sequence[ProbedVariable]) -> None:
     """The first and the second derivatives, as far as they are promised."""
     bench, job = context.bench, context.bench.job
-    chosen = [v for v in outputs if v.size == 1][:_MOST]
+    chosen = [v for v in outputs if v.size <= _MOST][:_MOST]
     if not chosen:
         return
     orders = range(1, min(job.output_order, len(_ORDERS)) + 1)
@@ -37,37 +37,46 @@ def judge_outputs(context: Context, outputs: Sequence[ProbedVariable]) -> None:
                     if order == 1:
                         raise
                     found.pop(order)  # the probe of promises says so
-    for i, v in enumerate(chosen):
-        right = all(_within(row[i], v) for row in rows)  # else a finding already
+    places = [(v, label) for v in chosen for label in v.labels]
+    wrong: set[str] = set()
+    for i, (v, label) in enumerate(places):
+        right = v.name not in wrong and all(_within(row[i], v) for row in rows)  # else a finding already
         for order, derivatives in found.items():
             below = rows if order == 1 else found[order - 1]
-            right = right and _judge(context, v, order, ([row[i] for row in below], [row[i] for row in derivatives]))
+            pair = [row[i] for row in below], [row[i] for row in derivatives]
+            right = right and _judge(context, (v.name, label), order, pair)
+        if not right:
+            wrong.add(v.name)
 
 
 def _ask(driver: Driver, variables: Sequence[ProbedVariable], order: int, when: str) -> list[float]:
-    count = len(variables)
+    count, size = len(variables), sum(v.size for v in variables)
     arguments = [
         ("in", "uint32", [v.reference for v in variables]), ("size", count), ("in", "int32", [order] * count),
-        ("out", "double", count), *((("size", count),) if driver.job.version == "3.0" else ()),
+        ("out", "double", size), *((("size", size),) if driver.job.version == "3.0" else ()),
     ]  # fmt: skip
     return list(driver.call(_FUNCTIONS[driver.job.version], *arguments, when=when)[0])
 
 
-def _judge(context: Context, v: ProbedVariable, order: int, values: tuple[list[float], list[float]]) -> bool:
-    """Whether a derivative, the second of ``values``, is near the slopes of the first."""
+def _judge(context: Context, names: tuple[str, str], order: int, values: tuple[list[float], list[float]]) -> bool:
+    """Whether a derivative, the second of ``values``, is near the slopes of the first.
+
+    Args:
+        names: of the variable, and of the element of it.
+    """
     below, derivative = values
-    what = f"{_ORDERS[order - 1]} derivative of `{v.name}`"
+    what = f"{_ORDERS[order - 1]} derivative of `{names[1]}`"
     absent = sum(not math.isfinite(x) for x in derivative)
     if absent:
         message = f"{what} must be finite, but {absent} of {len(derivative)} are not"
-        context.report("derivative.value", message, v.name)
+        context.report("derivative.value", message, names[0])
         return False
     slopes = [(b - a) / context.bench.job.step for a, b in pairwise(below)]
     far = count_far(derivative, slopes)
     if far > (len(slopes) - 1) / 2:
         text = f"is off by more than {TOLERANCE:.0%} of the largest slope at {far} of {len(slopes) - 1} points"
         of = "the output" if order == 1 else "the first derivative"
-        context.report("derivative.value", f"{what} must be the slope of {of}, but {text}", v.name)
+        context.report("derivative.value", f"{what} must be the slope of {of}, but {text}", names[0])
         return False
     return True
 

@@ -1,0 +1,49 @@
+"""Faults of two small FMUs: behind a threshold far from driven values, in arrays, and in arrays of other sizes."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestrator.checking.check import CheckOptions, check_fmu
+from orchestrator.shared.isolation.limits import Limits
+from tests.support.c_fmu import have_compiler
+from tests.support.small_fmus import build_small_fmu
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
+)
+OPTIONS = CheckOptions(limits=Limits(time=10.0))
+FAULTS = [
+    ("thermostat", "keep_count", "run.reset"),
+    ("thermostat", "lose_heat", "state.restore"),
+    ("thermostat", "switch_in_step", "event.outside"),
+    ("thermostat", "late_loss", "value.stale"),
+    ("thermostat", "dead_truth", "dependency.superfluous"),
+    ("thermostat", "time_by_count", "steps.time"),
+    ("cells", "first_slope", "derivative.value"),
+    ("cells", "resized_lost", "value.kept"),
+    ("cells", "refuses_sizes", "configuration.status"),
+    ("cells", "voltage_late", "value.stale"),
+]
+
+
+@pytest.mark.parametrize("model", ["thermostat", "cells"])
+def test_a_sound_one_has_no_finding(model: str, tmp_path: Path) -> None:
+    report = check_fmu(build_small_fmu(tmp_path / "sound.fmu", model), OPTIONS)
+    assert report.findings == ()
+    assert report.executed
+
+
+@pytest.mark.parametrize(("model", "fault", "rule"), FAULTS)
+def test_a_fault_is_named_by_its_rule(model: str, fault: str, rule: str, tmp_path: Path) -> None:
+    report = check_fmu(build_small_fmu(tmp_path / "broken.fmu", model, fault), OPTIONS)
+    assert rule in {f.rule for f in report.findings}
+
+
+def test_a_factor_of_a_parameter_is_no_constant(tmp_path: Path) -> None:
+    changes = {'dependenciesKind="fixed dependent"': 'dependenciesKind="constant dependent"'}
+    report = check_fmu(build_small_fmu(tmp_path / "kind.fmu", "cells", "", changes), OPTIONS)
+    (found,) = report.findings
+    assert found.rule == "dependency.kind"
+    assert "`voltage[0]` must follow `current` by a constant factor" in found.message
