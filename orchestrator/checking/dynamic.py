@@ -69,6 +69,8 @@ _PROBES: dict[str, probes.Probe] = {
     "another start": probes_life.another_start,
     "misuse": probes_misuse.misuse,
 }
+_AT_POINTS = ("states", "dependencies", "derivatives")
+"""Probes that look at points of a driven run: far from the values of the file too, where the others stay near them."""
 PROBES: dict[Version, tuple[str, ...]] = {
     "2.0": tuple(n for n in _PROBES if n not in ("early return", "intermediate update", "clocks", "configuration")),
     "3.0": tuple(_PROBES),
@@ -193,7 +195,12 @@ class _Watcher:
                 self._report_late(names)
                 return
             try:
-                probes.carry_out(_PROBES[self.probe], context)
+                told = len(self.findings)
+                if self.probe in _AT_POINTS and context.far is not None:
+                    with context.away():
+                        probes.carry_out(_PROBES[self.probe], context)
+                if len(self.findings) == told:
+                    probes.carry_out(_PROBES[self.probe], context)
             except (probes.SkippedError, DiscardedError) as reason:
                 self.stages[self.probe] = str(reason)
                 continue

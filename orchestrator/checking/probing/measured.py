@@ -119,7 +119,10 @@ class Measured:
         """Name knowns that are listed and change nothing: at no point, and in no run."""
         bench, trace = self.context.bench, self.context.trace
         calculated = {v.name for v in bench.job.variables if v.causality == "calculatedParameter"}
-        heard = {known for _, unknown, known in self.reacted if unknown not in calculated}
+        heard = {known for _, unknown, known in self.reacted if unknown not in calculated} | self.context.heard
+        if self.context.far is not None and bench.movement is self.context.far[0]:
+            self.context.heard = frozenset(heard)  # what is silent here may be heard near the values of the file
+            return
         often = {known for (_, _, known), count in self.tried.items() if count >= _OFTEN}
         listed = {k.key for u in self.listing() if u.variable.name not in calculated for k in u.knowns or ()}
         listed |= self._listed_by_silence()
@@ -152,7 +155,8 @@ class Measured:
         job = self.context.bench.job
         found = {v.key for v in self.context.bench.movement.values if v.causality == "parameter"}
         everything = any(u.section == "initial" and u.knowns is None for u in job.unknowns)
-        return found if everything and len(found) <= _FEW_LISTED else set()
+        whole = job.stop is not None and job.start + (job.steps + 0.5) * job.step >= job.stop  # what comes later counts
+        return found if everything and whole and len(found) <= _FEW_LISTED else set()
 
     def _runs_as(self, trace: list[list[Any]]) -> bool:
         """Whether a run is as another one, looked at piece by piece, for most that differ do so soon."""

@@ -4,12 +4,14 @@ A probe that cannot be carried out on an FMU raises ``SkippedError`` with the re
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.movement import Movement
 from orchestrator.checking.probing.statuses import DISCARD, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.trajectory import Bench, Difference, compare
 from orchestrator.checking.probing.variables import ProbedVariable, finite, shown
@@ -24,6 +26,7 @@ _RESETS = 16
 _SMALL = 1e-3
 _BEGINNING = "in initialisation mode"
 _MOST_ITEMS = 10
+Rows = list[list[Any]] | None
 
 
 @dataclass
@@ -41,6 +44,8 @@ class Context:
         resets: whether a reset has worked so far.
         remarked: rules of warnings that have been reported.
         notes: messages of a run after logging was switched off, and the first; None where that was refused.
+        far: movement, driven and plain run farther from the values of the file, where the ones in use are near them.
+        heard: names of variables that something has reacted to there.
     """
 
     bench: Bench
@@ -53,6 +58,8 @@ class Context:
     resets: bool = True
     remarked: set[str] = field(default_factory=set)
     notes: tuple[int, str] | None = None
+    far: tuple[Movement, Rows, Rows] | None = None
+    heard: frozenset[str] = frozenset()
     _watched: WatchedRun | None = None
 
     @property
@@ -61,6 +68,17 @@ class Context:
         if self._watched is None:
             self._watched = watch(self.bench)
         return self._watched
+
+    @contextmanager
+    def away(self) -> Iterator[None]:
+        """Use the runs that are far for a while."""
+        assert self.far is not None
+        near = self.bench.movement, self.trace, self.plain
+        self.bench.movement, self.trace, self.plain = self.far
+        try:
+            yield
+        finally:
+            self.bench.movement, self.trace, self.plain = near
 
     @property
     def names(self) -> list[str]:

@@ -58,6 +58,8 @@ def inputs(context: Context) -> None:
 def _shorten(context: Context, plain: float, driven: float) -> None:
     """Let runs have fewer steps where those away from the values of the file cost the FMU far more time.
 
+    Then there is time for the runs near these values alone, where there are two kinds.
+
     Args:
         plain, driven: what a run from the values of the file and the driven run took [s].
     """
@@ -67,6 +69,7 @@ def _shorten(context: Context, plain: float, driven: float) -> None:
     if steps >= job.steps:
         return
     bench.job = replace(job, steps=steps)
+    context.far = None
     with bench.instance(moved=False) as driver:
         context.plain = bench.run(driver)
     with bench.instance() as driver:
@@ -114,7 +117,7 @@ class _Search:
         """
         bench, context = self.bench, self.context
         chosen = list(bench.movement.values)
-        far = bench.movement
+        far = bench.movement, context.trace, context.plain
         lacking = self._still()
         for which in _NEARER if lacking else ():
             if self.budget.over or self.crashes:
@@ -126,7 +129,8 @@ class _Search:
                 bench.movement, context.trace, self.seconds = before
             if not lacking:
                 break
-        if bench.movement is not far:
+        if bench.movement is not far[0]:
+            context.far = far
             with bench.instance(moved=False) as driver:
                 context.plain = bench.run(driver)
 
