@@ -174,7 +174,7 @@ def structure(context: Context) -> None:
                 for v in arrays:
                     driver.get([v.resize(sizes)], f"for `{v.name}` of the new size")
                 if change and job.interface != "ScheduledExecution":
-                    _live(context, driver, sizes)
+                    _run_resized(context, driver, sizes)
             except (StatusError, TerminatedError) as error:
                 rule = error.rule if isinstance(error, StatusError) else ""
                 context.report(rule or "configuration.status", str(error))
@@ -182,11 +182,11 @@ def structure(context: Context) -> None:
     _probe_reconfiguration(context)
 
 
-def _live(context: Context, driver: Driver, sizes: Mapping[int, int]) -> None:
+def _run_resized(context: Context, driver: Driver, sizes: Mapping[int, int]) -> None:
     """Arrays of other sizes keep what is set, and the run begins with as many states as there are then.
 
     Args:
-        driver: after configuration mode.
+        driver: with these sizes set, not yet in initialisation mode.
         sizes: values of the structural parameters by their value references.
     """
     job = context.bench.job

@@ -36,14 +36,14 @@ def own_time(context: Context) -> None:
         context.report("steps.time", f"`{v.name}` must be later after {job.steps} steps, but is not", v.name)
 
 
-def _judge_time(context: Context, v: ProbedVariable, found: float, t: float) -> bool:
+def _judge_time(context: Context, v: ProbedVariable, inside: float, t: float) -> bool:
     """Whether the independent variable is not later than the communication point ``t`` [s]; it is reported if it is."""
-    if found <= t + _TIME * context.bench.job.step:
+    if inside <= t + _TIME * context.bench.job.step:
         return True
     if "steps.time" not in context.remarked:
         context.remarked.add("steps.time")
         text = f"`{v.name}` must not be later than the communication point after a step, but is"
-        context.report("steps.time", text, v.name, f"({found:.9g} at t = {t:.9g})")
+        context.report("steps.time", text, v.name, f"({inside:.9g} at t = {t:.9g})")
     return False
 
 
