@@ -146,9 +146,8 @@ class Measured:
             finally:
                 bench.movement, bench.held = movement, frozenset()
         if silent:
-            names = ", ".join(silent)
-            text = f"what is listed as a dependency must have an effect, but none was seen of {names}"
-            self.context.report("dependency.superfluous", f"{text}, at three points and in a run")
+            text = "what unknowns depend on, by a list or for want of one, must have an effect, but none was seen of "
+            self.context.report("dependency.superfluous", f"{text}{', '.join(silent)}, at three points and in a run")
 
     def _listed_by_silence(self) -> set[tuple[str, int]]:
         """The parameters of a small FMU whose initial unknowns list nothing: they depend on all of them then."""

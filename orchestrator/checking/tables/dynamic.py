@@ -98,7 +98,7 @@ steps.time | W | 4.2.2 | 4.2.1 | the independent variable is not later than the 
 dependency.missing | E | 2.2.8 | 2.4.8 | what reacts to a known at once lists it among its dependencies | add it; hosts order their calls by that list
 dependency.initial | W | 2.2.8 | 2.4.8 | what reacts to a known in initialisation mode lists it in InitialUnknowns | add it; hosts initialise loops by that list
 dependency.kind | E | 2.2.8 | 2.4.8 | factors are as dependenciesKind says | write dependent, or leave dependenciesKind out
-dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are listed are seen | see whether the value is used; leave it out of the list where it is none of that unknown's
+dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are stated are seen | see whether the value is used; list dependencies without it where it is none of them
 
 [states]
 states.order | E | 3.2.1 | 3.2.1 | states stand in the order of ModelStructure, by the attribute derivative | correct the order, or the attribute derivative
