@@ -1,7 +1,9 @@
 """Raw FMI 2.0 calls through ctypes, for the tests: every status and every message is seen."""
 
 import ctypes
+import shutil
 import tempfile
+import weakref
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,6 +28,7 @@ class RawFmu:
 
     def __init__(self, path: Path) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="fmu "))
+        weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
         with zipfile.ZipFile(path) as archive:
             archive.extractall(self.folder)
         root = ElementTree.parse(self.folder / "modelDescription.xml").getroot()
