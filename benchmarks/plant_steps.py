@@ -30,7 +30,7 @@ def effects() -> dict[str, list[str]]:
     return groups
 
 
-def draw_machine(rng: np.random.Generator, model: int, names: list[str]) -> tuple[float, ...]:
+def draw_machine(rng: np.random.Generator, model: int, names: list[str]) -> DrivetrainParameters:
     """Return parameters of a machine of ordinary size with an effect on, its size spread over two decades."""
 
     def spread(value: float, decades: float = 0.5) -> float:
@@ -58,7 +58,8 @@ def draw_machine(rng: np.random.Generator, model: int, names: list[str]) -> tupl
             plain[f"effects.coulomb_friction.{site}.torque"] = spread(2.0)
         if size is not None:
             plain[name] = spread(size)
-    return with_values(DEFAULTS, plain)
+    drawn: DrivetrainParameters = with_values(DEFAULTS, plain)
+    return drawn
 
 
 def draw_extreme(rng: np.random.Generator, model: int, names: list[str]) -> DrivetrainParameters:
@@ -75,7 +76,7 @@ def draw_extreme(rng: np.random.Generator, model: int, names: list[str]) -> Driv
 
 def warm_up(plant: ModuleType) -> None:
     """Compile all that the steps need."""
-    p = with_values(tuple(entry.default for entry in PARAMETERS), {"alpha": 0.01})
+    p = with_values(DEFAULTS, {"alpha": 0.01})
     table = plant.prepare(p, 1e-3)
     x = plant.consistent_start((0.0,) * 8, p)
     plant.advance(x, plant.initial_mode(x, p), p, 1.0, 0.0, 1e-3, table)
