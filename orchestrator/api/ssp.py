@@ -81,5 +81,10 @@ def export_ssp(
         chosen = scenario_of_pair(Experiment(), ensure_built(FMUS), alpha, reference)
     else:
         chosen = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
-    write_ssp(Path(path), chosen, version)
+    try:
+        write_ssp(Path(path), chosen, version)
+    except ScenarioError as error:
+        if not isinstance(scenario, Path | str):
+            raise
+        raise ScenarioError(f"{scenario}: {error}") from None
     return ExportedSsp(Path(path), chosen)

@@ -284,6 +284,30 @@ def test_words_that_do_not_fit_the_action(tmp_path: Path, capsys, words: list[st
     assert not (tmp_path / "x").exists()
 
 
+def test_a_file_that_ssp_cannot_say_is_named(fmus, tmp_path: Path, capsys) -> None:
+    file = tmp_path / "moved.toml"
+    file.write_text(
+        f"""
+stop = 0.01
+record = ["plant.theta_m"]
+[master]
+algorithm = "jacobi"
+step = 1e-3
+[instances.plant]
+fmu = {str(fmus["Drivetrain"])!r}
+[[sources]]
+to = "plant.u"
+kind = "sine"
+amplitude = 1.0
+frequency = 1.0
+""",
+        encoding="utf-8",
+    )
+    assert main(["ssp", "export", "--scenario", str(file), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert said.splitlines()[-1] == f"error: {file}: $.sources[0]: must be constant to be written as SSP, but varies"
+
+
 def test_a_single_fmu_without_connections(tmp_path: Path) -> None:
     scenario = tmp_path / "alone.toml"
     scenario.write_text(
