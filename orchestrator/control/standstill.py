@@ -122,6 +122,8 @@ def loop_margins(model: LinearModel, gains: tuple[float, ...], sample_time: floa
     size = np.abs(L)
     crossed = np.flatnonzero(np.diff(np.floor((phase - np.pi) / (2.0 * np.pi))) != 0)
     factors = 1.0 / size[crossed]
+    if L[-1].real < 0.0:  # at half the sampling frequency the response is real: a pole leaves at z = -1
+        factors = np.append(factors, 1.0 / size[-1])
     unity = np.flatnonzero(np.diff(size > 1.0))
     over = np.mod(phase[unity] + np.pi, 2.0 * np.pi)
     times = over / angles[unity] * sample_time

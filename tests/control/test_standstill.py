@@ -50,6 +50,18 @@ def test_the_margins_are_where_the_loop_becomes_unstable(tau):
     assert slow.upper < np.inf
 
 
+@pytest.mark.parametrize("weights", [THESIS, LOAD])
+@pytest.mark.parametrize("tau", [1.0, 0.05, 5e-3])
+@pytest.mark.parametrize("delay", [0, 1])
+def test_a_sampled_loop_bears_no_gain_without_end(tau, weights, delay):
+    values, gains = gains_of(tau, weights)
+    upper = loop_margins(five_state_model(values), gains, STEP, delay).upper
+    inside, outside = (spectral_radius(values, np.multiply(gains, upper * s), delay) for s in (0.995, 1.005))
+    assert inside < 1.0 < outside
+    between = [spectral_radius(values, np.multiply(gains, g), delay) for g in np.geomspace(1.0, 0.995 * upper, 20)]
+    assert max(between) < 1.0
+
+
 def integrate(values, gains, seconds):
     """Load angle over the half-gap at each sample of the loop, from afar, by an integrator with tight tolerance."""
     v, x, loads = values, np.array([0.0, 0.0, 0.0, 3.0, 0.0]), []
