@@ -32,6 +32,7 @@ STILL = 0.05  # motion of the load in a piece, over the half-gap, that is rest
 REPEATED = 0.01  # relative difference of the motion of two pieces, below which it is a cycle
 STARTS = ((100.0, 0.0), (0.0, 30.0), (3.0, 0.0), (-1.5, 6.0))  # load angle and speed, over the half-gap
 FREQUENCIES = 20_000  # of the loop's margins
+ROUNDING = 1e-10  # of an eigenvalue's size
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def forecast_rest(
     """
     matrices = _matrices(values, np.asarray(gains), sample_time, delay)
     parts = n_parts(sample_time)
-    _require_stable(matrices, parts)
+    _require_stable(matrices, sample_time)
     state = np.zeros((6 + delay + 1, len(STARTS)))
     state[-1] = 1.0
     state[2], state[3] = np.array(STARTS).T
@@ -180,16 +181,18 @@ def n_parts(sample_time: float) -> int:
     return math.ceil(sample_time / LONGEST_PART - 1e-9)
 
 
-def _require_stable(matrices: tuple[Array, Array, Array], parts: int) -> None:
+def _require_stable(matrices: tuple[Array, Array, Array], sample_time: float) -> None:
     """Refuse a loop whose teeth always touch and that is unstable: far out every loop with a gap is that one."""
     _, contact, sample = matrices
-    step = np.linalg.matrix_power(contact[:-1, :-1], parts) @ sample[:-1, :-1]
+    step = np.linalg.matrix_power(contact[:-1, :-1], n_parts(sample_time)) @ sample[:-1, :-1]
     largest = float(np.abs(np.linalg.eigvals(step)).max())
-    if largest >= 1.0:
+    if largest > 1.0 - ROUNDING:
         late = len(sample) - 7
+        grows = largest > 1.0 + ROUNDING
+        motion = f"doubles in {sample_time * math.log(2.0) / math.log(largest):.3g} s" if grows else "does not decay"
         raise ScenarioError(
-            f"the loop must be stable without a gap, but with a `delay` of {late} it grows {largest:.4g} times in a "
-            "sample: give a shorter `delay` or other gains",
+            f"the loop must be stable without a gap, but with a `delay` of {late} its motion {motion}: "
+            f"give {'a shorter `delay` or ' if late else ''}other gains",
             "delay",
         )
 

@@ -93,9 +93,14 @@ def test_the_describing_function_is_silent_where_it_fails(thesis):
     [
         (["--gains", "1,2"], "--gains` must be 5 numbers"),
         (["--gains", "1,2,x,4,5"], "--gains` must be numbers separated by commas"),
-        (["--gains", "-1,0,0,0,0"], "give a shorter `--delay` or other gains"),
+        (["--gains", "-1,0,0,0,0"], "s: give other gains"),
+        (["--gains", "0,10,0,10,0"], "its motion does not decay: give other gains"),
         (["--gains", "-.5e0,0,0,0,0"], "stable without a gap"),
-        (["--delay", "90"], "error: the loop must be stable without a gap, but with a `--delay` of 90 it grows"),
+        (
+            ["--delay", "90"],
+            "error: the loop must be stable without a gap, but with a `--delay` of 90 its motion doubles",
+        ),
+        (["--delay", "90"], "s: give a shorter `--delay` or other gains"),
         (["--state-weights", "0,1,0,1,1"], "--state-weights` must weigh an angle"),
         (["--state-weights", "-1,1,1,1,1"], "--state-weights` must be between 0 and"),
         (["--sample-time", "1"], "--sample-time` must be between"),

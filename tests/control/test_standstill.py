@@ -102,5 +102,5 @@ def test_weights_that_damp_the_load_are_still_on_a_fast_drive():
 
 def test_a_loop_that_is_unstable_without_a_gap_is_refused():
     values, gains = gains_of(5e-3, THESIS)
-    with pytest.raises(ScenarioError, match="stable without a gap, but with a `delay` of 6 it grows"):
+    with pytest.raises(ScenarioError, match="stable without a gap, but with a `delay` of 6 its motion doubles in"):
         forecast_rest(values, gains, STEP, delay=6)

@@ -12,23 +12,31 @@ from orchestrator.shared.results.compensate import CompensateFound
 def build(source: ResultDocument) -> Report:
     """Return the page."""
     results = read(source.results, CompensateFound)
-    bound = Series("bound", results.bound_times, results.bound_speeds)
+    bound = Series("bound from rest", results.bound_times, results.bound_speeds)
     clouds = tuple(Series(law.law, law.times, law.impacts, "points") for law in results.laws if law.times)
     paths = tuple(Series(law.law, law.path_times, law.path) for law in results.laws if law.path)
-    quickest = Series("bound", results.path_times, results.path)
+    quickest = Series("bound from rest", results.path_times, results.path)
     last = results.laws[-1]
     time = f"takes {median(last.times):.3f} s" if last.times else "is not made"
     return Report(
         title="Laws across the gap",
         summary=(
-            f"A traversal of the {last.law} {time}; none that lands at {results.impact_speed:g} rad/s takes less than "
-            f"{results.bound:.4f} s. Its largest impact is {last.impact:.3g} rad/s, that of the {results.laws[0].law} "
-            f"{results.laws[0].impact:.3g} rad/s."
+            f"A traversal of the {last.law} {time}; none from rest that lands at {results.impact_speed:g} rad/s takes "
+            f"less than {results.bound:.4f} s. Its largest impact is {last.impact:.3g} rad/s, "
+            f"that of the {results.laws[0].law} {results.laws[0].impact:.3g} rad/s."
         ),
         sections=(
             _table(results),
             *rest_facts(results.forecast, "The plain LQR"),
-            Plot("Traversals", "time [s]", "impact [rad/s]", (bound, *clouds), log_x=True, log_y=True),
+            Plot(
+                "Traversals",
+                "time [s]",
+                "impact [rad/s]",
+                (bound, *clouds),
+                log_x=True,
+                log_y=True,
+                note="A traversal that begins with speed, or out of a wound shaft, may be quicker than one from rest.",
+            ),
             Plot(
                 "The first traversal of each law",
                 "time [s]",

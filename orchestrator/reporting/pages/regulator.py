@@ -57,6 +57,7 @@ def rest_facts(f: ForecastFound | None, loop: str) -> tuple[Facts, ...]:
         ("load by the describing function [half-gaps]", f.harmonic_load),
         ("phase margin without a gap [rad]", f.phase_margin),
         ("delay margin without a gap [ms]", None if f.delay_margin is None else 1e3 * f.delay_margin),
+        ("smallest factor of the gain without a gap", f.lower_gain or 0.0),
         ("largest factor of the gain without a gap", f.upper_gain),
         ("states of six that the request moves", f.rank),
     )
