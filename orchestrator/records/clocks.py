@@ -127,12 +127,13 @@ def read_own_time(source: RecordSource, place: int, clock: Clock, column: Column
         )
     if raw.dtype.kind == "M":
         return seconds_of(raw, label, path, clock.start)
-    numbers = unwrap_time(np.asarray(raw, dtype=float), column, label, str(path))
+    named = source.heads[known[0]].full or source.heads[known[0]].name
+    numbers = unwrap_time(np.asarray(raw, dtype=float), column, named, str(path))
     if column.modulo is not None and np.isfinite(numbers).any():  # the counters began within half a turn of each other
         first = float(numbers[np.isfinite(numbers)][0])
         numbers = numbers - column.modulo * np.rint((first - clock.first) / column.modulo)
     numbers = scale_values(numbers, column.factor, column.offset)
-    unit = None if clock.numbered else unit_of("time", column, source.heads[known[0]].unit, label, str(path))
+    unit = None if clock.numbered else unit_of("time", column, source.heads[known[0]].unit, named, str(path))
     factor = clock.factor if unit is None else unit.factor
     return scale_values(numbers, factor, -clock.start * clock.factor)
 

@@ -101,6 +101,17 @@ def test_a_time_is_in_the_unit_of_its_group(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_record(path).u, HELD, atol=1e-9)
 
 
+def test_a_counter_of_a_group_that_overflows_is_named(tmp_path: Path) -> None:
+    milliseconds = np.rint(1e3 * TIME) % 2048.0
+    machine = {"time": TIME, "theta_m": ANGLE}
+    path = _mat(tmp_path, {"d": {"time": milliseconds[::EVERY], "u": LEVELS}, "m": machine})
+    with pytest.raises(RecordError, match=r"column `time` must increase, but begins again"):
+        read_record(path)
+    path = _mat(tmp_path, {"d": {"time": milliseconds[::EVERY], "u": LEVELS}, "m": machine | {"time": milliseconds}})
+    record = read_record(path, {"time": Column(unit="ms", modulo=2048.0)})
+    np.testing.assert_allclose(record.u, HELD, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", ["time_u", "t_drive"])
 def test_rows_of_another_length_take_the_time_beside_them(name: str, tmp_path: Path) -> None:
     np.savez(tmp_path / "log.npz", **{"time": TIME, "theta_m": ANGLE, "u": LEVELS, name: OWN})
