@@ -72,11 +72,26 @@ def test_a_value_that_changes_slowly_is_no_surer_than_its_parts(fitted):
 
 def test_of_a_value_that_changes_nothing_nothing_is_known(fitted, monkeypatch):
     problem, model = fitted
-    whole = type(problem).jacobian
-    monkeypatch.setattr(type(problem), "jacobian", lambda *given: whole(*given) * [1.0, 0.0])
+    whole = type(problem).move_point
+    monkeypatch.setattr(
+        type(problem), "move_point",
+        lambda problem, point, coordinates, steps: replace(
+            whole(problem, point, coordinates, steps), effects=point.effects
+        ),
+    )  # fmt: skip
     idle = fit_model(problem, model.point)
     assert idle.covariance[1, 1] > 1e3 * model.covariance[1, 1]
     assert idle.covariance[0, 0] == pytest.approx(1.0 / np.sum(model.jacobian[:, 0] ** 2), rel=0.2)
+
+
+def test_a_value_at_its_upper_end_is_as_sure_as_the_way_back_says(fitted, monkeypatch):
+    problem, model = fitted
+    ended = replace(problem.effects[LABEL], lower=(0.0,), upper=(0.4,))
+    monkeypatch.setattr(problem.models[0], "effects", {LABEL: ended})
+    stopped = fit_model(problem, model.point.with_effect(LABEL, (0.4,)), 0)
+    assert np.ptp(stopped.jacobian[:, 1]) == 0.0
+    assert stopped.covariance[1, 1] == pytest.approx(model.covariance[1, 1], rel=0.1)
+    assert stopped.covariance[0, 0] == pytest.approx(1.0 / np.sum(model.jacobian[:, 0] ** 2), rel=0.1)
 
 
 def test_a_true_effect_gains_and_chance_does_not():

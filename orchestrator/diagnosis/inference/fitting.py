@@ -137,10 +137,33 @@ def _score(
     )
     covariance = np.asarray(np.linalg.pinv(normal, hermitian=True))
     idle = np.flatnonzero(np.diag(normal) == 0.0)
-    covariance[idle, idle] = UNKNOWN**2  # of what changes no residual nothing is known
+    if idle.size:
+        covariance[idle, idle] = _variance_at_ends(problem, point, coordinates, residual, jacobian, idle)
     return FittedModel(
         point, tuple(coordinates), residual, jacobian, cost, covariance, held_out, problem.blocks, shifts
     )
+
+
+def _variance_at_ends(
+    problem: FitProblem, point: ModelPoint, coordinates: Sequence[Coordinate], residual: Array, jacobian: Array,
+    idle: NDArray[np.int64],
+) -> Array:  # fmt: skip
+    """Return the variances of values that change no residual when they grow.
+
+    One that stands at the upper end of its range is as sure as the way back says; of another one nothing is known.
+
+    Args:
+        idle: (values,) places of the coordinates.
+    """
+    moved = [problem.move_point(point, [coordinates[n]], np.array([-1.0])) for n in idle]
+    both = jacobian.copy()
+    both[:, idle] = np.column_stack([residual - back for back in problem.whiten_residuals(moved)])
+    _, slopes = problem.prior(point, coordinates)
+    normal = both.T @ both + np.diag(slopes**2)
+    if not np.isfinite(normal).all():
+        return np.full(idle.size, UNKNOWN**2)
+    variances = np.diag(np.linalg.pinv(normal, hermitian=True))[idle]
+    return np.where(np.diag(normal)[idle] > 0.0, variances, UNKNOWN**2)
 
 
 def leave_blocks_out(
