@@ -50,6 +50,21 @@ def test_an_angle_that_wraps_is_told_its_turn(unit: str, turn: float, said: str,
     assert _advice(tmp_path / "log.csv", "modulo", motor, theta_m=Column(unit=unit)) == said
 
 
+@pytest.mark.parametrize("speed", [100.0, 150.0])  # rad/s
+def test_a_fast_angle_that_wraps_in_every_tenth_row_is_told(speed: float, tmp_path: Path) -> None:
+    angle = ANGLE + speed * TIME
+    motor = np.round(np.degrees(angle) % 360.0, 6)
+    assert np.mean(np.abs(np.diff(motor)) > 180.0) > 0.07
+    said = _advice(tmp_path / "log.csv", "modulo", motor, theta_m=Column(unit="deg"))
+    record = _read(tmp_path / "log.csv", motor, theta_m=Column(unit="deg", modulo=float(said)))
+    np.testing.assert_allclose(np.diff(record.theta_m), np.diff(angle), atol=1e-6)
+
+
+def test_a_count_that_goes_to_and_fro_wraps_nowhere(tmp_path: Path) -> None:
+    motor = 0.001 * (np.arange(TIME.size) % 3 == 0)
+    assert np.ptp(_read(tmp_path / "log.csv", motor).theta_m) == pytest.approx(0.001)
+
+
 def test_a_range_that_nobody_knows_is_not_guessed(tmp_path: Path) -> None:
     counts = Column(unit="counts", counts_per_rev=4096.0)
     with pytest.raises(RecordError, match=r"modulo = \.\.\.`.*near 5734\d"):
