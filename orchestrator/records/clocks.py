@@ -64,13 +64,14 @@ def read_clock(
         return Clock(np.arange(rows) / rate, f"time from the row and {rate:.12g} Hz")
     choice = chosen["time"]
     raw = values[choice.place]
-    if column.rate is not None and not _are_sample_numbers(raw):
+    empty = bool(np.all(np.isnat(raw) if raw.dtype.kind == "M" else np.isnan(raw)))
+    if rate is not None and (empty or (column.rate is not None and not _are_sample_numbers(raw))):
         _refuse_broken(source, path)
         said = _rate_of(raw, column, source.heads[choice.place].unit)
-        differs = math.isfinite(said) and abs(said / column.rate - 1.0) > 0.01
-        spoken = f"time from the row and {column.rate:.12g} Hz, `{label}` not used"
+        differs = math.isfinite(said) and abs(said / rate - 1.0) > 0.01
+        spoken = f"time from the row and {rate:.12g} Hz, `{label}` not used"
         spoken += f" though it says {said:.6g} Hz" if differs else ""
-        return Clock(np.arange(raw.size) / column.rate, spoken)
+        return Clock(np.arange(raw.size) / rate, spoken)
     if raw.dtype.kind == "M":
         return Clock(seconds_of(raw, label, path), f"{label} as date and time", 1.0, raw[~np.isnat(raw)][0])
     numbers = np.asarray(raw, dtype=float)

@@ -58,6 +58,19 @@ def test_no_time_but_a_step(tmp_path: Path, columns: dict[str, np.ndarray]) -> N
     np.testing.assert_allclose(record.theta_l, columns["theta_l"], atol=1e-8)
 
 
+def test_an_empty_time_and_a_step(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
+    path = tmp_path / "log.lvm"
+    rows = _rows([np.full(columns["u"].size, np.nan), *(columns[name] for name in NAMES)])
+    path.write_text(_head("No", ["0.005"] * 3, ["X_Value", *NAMES]) + rows)
+    record = read_record(path)
+    np.testing.assert_allclose(record.time, columns["time"], atol=1e-9)
+    np.testing.assert_allclose(record.theta_l, columns["theta_l"], atol=1e-8)
+    path.write_text(_head("No", ["0.005", "0.01", "0.005"], ["X_Value", *NAMES]) + rows)
+    with pytest.raises(RecordError, match=r"say `\[columns\.time\] rate"):
+        read_record(path)
+    np.testing.assert_allclose(read_record(path, {"time": Column(rate=200.0)}).time, columns["time"], atol=1e-9)
+
+
 def test_no_time_and_several_steps_are_refused(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
     path = tmp_path / "log.lvm"
     path.write_text(_head("No", ["0.005", "0.01", "0.005"], list(NAMES)) + _rows([columns[name] for name in NAMES]))
