@@ -1,6 +1,6 @@
 """From an opened file to the columns of a record in SI: which channels, which units, which time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from orchestrator.records.rasters import bring_to_motor, make_uniform
 from orchestrator.records.requests import SAMPLED
 from orchestrator.records.topics import has_topics, split_topics
 from orchestrator.records.units import angle_unit, parse_unit
+from orchestrator.records.words import TIME, words_of
 from orchestrator.shared.numbers import exact_text
 
 MOST_NAMED = 12  # columns in a note
@@ -120,7 +121,11 @@ def load(
         if name not in table and source.heads[place].raster == source.heads[motor].raster:
             table[name] = values[place].astype(float)
     table, raster, more = bring_to_motor(table, own, labels, path, reading.resample)
-    notes += [", ".join(units), *_unused(source, places), *more]
+    notes += [
+        ", ".join(units),
+        *_unused(source, places, {source.heads[chosen[name].place].raster for name in own}),
+        *more,
+    ]
     drive = columns.get("u", Column())
     unit = None
     if "u" in chosen:
@@ -137,9 +142,12 @@ def load(
     return Loaded(table, labels, (*notes, *more), raster, angle_unit(texts))
 
 
-def _unused(source: RecordSource, places: Sequence[int]) -> list[str]:
-    """Return a note that names the columns that are not used, or none."""
-    rest = [(n, head) for n, head in enumerate(source.heads) if n not in places and head.name != "time"]
+def _unused(source: RecordSource, places: Sequence[int], rasters: Collection[int]) -> list[str]:
+    """Return a note that names the columns that are not used, or none; ``rasters`` have times that are."""
+    rest = [
+        (n, head) for n, head in enumerate(source.heads)
+        if n not in places and head.name != "time" and not (head.raster in rasters and set(words_of(head.name)) & TIME)
+    ]  # fmt: skip
     names = [f"`{head.full or head.name or f'#{n + 1}'}`" for n, head in rest]
     if not names:
         return []

@@ -31,12 +31,14 @@ class Request:
         sampled: (n,) a smooth signal through the torque's rows, at the rows of the angles; None: these are not rarer,
             or the torque is logged when it changes.
         raster: step of the torque's own rows [s], where there is such a reading; else 0.0.
+        undated: its own rows without a time stamp, which are left out.
     """
 
     held: Array
     within: float
     sampled: Array | None
     raster: float
+    undated: int = 0
 
     def describe(self, label: str, lost: int) -> str:
         """Return what was done in words; ``lost``: rows of the angles before and after the torque."""
@@ -46,6 +48,7 @@ class Request:
         if self.sampled is not None:
             off = float(np.sqrt(np.nanmean((self.sampled - self.held) ** 2)))
             text += f"; were it a signal that was sampled, held it would be off by {off:.2g} (rms)"
+        text += f"; {self.undated} of its rows have no time and are left out" if self.undated else ""
         return text + (f"; {lost} rows without it left out" if lost else "")
 
 
@@ -58,6 +61,7 @@ def hold_request(time: Array, stamps: Array, values: Array, label: str, source: 
         values: (m,) torque; NaN: missing, until the next row.
     """
     stamped = np.isfinite(stamps)
+    undated = int(np.count_nonzero(~stamped & np.isfinite(values)))
     stamps, values = stamps[stamped], values[stamped]
     steps = np.diff(stamps)
     if stamps.size < 2 or np.any(steps <= 0.0):
@@ -86,7 +90,7 @@ def hold_request(time: Array, stamps: Array, values: Array, label: str, source: 
     even = np.mean(steps > RARER * usual) <= MOST_UNEVEN
     step = float(np.median(np.diff(time)))
     if not even or usual < RARER * step or np.count_nonzero(known) < 4:
-        return Request(np.where(whole, held, np.nan), within, None, 0.0)
+        return Request(np.where(whole, held, np.nan), within, None, 0.0, undated)
     from scipy.interpolate import CubicSpline  # a tenth of a second of importing that few records need
 
     # A row of the angles has one torque, so what was logged within it is that of its beginning.
@@ -94,7 +98,7 @@ def hold_request(time: Array, stamps: Array, values: Array, label: str, source: 
     knots = np.where(stamps[known] < time[0], stamps[known], time[begun])
     smooth = CubicSpline(*_distinct(knots, values[known]))(time)
     inside = whole & (time <= knots[-1])
-    return Request(np.where(whole, held, np.nan), within, np.where(inside, smooth, held), usual)
+    return Request(np.where(whole, held, np.nan), within, np.where(inside, smooth, held), usual, undated)
 
 
 def _distinct(knots: Array, values: Array) -> tuple[Array, Array]:

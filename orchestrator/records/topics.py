@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.records.checks import LARGEST_SHARE_MISSING
-from orchestrator.records.formats.source import Head, RecordSource
+from orchestrator.records.formats.source import Head, RecordSource, is_filled
 
 TOGETHER = 0.1  # of the rows of a column: with fewer that another one fills, too, they are two topics
 EVEN = 0.9  # of the distances between a column's rows: with more of them equal it has a raster of its own
@@ -19,7 +19,7 @@ EVEN = 0.9  # of the distances between a column's rows: with more of them equal 
 
 def has_topics(values: Mapping[int, NDArray[Any]], places: Sequence[int]) -> bool:
     """Return whether channels (n,) of one raster may be several topics: more is missing than a record may lack."""
-    shares = [float(np.mean(_filled(values[place]))) for place in places]
+    shares = [float(np.mean(is_filled(values[place]))) for place in places]
     return min(shares, default=1.0) < 1.0 - LARGEST_SHARE_MISSING
 
 
@@ -32,7 +32,7 @@ def split_topics(source: RecordSource, time: int, places: Sequence[int], main: i
         places: of the channels that are wanted.
         main: place of the channel whose topic the time belongs to.
     """
-    filled = {place: _filled(values) for place, values in zip(places, source.load(places), strict=True)}
+    filled = {place: is_filled(values) for place, values in zip(places, source.load(places), strict=True)}
     topics: list[list[int]] = []
     for place in places:
         same = next((topic for topic in topics if _agree(filled[topic[0]], filled[place])), None)
@@ -45,10 +45,6 @@ def split_topics(source: RecordSource, time: int, places: Sequence[int], main: i
     topics.sort(key=lambda topic: main not in topic)
     rows = [np.logical_or.reduce([filled[place] for place in topic]) for topic in topics]
     return _Topics(source, time, topics, rows)
-
-
-def _filled(values: NDArray[Any]) -> NDArray[np.bool_]:
-    return ~np.isnat(values) if values.dtype.kind == "M" else ~np.isnan(values)
 
 
 def _agree(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> bool:

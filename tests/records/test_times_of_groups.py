@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import RecordError
+from orchestrator.records.preview import preview_log
 from orchestrator.records.record import Column, Reading, read_record
 from orchestrator.records.tables import Wanted, read_columns
 from orchestrator.scenarios.tables import read_table
@@ -116,6 +117,59 @@ def test_a_counter_of_a_group_that_overflows_is_named(tmp_path: Path) -> None:
 def test_rows_of_another_length_take_the_time_beside_them(name: str, tmp_path: Path) -> None:
     np.savez(tmp_path / "log.npz", **{"time": TIME, "theta_m": ANGLE, "u": LEVELS, name: OWN})
     np.testing.assert_allclose(read_record(tmp_path / "log.npz").u, HELD, atol=1e-9)
+
+
+def _pad(values: np.ndarray) -> np.ndarray:
+    return np.append(values, np.full(TIME.size - values.size, np.nan))
+
+
+@pytest.mark.parametrize("names", [("time", "time_u"), ("t", "t.1"), ("Time (motor) [s]", "Time (drive) [s]")])
+@pytest.mark.parametrize("kind", ["csv", "npz"])
+@pytest.mark.parametrize("part", [None, (0.0, 2.0), (1.0, 3.0)])
+def test_signals_beside_each_other_end_with_their_own_times(
+    names: tuple[str, str], kind: str, part: tuple[float, float] | None, tmp_path: Path
+) -> None:
+    columns = {names[1]: _pad(OWN), "u": _pad(LEVELS), names[0]: TIME, "theta_m": ANGLE}
+    path = tmp_path / f"log.{kind}"
+    if kind == "csv":
+        rows = [",".join("" if cell != cell else f"{cell:.12g}" for cell in row) for row in zip(*columns.values())]  # noqa: B905, PLR0124
+        path.write_text("\n".join([",".join(columns), *rows]) + "\n")
+    else:
+        np.savez(path, **columns)
+    record = read_record(path, reading=Reading(part=part))
+    first, last = (0, TIME.size) if part is None else np.searchsorted(TIME, (part[0] - 1e-9, part[1] + 1e-9))
+    np.testing.assert_allclose(record.u, HELD[first:last], atol=1e-9)
+    np.testing.assert_allclose(record.theta_m, ANGLE[first:last], atol=1e-9)
+    assert record.u_raster == pytest.approx(0.02)
+    assert not any("not used" in note for note in record.notes)
+    shown = preview_log(path, {})
+    assert [shown.problem, *shown.missing] == [""]
+    assert {one.column: one.place for one in shown.columns} == {"time": 2, "u": 1, "theta_m": 3, "theta_l": None}
+
+
+def test_times_of_merged_topics_do_not_end_together_by_chance(tmp_path: Path) -> None:
+    late = OWN + 0.0007
+    time = np.append(TIME, late)
+    order = np.argsort(time)
+    nothing, rows = np.full(TIME.size, np.nan), np.full(late.size, np.nan)
+    columns = {
+        "time": time, "t_drive": np.append(nothing, late), "t_motor": np.append(TIME, rows),
+        "u": np.append(nothing, LEVELS), "theta_m": np.append(ANGLE, rows),
+    }  # fmt: skip
+    np.savez(tmp_path / "log.npz", **{name: values[order] for name, values in columns.items()})
+    record = read_record(tmp_path / "log.npz", {"time": Column("time")})
+    assert any("2 topics with rows of their own" in note for note in record.notes)
+    np.testing.assert_allclose(record.theta_m, ANGLE[-record.size :], atol=1e-12)
+
+
+def test_rows_of_a_torque_without_a_time_are_told(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    own = np.where(np.arange(OWN.size) == 7, np.nan, OWN)
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        for name, values in (("d/time", own), ("d/u", LEVELS), ("m/time", TIME), ("m/theta_m", ANGLE)):
+            file[name] = values
+    assert any("1 of its rows have no time and are left out" in note for note in read_record(path).notes)
 
 
 def test_rows_without_a_time_are_refused_and_the_cure_works(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from orchestrator.errors import RecordError
 from orchestrator.records.formats import numpy_file, text
 from orchestrator.records.formats.apart import open_apart
+from orchestrator.records.formats.lengths import split_lengths
 from orchestrator.records.formats.source import MAXIMUM_BYTES, RecordSource
 
 # First bytes of a file (and where they stand) and the module that reads it.
@@ -64,12 +65,12 @@ def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]
     if header is not None and module != "text":
         raise RecordError(f"{path}: `header` must be left out, but is {header}: it is for text files")
     if module == "text":
-        yield text.open_file(path, header)
+        yield split_lengths(text.open_file(path, header))
     elif module == "numpy_file":
-        yield numpy_file.open_file(path)
+        yield split_lengths(numpy_file.open_file(path))
     else:
         with open_apart(module, path) as source:
-            yield source
+            yield split_lengths(source)
 
 
 def _is_mat_4(head: bytes) -> bool:

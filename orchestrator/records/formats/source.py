@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
@@ -75,6 +76,11 @@ class _Within(RecordSource):
             values[self._rows] if self.heads[place].raster == self._raster else values
             for place, values in zip(places, self._source.load(places), strict=True)
         ]
+
+
+def is_filled(values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which values (n,) of a channel are there."""
+    return ~np.isnat(values) if values.dtype.kind == "M" else ~np.isnan(values)
 
 
 def as_numbers(values: NDArray[Any], name: str, path: Path) -> NDArray[Any]:
