@@ -35,6 +35,12 @@ def test_a_sound_one_has_no_finding(model: str, tmp_path: Path) -> None:
     assert report.executed
 
 
+@pytest.mark.parametrize("variant", ["least_power", "opening"])
+def test_what_acts_far_away_or_later_is_no_fault(variant: str, tmp_path: Path) -> None:
+    report = check_fmu(build_small_fmu(tmp_path / "sound.fmu", "thermostat", variant), OPTIONS)
+    assert report.findings == ()
+
+
 @pytest.mark.parametrize(("model", "fault", "rule"), FAULTS)
 def test_a_fault_is_named_by_its_rule(model: str, fault: str, rule: str, tmp_path: Path) -> None:
     report = check_fmu(build_small_fmu(tmp_path / "broken.fmu", model, fault), OPTIONS)

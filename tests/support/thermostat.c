@@ -3,7 +3,8 @@
  *
  *     dT/dt = heat P - (T - outside) / tau        heat: on below set - 0.5 K, off above set + 0.5 K
  *
- * It is correct, or has the one fault that the macro FAULT names. */
+ * It is correct, or has the one fault that the macro FAULT names; least_power and opening are legal variants: a parameter
+ * that acts far from its value alone, and an output that is zero at the start whatever the inputs are. */
 
 #include <math.h>
 #include <stdlib.h>
@@ -27,7 +28,9 @@ typedef struct {
 typedef struct { State s; int phase, exchange; } Room;
 
 static double loss(const State *s) { return (s->x - s->outside) / (s->thick || IS(dead_truth) ? 100.0 : 80.0); }
-static double rate(const State *s) { return (s->heat ? s->power : 0.0) - loss(s); }
+static double shown(const State *s) { return loss(s) * (IS(opening) ? fmin(s->time - s->start, 1.0) : 1.0); }
+static double power(const State *s) { return IS(least_power) ? fmax(s->power, 0.7) : s->power; }
+static double rate(const State *s) { return (s->heat ? power(s) : 0.0) - loss(s); }
 static int switches(State *s) {
     int old = s->heat;
     if (s->x > s->set + 0.5) s->heat = 0;
@@ -43,7 +46,7 @@ static void begin(Room *r) {
 }
 static void settle(Room *r) {
     if (r->phase <= INITIALISATION) r->s.heat = r->s.x < r->s.set;
-    if (!IS(late_loss) || r->phase > INITIALISATION) r->s.loss = loss(&r->s);
+    if (!IS(late_loss) || r->phase > INITIALISATION) r->s.loss = shown(&r->s);
 }
 
 API const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -76,7 +79,7 @@ API fmi2Status fmi2Terminate(fmi2Component c) { ((Room *)c)->phase = TERMINATED;
 API fmi2Status fmi2Reset(fmi2Component c) { begin(c); return fmi2OK; }
 API fmi2Status fmi2GetReal(fmi2Component c, References r, size_t n, fmi2Real v[]) {
     State *s = &((Room *)c)->s;
-    if (!IS(late_loss) || ((Room *)c)->phase > INITIALISATION) s->loss = loss(s);
+    if (!IS(late_loss) || ((Room *)c)->phase > INITIALISATION) s->loss = shown(s);
     double all[] = {s->time, s->outside, s->set, s->power, 0.0, s->x, rate(s), s->loss};
     for (size_t k = 0; k < n; k++) if (r[k] > LOSS || r[k] == THICK) return fmi2Error; else v[k] = all[r[k]];
     return fmi2OK;

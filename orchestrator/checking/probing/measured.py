@@ -6,9 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 from orchestrator.checking.probing.job import ProbedUnknown
+from orchestrator.checking.probing.movement import Values, distant
 from orchestrator.checking.probing.probes import Context
-from orchestrator.checking.probing.statuses import StatusError, TerminatedError
+from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.errors import ChildError
 
 _SEEN = 1e-6  # of the size of a value: less is what an algebraic loop leaves
 _SPREAD = 0.01  # of a quotient: more is no constant
@@ -32,6 +34,7 @@ class Measured:
         self.missing: dict[tuple[str, str], dict[str, str]] = {}
         self.tried: dict[tuple[str, str, str], int] = {}
         self.reacted: dict[tuple[str, str, str], int] = {}
+        self.first: dict[str, str] = {}
         self.quotients: dict[tuple[str, str, str], list[tuple[float, float, str]]] = {}
 
     def look(
@@ -79,17 +82,22 @@ class Measured:
         self._report_unmoved()
         self._report_silent()
 
+    def look_first(self, unknowns: Sequence[ProbedUnknown], v: ProbedVariable, rows: list[list[Any]]) -> None:
+        """Take the same at the first communication point, with the values of initialisation mode."""
+        position = 0
+        for u in unknowns:
+            before, during = (row[position : position + u.variable.size] for row in rows)
+            position += u.variable.size
+            if any(_reacts(u.variable, a, b) for a, b in zip(before, during, strict=True)):
+                self.first.setdefault(u.variable.name, v.name)
+
     def _report_unmoved(self) -> None:
-        """Name outputs that react to a known whenever it changes in a run, and in initialisation mode to nothing."""
+        """Name outputs that react to a known right after initialisation mode, and in it to nothing."""
         if "value.stale" in self.context.remarked:
             return
         moving = {unknown for section, unknown, _ in self.reacted if section == "initial"}
-        smooth = {u.variable.name for u in self.context.bench.job.unknowns if u.variable.variability == "continuous"}
-        for (section, unknown, known), count in self.reacted.items():
-            first = self.tried.get(("initial", unknown, known), 0)
-            always = section == "output" and count == self.tried[section, unknown, known] >= _OFTEN <= first
-            if always and unknown in smooth - moving:
-                moving.add(unknown)
+        for unknown, known in self.first.items():
+            if ("initial", unknown, known) in self.tried and unknown not in moving:
                 text = f"`{unknown}` must follow `{known}` in initialisation mode too, but reacts to it only afterwards"
                 self.context.report("value.stale", text, unknown)
 
@@ -128,7 +136,7 @@ class Measured:
         listed |= self._listed_by_silence()
         movement = bench.movement
         states = {v.key for v in bench.job.state_variables or ()}
-        silent: list[str] = []
+        silent: list[ProbedVariable] = []
         for v in movement.values:
             told = v.name in heard or v.name not in often or v.key not in listed
             chosen = v.real or (v.causality == "parameter" and v.base not in ("String", "Binary"))
@@ -136,18 +144,12 @@ class Measured:
                 continue
             if trace is None or len(silent) >= _MOST_SILENT:
                 return
-            bench.movement = replace(movement, values={w: x for w, x in movement.values.items() if w is not v})
-            bench.held = frozenset({v.key})
-            try:
-                if self._runs_as(trace):
-                    silent.append(f"`{v.name}`")
-            except (StatusError, TerminatedError):
-                continue
-            finally:
-                bench.movement, bench.held = movement, frozenset()
-        if silent:
+            if self._is_silent(v, trace, [v.start or ()]):
+                silent.append(v)
+        names = [f"`{v.name}`" for v in silent if trace is None or self._is_silent(v, trace, distant(v))]
+        if names:
             text = "what unknowns depend on, by a list or for want of one, must have an effect, but none was seen of "
-            self.context.report("dependency.superfluous", f"{text}{', '.join(silent)}, at three points and in a run")
+            self.context.report("dependency.superfluous", f"{text}{', '.join(names)}, at three points and in a run")
 
     def _listed_by_silence(self) -> set[tuple[str, int]]:
         """The parameters of a small FMU whose initial unknowns list nothing: they depend on all of them then."""
@@ -156,6 +158,25 @@ class Measured:
         everything = any(u.section == "initial" and u.knowns is None for u in job.unknowns)
         whole = job.stop is not None and job.start + (job.steps + 0.5) * job.step >= job.stop  # what comes later counts
         return found if everything and whole and len(found) <= _FEW_LISTED else set()
+
+    def _is_silent(self, v: ProbedVariable, trace: list[list[Any]], values: Sequence[Values]) -> bool:
+        """Whether runs with other values of a variable are all as the driven one; what is refused has an effect."""
+        bench = self.context.bench
+        movement = bench.movement
+        bench.held = frozenset({v.key})
+        try:
+            for x in values:
+                bench.movement = replace(movement, values={**movement.values, v: x})
+                if not self._runs_as(trace):
+                    return False
+        except (StatusError, DiscardedError, TerminatedError):
+            return False
+        except ChildError:
+            bench.library.renew()
+            return False
+        finally:
+            bench.movement, bench.held = movement, frozenset()
+        return True
 
     def _runs_as(self, trace: list[list[Any]]) -> bool:
         """Whether a run is as another one, looked at piece by piece, for most that differ do so soon."""

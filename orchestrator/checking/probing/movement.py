@@ -14,6 +14,7 @@ from orchestrator.checking.probing.variables import ProbedVariable
 
 _SHARE = 0.1  # of the size of a start value: enough to be seen, too little to leave what a model is made for
 _WIDTH = 0.1  # of the range between min and max, at most
+_FAR = 100.0  # times a start value, or its size, is where limits act that it never reaches
 _BITS = {f"{sign}Int{bits}": (sign, bits) for sign in ("", "U") for bits in (8, 16, 32, 64)}
 _PATHS = ("/", "\\", ".", ":")  # a text with one of these may be the path of a file, or an address
 Values = tuple[Any, ...]
@@ -122,6 +123,18 @@ def _number(v: ProbedVariable, value: float, which: int, element: int) -> float 
     if found is not None and v.base == "Float32":
         found = struct.unpack("f", struct.pack("f", found))[0]
     return found
+
+
+def distant(v: ProbedVariable) -> list[Values]:
+    """Values far below and far above those of the file, within the limits of a floating point variable."""
+    starts = tuple(v.start or ())
+    if not v.real or not starts or not all(map(math.isfinite, starts)):
+        return []
+    low, high = _limits(v)
+    sizes = [max(abs(x), 10.0 * scale_of(v, x)) for x in starts]
+    below = tuple(x / _FAR if x else -_FAR * size for x, size in zip(starts, sizes, strict=True))
+    above = tuple(x + _FAR * size for x, size in zip(starts, sizes, strict=True))
+    return [tuple(min(max(x, low), high) for x in values) for values in (below, above)]
 
 
 def scale_of(v: ProbedVariable, value: float) -> float:

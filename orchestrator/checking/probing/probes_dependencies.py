@@ -138,7 +138,9 @@ def _in_initialisation(context: Context, measured: Measured, budget: Stopwatch) 
                 if which:
                     bench.place(driver, inputs=True)
                 _initial(measured, driver, unknowns, knowns, (movement, which), budget)
-        except StatusError:
+                driver.exit_initialisation()
+                _first(measured, driver, unknowns, knowns, (movement, which))
+        except (StatusError, TerminatedError):
             return  # not every tool takes values in initialisation mode again and again
 
 
@@ -158,3 +160,20 @@ def _initial(
             measured.look(unknowns, v, rows, change, "in initialisation mode")
         if budget.over:
             return
+
+
+def _first(
+    measured: Measured, driver: Driver, unknowns: Sequence[ProbedUnknown], knowns: Sequence[ProbedVariable],
+    at: tuple[Mapping[ProbedVariable, Values], int],
+) -> None:  # fmt: skip
+    """At the first communication point: the same inputs with the same values as in initialisation mode."""
+    movement, which = at
+    smooth = measured.context.bench.job.inputs() if measured.context.bench.excited else ()
+    followers = [u for u in unknowns if u.variable.causality == "output" and u.variable.variability == "continuous"]
+    for v in [v for v in knowns if v in smooth and v.variability == "continuous"] if followers else ():
+        base = movement[v] if which else (v.start or ())
+        other = moved(v, base, which)
+        if other is not None:
+            rows = _rows_beside(driver, v, base, other, [u.variable for u in followers])
+            if rows is not None:
+                measured.look_first(followers, v, rows)

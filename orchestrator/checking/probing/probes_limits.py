@@ -107,7 +107,8 @@ def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Value
         off += [v for v, a, b in _pairs(recorded, first, second) if not equal(v, b, a, _SAME) and v not in off]
     when = ""
     if not off:
-        off = [v for v, a, b in _pairs(watch, *early) if not equal(v, b, a, _SAME)]
+        # Local ones concern no host then, and tools compute them once until that is over.
+        off = [v for v, a, b in _pairs(watch, *early) if v.causality != "local" and not equal(v, b, a, _SAME)]
         when = " while that lasts"
     if off:
         names = ", ".join(f"`{v.name}`" for v in off[:_MOST_NAMED]) + (" and others" if off[_MOST_NAMED:] else "")
