@@ -94,25 +94,38 @@ def preview_log(path: Path, columns: Mapping[str, Column], header: int | None = 
         header: line of the names of a text, from 1; 0: there are none; None: found.
 
     Raises:
-        RecordError: the file is no log at all.
+        RecordError: the file is no log at all, and no text whose lines could be looked at.
     """
     lines = _raw_lines(path)
-    with open_source(path, header) as source:
-        try:
-            chosen, unclear = find_all_channels(source, columns, str(path), torque_needed=False)
-            problem = next(iter(unclear.values()), "")
-        except RecordError as error:
-            chosen, unclear, problem = {}, {}, str(error)
-        taken = [_take(name, chosen.get(name), columns.get(name, Column()), source) for name in COLUMNS]
-        notes: tuple[str, ...] = ()
-        if not problem:
-            taken, notes, problem = _convert(source, path, columns, taken)
-        used = {one.place: one.column for one in taken if one.place is not None}
-        return LogPreview(
-            path.name, source.dialect, source.rate, lines if header is not None or lines else (),
-            _names_line(lines, source, header), tuple(_channels(source, used)), tuple(taken), problem, notes,
-            tuple(unclear),
-        )  # fmt: skip
+    try:
+        with open_source(path, header) as source:
+            return _preview_source(source, path, columns, header, lines)
+    except RecordError as error:
+        if not any(lines) or not all(line.expandtabs().rstrip("\r").isprintable() for line in lines):
+            raise
+        absent = tuple(ColumnTaken(name, MEANINGS[name], None, "absent") for name in COLUMNS)
+        return LogPreview(path.name, "", None, lines, header or None, (), absent, str(error))
+
+
+def _preview_source(
+    source: RecordSource, path: Path, columns: Mapping[str, Column], header: int | None, lines: tuple[str, ...]
+) -> LogPreview:
+    """Return what a log holds whose table was found."""
+    try:
+        chosen, unclear = find_all_channels(source, columns, str(path), torque_needed=False)
+        problem = next(iter(unclear.values()), "")
+    except RecordError as error:
+        chosen, unclear, problem = {}, {}, str(error)
+    taken = [_take(name, chosen.get(name), columns.get(name, Column()), source) for name in COLUMNS]
+    notes: tuple[str, ...] = ()
+    if not problem:
+        taken, notes, problem = _convert(source, path, columns, taken)
+    used = {one.place: one.column for one in taken if one.place is not None}
+    return LogPreview(
+        path.name, source.dialect, source.rate, lines if header is not None or lines else (),
+        _names_line(lines, source, header), tuple(_channels(source, used)), tuple(taken), problem, notes,
+        tuple(unclear),
+    )  # fmt: skip
 
 
 def _raw_lines(path: Path) -> tuple[str, ...]:

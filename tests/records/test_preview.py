@@ -107,3 +107,20 @@ def test_columns_of_words_and_files_of_others(tmp_path: Path) -> None:
     (tmp_path / "picture.csv").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(3000))
     with pytest.raises(RecordError):
         preview_log(tmp_path / "picture.csv", {})
+
+
+def test_the_lines_of_a_text_are_shown_though_no_table_was_found(log: Path, tmp_path: Path) -> None:
+    seen = preview_log(log, {}, 1)
+    assert (seen.names_line, seen.lines[0], seen.channels) == (1, "Export of a drive", ())
+    assert [one.how for one in seen.columns] == ["absent"] * 4
+    assert "line 1, which `header` names, must have 4 names" in seen.problem
+    first, *rows = ["t;u;m", *(f"{n};1;{n % 7}" for n in range(300))]
+    twice = tmp_path / "twice.csv"
+    twice.write_text("\n".join([first, *rows[:20], "--- trigger ---", first, *rows]) + "\n")
+    seen = preview_log(twice, {})
+    assert (seen.lines[1], seen.channels) == ("0;1;0", ())
+    assert "rows of numbers stand above the names" in seen.problem
+    assert [channel.name for channel in preview_log(twice, {}, 23).channels] == ["t", "u", "m"]
+    (tmp_path / "empty.csv").write_text("\n")
+    with pytest.raises(RecordError, match="empty"):
+        preview_log(tmp_path / "empty.csv", {})

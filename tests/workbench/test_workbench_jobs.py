@@ -90,7 +90,10 @@ def test_bad_input_is_told_in_the_words_of_the_command(served) -> None:
     assert len(job["messages"]) == 1
     assert job["messages"][0].startswith("error: files/words.csv")
     status, said = served.ask("POST", "columns", {"file": "files/words.csv"})
-    assert (status, "words.csv" in said["error"]) == (422, True)
+    assert (status, "words.csv" in said["problem"], said["lines"][0]) == (200, True, "these,are")
+    served.ask("PUT", "upload/picture.csv", b"\x89PNG\r\n\x1a\n" + bytes(3000))
+    status, said = served.ask("POST", "columns", {"file": "files/picture.csv"})
+    assert (status, "picture.csv" in said["error"]) == (422, True)
 
 
 @pytest.mark.skipif(not have_compiler(), reason="the FMUs are built with a C compiler")
