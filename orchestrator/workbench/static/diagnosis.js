@@ -2,7 +2,7 @@
 import { check, digits, fill, make, plain, withInterval } from "./dom.js";
 import { inputs, needLog, reading, trustTag } from "./gap.js";
 import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
-import { choices, choose, jobOf, start } from "./state.js";
+import { choices, choose, jobOf, modelOfLog, start } from "./state.js";
 
 const SIZES = { alpha: "half-gap" }, SIGNALS = { theta_m: "motor angle", theta_l: "load angle" };
 const GRADES = { certain: "good", likely: "good", possible: "warn" };
@@ -13,7 +13,7 @@ const headline = (found) => plain(found.summary?.[0]?.split(". ").slice(1).join(
 export function build(panel, go) {
   const said = message(), read = reading();
   let test = "", settings = "";
-  const options = () => ({ model: choices.model, test, settings, ...read.options() });
+  const options = async () => ({ model: await modelOfLog(), test, settings, ...read.options() });
   const view = jobView("diagnosis", (job) => {
     const place = make("div", {});
     show(job, place).catch((error) => said.say(error.message));
@@ -94,7 +94,7 @@ export function build(panel, go) {
       fileChoice("Settings", isModel, () => settings, (file) => { settings = file; choose({}); }, "the usual ones")),
     read.element, said.element,
     make("div", { class: "row" },
-      action("Diagnose", said, async () => { needLog(); view.show(await start("diagnose", [choices.log], options())); }, "main"),
+      action("Diagnose", said, async () => { needLog(); view.show(await start("diagnose", [choices.log], await options())); }, "main"),
       action("Go on to the model", said, () => go("model"))),
     view.element);
 }

@@ -2,11 +2,20 @@
 import { post } from "./api.js";
 import { check, digits, field, make, numberIn, numberInput, plain, withInterval } from "./dom.js";
 import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
-import { choices, choose, chooseLog, start } from "./state.js";
+import { choices, choose, chooseLog, draft, modelOfLog, start, watch } from "./state.js";
 
-export const inputs = () => make("div", { class: "row" },
-  fileChoice("Log", isLog, () => choices.log, chooseLog),
-  fileChoice("Model file", isModel, () => choices.model, (model) => choose({ model }), "the default machine"));
+export function inputs() {
+  const note = make("p", { class: "note", role: "status" });
+  const tell = () => {
+    note.textContent = draft.names.length ? `Changed in the tab Machine and not saved: ${draft.names.join(", ")}`
+      : choices.log && !choices.model ? "Without a model file the machine is the default one; “Look at this log” in the tab Log drafts one from the record." : "";
+  };
+  watch(tell);
+  tell();
+  return make("div", {}, make("div", { class: "row" },
+    fileChoice("Log", isLog, () => choices.log, chooseLog),
+    fileChoice("Model file", isModel, () => choices.model, (model) => choose({ model }), "the default machine")), note);
+}
 
 // Options that all commands have for reading a log; `reading()` gives what the user has filled in.
 export function reading() {
@@ -39,7 +48,7 @@ export function answerOf(found) {
 export function build(panel) {
   const said = message(), cost = make("p", { role: "status" });
   const read = reading(), motorOnly = check("leave the load encoder out", false, () => {});
-  const options = () => ({ model: choices.model, motor_only: motorOnly.querySelector("input").checked, ...read.options() });
+  const options = async () => ({ model: await modelOfLog(), motor_only: motorOnly.querySelector("input").checked, ...read.options() });
   const view = jobView("gap", (job) => {
     const place = make("div", {});
     resultOf(job).then((found) => {
@@ -59,7 +68,7 @@ export function build(panel) {
     needLog();
     cost.textContent = "Working out what it takes …";
     try {
-      const given = Object.fromEntries(Object.entries(options()).filter(([, value]) => value !== null && value !== "" && value !== false));
+      const given = Object.fromEntries(Object.entries(await options()).filter(([, value]) => value !== null && value !== "" && value !== false));
       cost.textContent = (await post("cost", { inputs: [choices.log], options: given })).cost;
     } catch (error) {
       cost.textContent = "";
@@ -78,6 +87,6 @@ export function build(panel) {
   panel.append(inputs(), make("div", { class: "row" }, motorOnly), read.element, said.element,
     make("div", { class: "row" },
       action("What will it cost?", said, price),
-      action("Estimate the gap", said, async () => { needLog(); view.show(await start("estimate", [choices.log], options())); }, "main")),
+      action("Estimate the gap", said, async () => { needLog(); view.show(await start("estimate", [choices.log], await options())); }, "main")),
     cost, proposal, view.element);
 }

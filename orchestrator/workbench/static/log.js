@@ -1,7 +1,7 @@
 import { post } from "./api.js";
 import { choice, digits, field, fill, make, numberInput, plain } from "./dom.js";
 import { action, dropZone, fileChoice, isLog, jobView, message, resultOf } from "./parts.js";
-import { choices, choose, chooseLog, jobOf, start, watch } from "./state.js";
+import { choices, choose, chooseLog, jobOf, noteColumns, start, watch } from "./state.js";
 
 const TITLES = { time: "Time", u: "Torque asked for", theta_m: "Motor angle", theta_l: "Load angle" };
 const UNITS = {
@@ -94,7 +94,9 @@ export function build(panel, go) {
     columns[column] = entry;
     if (!Object.keys(entry).length) delete columns[column];
     choose({ columns });
-    look();
+    const kept = !label && came.taken && !came.columns[came.taken]?.name;  // taken by its own name
+    const looking = look(), mine = turn;
+    looking.then(() => kept && mine === turn && said.say(`It is recognised by its name: give “${TITLES[came.taken]}” another channel; the tab Gap can leave the load encoder out`));
   }
 
   // A channel whose name appears twice is called by its number.
@@ -113,17 +115,17 @@ export function build(panel, go) {
     const told = adviceOf(seen.problem), wrong = told?.column === one.column && told.key === "unit";
     const unit = make("input", { value: stated.unit ?? "", placeholder: one.unit || "SI", list, "data-key": `unit-${one.column}`,
       onchange: () => state(one.column, { unit: unit.value.trim() }) });
-    const needed = new Set(one.needs);
+    const needed = new Set(one.column === "time" && one.place === null ? [...one.needs, "rate"] : one.needs);
     if (told?.column === one.column) needed.add(told.key);
     const numbers = OF_COLUMN[one.column].map((key) => numberField(one.column, key, stated[key], needed.has(key)));
     const asked = numbers.filter(({ open }) => open).map(({ element }) => element);
     const rest = numbers.filter(({ open }) => !open).map(({ element }) => element);
-    const tag = one.how === "absent" ? ["not found", one.column === "theta_l" ? "warn" : "bad"]
+    const tag = one.how === "absent" && one.least === null ? ["not found", one.column === "theta_l" ? "warn" : "bad"]
       : wrong ? ["unit not known", "bad"] : one.needs.length ? ["needs a number", "bad"] : one.how === "named" ? ["named", "good"] : ["recognised", "good"];
-    const range = one.least === null ? "" : `${digits(one.least)} to ${digits(one.most)} ${one.si}`;
+    const range = rangeOf(one);
     return make("div", { class: "card" },
       make("h3", {}, TITLES[one.column], " ", make("span", { class: `tag ${tag[1]}` }, tag[0])),
-      make("p", { class: "note" }, one.place === null ? one.meaning : `${seen.channels[one.place].label}${range ? `: ${range}` : ""}`),
+      make("p", { class: "note" }, one.place === null && !range ? one.meaning : `${labelOf(seen, one)}${range ? `: ${range}` : ""}`),
       field("Channel", pickChannel), field("Unit in the file", unit),
       make("datalist", { id: list }, UNITS[one.column].map((text) => make("option", { value: text }))),
       asked, make("details", {}, make("summary", {}, "More"), rest));
@@ -137,6 +139,11 @@ export function build(panel, go) {
   function draw() {
     const count = Math.max(0, ...seen.channels.map((channel) => channel.rows.length));
     const unused = seen.channels.filter((channel) => !channel.taken_as).map((channel) => channel.label);
+    if (!seen.channels.length) {  // no table was found, but lines to look at
+      fill(body, make("p", { class: "message", role: "alert" }, `${plain(seen.problem)}. The line of the names can be chosen below.`));
+      fill(rows, lines());
+      return;
+    }
     fill(body,
       make("p", { class: "note" }, plain(seen.dialect)),
       seen.problem ? make("p", { class: "message", role: "alert" }, problemOf(seen)) : make("p", {}, make("span", { class: "tag good" }, "can be read")),
@@ -177,13 +184,15 @@ export function build(panel, go) {
 
   function lines() {
     const set = (line) => { seen = came = null; choose({ header: line, columns: {} }); look(); };
-    return make("details", { open: seen.names_line === null || choices.header !== null },
+    const other = numberInput({ value: choices.header || "", placeholder: "found", "data-key": "header" }, set, (line) => Number.isInteger(line) && line >= 0);
+    return make("details", { open: seen.names_line === null || choices.header !== null || !seen.channels.length },
       make("summary", {}, seen.names_line ? `The names are in line ${seen.names_line}; choose another line` : "Which line holds the names?"),
       make("fieldset", { class: "raw" }, make("legend", { class: "visually-hidden" }, "Line of the names"),
         make("label", {}, make("input", { type: "radio", name: "header", checked: choices.header === 0, onchange: () => set(0) }), "none of them"),
         seen.lines.map((text, n) => make("label", { class: seen.names_line === n + 1 ? "names" : "" },
           make("input", { type: "radio", name: "header", checked: seen.names_line === n + 1, onchange: () => set(n + 1) }),
-          make("span", { class: "at" }, String(n + 1)), text))));
+          make("span", { class: "at" }, String(n + 1)), text))),
+      field("The names are in line", other));
   }
 
   async function inspect() {
@@ -193,7 +202,9 @@ export function build(panel, go) {
       const model = await post("models", { name: `${stem}-columns.toml`, columns: choices.columns, ...(choices.header === null ? {} : { header: choices.header }) });
       options.model = model.file;
     }
-    view.show(await start("inspect", [choices.log], options));
+    const name = await start("inspect", [choices.log], options);
+    noteColumns(`results/${name}/model.toml`);
+    view.show(name);
   }
 
   panel.append(
@@ -217,12 +228,17 @@ export function rivalsOf(line) {
   return column in TITLES ? { column, names: [first, second] } : null;
 }
 
+// What a column is taken from, and its range.
+const labelOf = (seen, one) => (one.place !== null ? seen.channels[one.place].label : one.least === null ? "nothing" : "the rows' number");
+const rangeOf = (one) => (one.least === null ? "" : `${digits(one.least)} to ${digits(one.most)} ${one.si}`);
+
 function problemOf(seen) {
   const rivals = rivalsOf(seen.problem);
   const needs = seen.columns.flatMap((one) => one.needs.map((key) => `${TITLES[one.column]}: ${NUMBERS[key] ?? key}`));
   const missing = seen.columns.filter((one) => one.how === "absent" && seen.missing.includes(one.column));
+  const orRate = (one) => (one.column === "time" ? `, or ${NUMBERS.rate}` : "");
   const alike = (one) => (one.column === rivals?.column ? ` (${rivals.names.map((name) => `“${name}”`).join(" and ")} both look like it)` : "");
-  const asked = [...missing.map((one) => `${TITLES[one.column]}: the channel that holds it${alike(one)}`), ...needs];
+  const asked = [...missing.map((one) => `${TITLES[one.column]}: the channel that holds it${alike(one)}${orRate(one)}`), ...needs];
   return asked.length ? `Still needed. ${asked.join("; ")}` : plain(seen.problem);
 }
 
@@ -230,9 +246,7 @@ function problemOf(seen) {
 function differences(before, after) {
   const said = after.columns.flatMap((now, n) => {
     const was = before.columns[n];
-    const label = (seen, one) => (one.place === null ? "nothing" : seen.channels[one.place].label);
-    const range = (one) => (one.least === null ? "" : ` (${digits(one.least)} to ${digits(one.most)} ${one.si})`);
-    const [old, fresh] = [label(before, was) + range(was), label(after, now) + range(now)];
+    const [old, fresh] = [[before, was], [after, now]].map(([seen, one]) => labelOf(seen, one) + (rangeOf(one) && ` (${rangeOf(one)})`));
     return old === fresh ? [] : [`${TITLES[now.column]}: ${old} → ${fresh}`];
   });
   return said.length ? `Changed. ${said.join("; ")}` : "";

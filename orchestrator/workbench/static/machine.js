@@ -1,8 +1,9 @@
 import { fileAddress, get, post } from "./api.js";
 import { digits, field, fill, make, numberInput } from "./dom.js";
 import { action, dropZone, fileChoice, isModel, message } from "./parts.js";
-import { choices, choose, watch } from "./state.js";
+import { choices, choose, draft, watch } from "./state.js";
 
+const ENCODERS = { theta_m: "motor encoder", theta_l: "load encoder" };
 const TAGS = { assumed: "warn", "from the record": "", yours: "good", "the FMU's own": "" };
 
 // The model file as fields: every value with unit, uncertainty and where it is from.
@@ -13,6 +14,7 @@ export function build(panel, go) {
   async function load() {
     if (shown === choices.model) return;
     const asked = shown = choices.model;
+    draft.names = [];
     said.say("");
     fill(body, make("p", { class: "note", role: "status" }, "Reading …"));  // no field of the model before is typed into
     try {
@@ -31,7 +33,8 @@ export function build(panel, go) {
     const named = new Set(model.effects.flatMap((effect) => effect.parameters));
     const state = make("p", { class: "note", role: "status" });
     const tell = () => {
-      const names = Object.keys(changed);
+      const names = draft.names = [...Object.keys(changed), ...Object.keys(ENCODERS).filter((name) => JSON.stringify(encoders[name]) !== JSON.stringify(model.encoders[name])).map((name) => ENCODERS[name])];
+      choose({});
       state.textContent = names.length ? `Changed and not saved: ${names.join(", ")}` : "";
     };
 
@@ -67,6 +70,7 @@ export function build(panel, go) {
           if (number === null) delete encoders[name][key];
           else encoders[name][key] = number;
           if (key === "counts_per_rev") delete encoders[name].resolution;
+          tell();
         });
         return field(key === "noise" ? "noise [rad], before rounding" : "counts per revolution", input);
       }),
@@ -88,7 +92,7 @@ export function build(panel, go) {
           const stem = (choices.model || "machine.toml").split("/").at(-1).replace(/(-yours)?(-\d+)?\.toml$/, "");
           const made = await post("models", { base: choices.model || null, name: `${stem}-yours.toml`, parameters: changed, encoders });
           shown = null;
-          choose({ model: made.file });
+          choose({ model: made.file, saidIn: { ...choices.saidIn, [made.file]: choices.saidIn?.[choices.model] } });
         }, "main"),
         action("Go on to the gap", said, () => go("gap"))));
     tell();

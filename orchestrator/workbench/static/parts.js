@@ -108,7 +108,8 @@ function finished(job) {
       make("span", { class: "note" }, job.files.length > 1 ? "" : job.state === "stopped" ? "no results were left" : "")),
     words.map((text) => make("p", { class: job.state === "failed" ? "message" : "message calm" }, plain(text.replace(/^error: /, "").replaceAll("Ctrl-C", "Stop")))),
     make("code", {}, job.line),
-    make("ul", { class: "files" }, job.files.map((name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name.split("/").at(-1) }, name)))));
+    make("ul", { class: "files" }, job.files.map((name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`),
+      ...(name.endsWith(".html") ? { target: "_blank", rel: "noopener" } : { download: name.split("/").at(-1) }) }, name)))));
 }
 
 function reportOf(job) {
