@@ -16,7 +16,6 @@ import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +95,8 @@ def _ensure(recipe: Recipe, directory: Path, force: bool = False) -> Path:
 
 def python_toolchain(toolchain: Toolchain) -> tuple[str, ...]:
     """Return what FMUs that run Python are made with."""
+    from importlib.metadata import version  # native FMUs do without
+
     return version("pythonfmu"), platform.python_version(), sysconfig.get_platform(), toolchain.identity
 
 

@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from orchestrator.errors import FmuError
@@ -77,15 +76,15 @@ class Compiler:
 @cache
 def find_compiler(here: bool = False) -> Compiler | None:
     """Return zig if it is installed, else the local C compiler, else ``None``."""
-    local = [t for t in TARGETS if t.system == sys.platform and platform.machine().lower() in t.machines]
-    zig = _zig(tuple(local) if here else TARGETS)
-    cc = _local(tuple(local))
-    return (cc or zig) if here else (zig or cc)
+    local = tuple(t for t in TARGETS if t.system == sys.platform and platform.machine().lower() in t.machines)
+    return (_local(local) or _zig(local)) if here else (_zig(TARGETS) or _local(local))
 
 
 def _zig(targets: tuple[Target, ...]) -> Compiler | None:
     if importlib.util.find_spec("ziglang") is None or not targets:
         return None
+    from importlib.metadata import PackageNotFoundError, version  # many a command needs neither
+
     try:
         number = version("ziglang")
     except PackageNotFoundError:

@@ -22,7 +22,7 @@ from orchestrator.building.build import ensure_built
 from orchestrator.building.compilers import find_compiler
 from orchestrator.building.native_build import ensure_native
 from orchestrator.building.native_sources import slave_class
-from orchestrator.building.sources import recipe_of
+from orchestrator.building.sources import recipe_of, recipes_of
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import make_slave
@@ -50,7 +50,8 @@ def ensure_fastest(names: Sequence[str], meanwhile: Callable[[], object] | None 
         with contextlib.suppress(FmuError):  # whatever a compiler lacks, the Python FMUs are there
             folder = cache_directory("native")
             with ThreadPoolExecutor(len(names)) as pool:  # each waits for a compiler most of its time
-                built = pool.map(partial(ensure_native, directory=folder, here=True), [[name] for name in names])
+                each = [[recipe.name] for recipe in recipes_of(names)]  # the catalogue is read before they begin
+                built = pool.map(partial(ensure_native, directory=folder, here=True), each)
                 if meanwhile is not None:
                     pool.submit(meanwhile)  # once a thread is free: all are translated by then
             paths = {name: path for found in built for name, path in found.items()}
