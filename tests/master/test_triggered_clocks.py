@@ -22,7 +22,7 @@ from tests.support.clocked_fmus import build_clocked_fmus
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
 
 RECORD = ("plant.x", "controller.u", "supervisor.a")
-STOP = 6.0
+STOP = 4.0
 
 
 @pytest.fixture(scope="module")
