@@ -44,7 +44,7 @@ def test_what_is_left_and_constant_follows_no_signal() -> None:
         return Dependence("twist", "shaft", "rad", "N.m", (), (), (), comparison, 0.26, formula).words
 
     assert words("0.04428") == "26 % of it is a constant, 0.04428 N.m"
-    assert words("0.0443 s") == "26 % of it follows the twist, like 0.0443 s with s in rad"
+    assert words("0.0443 x") == "26 % of it follows the twist, like 0.0443 x with x in rad"
     assert words("") == "26 % of it follows the twist"
 
 

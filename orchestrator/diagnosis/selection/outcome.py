@@ -196,7 +196,7 @@ class Dependence:
     def words(self) -> str:
         """Return the dependence as part of a sentence."""
         share = f"{100.0 * self.share:.0f} % of it"
-        if self.formula and "s" not in self.formula:
+        if self.formula and "x" not in self.formula:
             return f"{share} is a constant, {self.formula} {self.unit}"
         text = f"{share} follows the {self.argument}"
-        return text + (f", like {self.formula} with s in {self.argument_unit}" if self.formula else "")
+        return text + (f", like {self.formula} with x in {self.argument_unit}" if self.formula else "")

@@ -112,11 +112,11 @@ def _whiten_hats(problem: FitProblem, argument: LawArgument, knots: Array) -> Ar
     return np.column_stack(columns)
 
 
-def simple_terms(s: Array) -> dict[str, Array]:
-    """Return the simple terms (n,) of a formula at the arguments ``s`` (n,), by their names."""
+def simple_terms(x: Array) -> dict[str, Array]:
+    """Return the simple terms (n,) of a formula at the arguments ``x`` (n,), by their names: "s" would be a second."""
     return {
-        "1": np.ones_like(s), "s": s, "sign(s)": np.sign(s), "|s|": np.abs(s), "s |s|": s * np.abs(s), "s^2": s**2,
-        "s^3": s**3, "sin(s)": np.sin(s), "cos(s)": np.cos(s),
+        "1": np.ones_like(x), "x": x, "sign(x)": np.sign(x), "|x|": np.abs(x), "x |x|": x * np.abs(x), "x^2": x**2,
+        "x^3": x**3, "sin(x)": np.sin(x), "cos(x)": np.cos(x),
     }  # fmt: skip
 
 
