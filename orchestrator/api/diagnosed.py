@@ -191,4 +191,8 @@ def _torque_table(diagnosis: DiagnosisResult) -> Iterator[Block]:
     torque = [(test.source, test.torque) for test in tests if test.torque]
     if torque:
         rows = [[source, *(f"{100.0 * share:.2f} %" for share in shares)] for source, shares in torque]
-        yield table("Torque that is left of all of it (rms)", ("record", "as given", "re-fitted", "with effects"), rows)
+        yield table(
+            "Torque that is left on test data (rms), of all of it",
+            ("record", "as given", "re-fitted", "with effects"),
+            rows,
+        )

@@ -59,8 +59,8 @@ def judge_trust(
     if record.inertia_is_off(settings.selection.prior_deviations):
         asked = f"{record.inertia:.2g}" if record.shows_inertia else f"at most {record.highest_inertia:.2g}"
         red.append(
-            f"the record alone asks for {asked} times the inertia of the model file: check the inertias, "
-            "the units and the scale of the torque"
+            f"without the ranges of the model file, the record asks for {asked} times its inertia: check the "
+            "inertias, the units and the scale of the torque"
         )
     for one in test:
         if one.is_worse(settings.report.worse, settings.report.of_noise):
