@@ -17,6 +17,7 @@ from orchestrator.commands._trust import note_missing_walls
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.output import stage_output
+from orchestrator.shared.trust import Level
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,9 +89,12 @@ def run(args: argparse.Namespace) -> int:
         found.write(folder, args.out, given, args.pictures)
         fmu = args.out / found.fmu_name
     print_blocks([*what_was_read(records if other is None else [*records, other]), *found.blocks()])
+    use = "for any FMI 2.0 tool: variables as before, corrected values as start values"
+    if found.diagnosis.trust.level is Level.RED:
+        use = "which must not be used as it stands"
     print_blocks(
         [
-            f"Corrected FMU: {fmu}, for any FMI 2.0 tool: variables as before, corrected values as start values",
+            f"Corrected FMU: {fmu}, {use}",
             f"Its model file: {args.out / 'corrected.toml'}; `diagnose NEW.csv --no-search --model` with it judges "
             "a new record",
             f"Written to {args.out}: report.html, diagnose.json, diagnose.csv",

@@ -54,6 +54,17 @@ def test_json_keeps_the_contract(result) -> None:
 
 
 @pytest.mark.slow(shares="result")
+def test_a_model_of_no_trust_is_not_offered_for_use(result, capsys) -> None:
+    out, _ = result
+    record = out.parent / "loose gear.csv"
+    assert main(["diagnose", str(record), "--no-search", "--out", str(out.parent / "red")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Trust: red" in said
+    assert "Drivetrain_loose_gear.fmu, which must not be used as it stands" in said
+    assert "for any FMI 2.0 tool" not in said
+
+
+@pytest.mark.slow(shares="result")
 def test_corrected_fmu_has_the_corrected_start_values(result) -> None:
     out, document = result
     path = Path(document["results"]["model"])

@@ -10,6 +10,12 @@ from tests.support.page_results import INSPECT
 from tests.support.reports import sections
 
 
+def next_step(report):
+    """Return the last line of what a page says is to be done."""
+    (step,) = (text.paragraphs[-1] for text in sections(report, Text) if text.title == "What to do next")
+    return step
+
+
 def estimate(value):
     return {"value": value, "standard_error": 0.01 * value, "unit": "N.m"}
 
@@ -115,6 +121,11 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     assert worth.note.endswith("The corrected model does worse than re-fitted parameters.")
     first = [section.title for section in report.sections if not isinstance(section, Fold)]
     assert first == ["What is missing", worth.title, "What to do next"]
+    assert "for any FMI 2.0 tool" in next_step(report)
+    write_result(tmp_path, "diagnose", {}, None, results | {"trust": {"level": "red", "reasons": ["it is worse"]}})
+    assert next_step(report_from_directory(tmp_path)) == (
+        "The corrected model, Corrected.fmu, must not be used as it stands."
+    )
     (bars,) = sections(report, Bars)
     assert [b.length for b in bars.items] == [1.0, 0.5, pytest.approx(0.01)]
     assert bars.items[2].text == "1.11 times noise"

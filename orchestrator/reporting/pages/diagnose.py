@@ -111,8 +111,11 @@ def _on_the_corrected_model(results: DiagnoseFound) -> str:
     """Return how the corrected model is used; empty where there is none."""
     if not results.model:
         return ""
+    name = Path(results.model).name
+    if results.trust is not None and results.trust.level == "red":
+        return f"The corrected model, {name}, must not be used as it stands."
     return (
-        f"The corrected model is {Path(results.model).name}: for any FMI 2.0 tool, variables as in the given model, "
+        f"The corrected model is {name}: for any FMI 2.0 tool, variables as in the given model, "
         "corrected values as start values. corrected.toml beside it is its model file: a diagnosis with it, without "
         "search, judges a new record."
     )
@@ -210,7 +213,7 @@ def _residual_sections(remaining: RemainingFound) -> list[Section]:
         rows = tuple(
             (d.site, d.argument, percent(d.share), percent(d.gain), d.t, d.formula or None) for d in remaining.follows
         )
-        note = "Curves over one signal. They are no effects and no part of the corrected model."
+        note = "Curves over one signal, x. They are no effects and no part of the corrected model."
         made.append(ReportTable("What the rest follows", tuple(TableColumn(c, "", 3) for c in columns), rows, note))
     return made
 

@@ -42,7 +42,7 @@ def evidence_table(effects: Sequence[EffectFound], of: str = "missing torque") -
         "effect", "grade", TAKES, "over its uncertainty", f"explains of the {of} [%]",
         "of the misfit on test data [%]", "in the corrected model", "not told from", "rules that lower the grade",
     )  # fmt: skip
-    note = "The corrected model has the effects that are likely before the test data are opened."
+    note = "The corrected model has the effects that are certain or likely, and those that were asked for."
     return [ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons, note)]
 
 
