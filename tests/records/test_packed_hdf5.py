@@ -135,8 +135,17 @@ def test_attributes_that_say_nothing_are_refused(
 
 def test_attributes_of_other_conventions_are_named(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
     path = tmp_path / "log.h5"
-    _write(path, columns, {"theta_m": {"gain": 2.0}, "u": {"Offset": 1.0, "note": h5py.Empty("S1")}})
+    _write(
+        path, columns,
+        {
+            "theta_m": {"gain": 2.0}, "u": {"Offset": 1.0, "note": h5py.Empty("S1")},
+            "theta_l": {"FillValue": -9999.0, "no_data": -1.0, "missing_value": -2.0, "FIELD_0_FILL": 0.0},
+        },
+    )  # fmt: skip
     notes = read_record(path).notes[0]
+    assert "`theta_l` attribute `FillValue` not used, attribute `no_data` not used" in notes
+    assert "`missing_value`" not in notes
+    assert "FIELD" not in notes
     assert "`theta_m` attribute `gain` not used" in notes
     assert "`u` attribute `Offset` not used" in notes
 

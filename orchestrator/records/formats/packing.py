@@ -17,6 +17,9 @@ Array = NDArray[Any]
 
 # Words in attributes of other conventions, which mean one thing here and another there.
 UNKNOWN = frozenset(["scale", "scaling", "factor", "gain", "slope", "offset", "intercept", "multiplier", "lsb"])
+# Other spellings of what marks a missing value, in small letters without underscores.
+MARKS = frozenset(["fillvalue", "missingvalue", "missing", "nodata", "nodatavalue", "invalidvalue"])
+KNOWN = ("scale_factor", "add_offset", "_FillValue", "missing_value")
 
 
 def unpack(values: Array, attributes: Mapping[str, Any], fill: Any = None) -> tuple[Array, str]:
@@ -52,7 +55,10 @@ def unpack(values: Array, attributes: Mapping[str, Any], fill: Any = None) -> tu
         out = out.astype(float)
         out[missing] = np.nan
         said.append(f"{np.count_nonzero(missing)} missing")
-    others = [key for key in attributes if key not in ("scale_factor", "add_offset") and UNKNOWN & set(words_of(key))]
+    others = [
+        key for key in attributes
+        if key not in KNOWN and (UNKNOWN & set(words_of(key)) or key.lower().replace("_", "") in MARKS)
+    ]  # fmt: skip
     said += [f"attribute `{key}` not used" for key in others]
     return out, ", ".join(said)
 
