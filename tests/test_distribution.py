@@ -23,7 +23,8 @@ print(abs(pair.estimate.alpha - 0.02) < 1e-6, oc.__version__)
 
 
 def run(words, folder):
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}  # or it finds this tree
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout
 
