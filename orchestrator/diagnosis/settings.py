@@ -107,9 +107,6 @@ class GradeSettings(Settings, frozen=True):
     test_t: Annotated[
         float, setting("paired errors by which the torque of test data speaks for an effect or against it: asked once")
     ] = 2.0
-    over_inertia: Annotated[
-        float, setting("torque over that of a wrong inertia from which an effect stands whatever the inertia is")
-    ] = 3.0
     inertia_error: Annotated[
         float, share("relative error of the inertia that the record must reach for a certain name")
     ] = 0.35

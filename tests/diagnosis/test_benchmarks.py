@@ -131,7 +131,7 @@ def test_the_ablation_counts_the_names_whose_grade_would_rise_without_a_rule() -
         row("gravity_load@load", "sure size", "inertia seen"),
         row("backlash@shaft", "sure size"),
         row("backlash@shaft", "sure size", "size"),
-        row("backlash@shaft", "same machine"),
+        row("backlash@shaft", "enough share"),
     ]
     assert count_rule("sure size", rows) == RuleCount("sure size", records=2, wrong=1, right=1)
     assert count_rule("size", rows) == RuleCount("size", records=1, wrong=1, right=0)

@@ -22,7 +22,6 @@ BROKEN = {
     "sure size": ({"size_t": 3.5}, {}),
     "size": ({"size_t": 2.0}, {}),
     "inertia seen": ({}, {"inertia_error": 0.5}),
-    "same machine": ({"torque": 0.5}, {"inertia": 3.0, "inertia_torque": 0.1}),
     "alone of its kind": ({"foreign_family": True}, {}),
     "possible size": ({"possible": False}, {}),
     "confirmed": ({"motion_share": 0.02}, {}),
@@ -88,10 +87,3 @@ def test_the_torque_of_test_data_confirms_what_free_runs_lose(torque, lowered):
 def test_the_torque_decides_where_free_runs_drift(motion, torque, lowered):
     effect = replace(EFFECT, motion_share=motion, test_torque=torque, runs_hold=False)
     assert set(grade_effect(effect, RECORD, SETTINGS)[1]) == lowered
-
-
-def test_what_is_larger_than_the_torque_of_a_wrong_inertia_stands():
-    other = replace(RECORD, inertia=0.05, inertia_torque=0.01)
-    assert other.inertia_is_off(SETTINGS.selection.prior_deviations)
-    for torque, lowered in ((0.05, ("same machine",)), (1.0, ())):
-        assert grade_effect(replace(EFFECT, torque=torque), other, SETTINGS)[1] == lowered

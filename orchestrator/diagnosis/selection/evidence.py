@@ -34,12 +34,11 @@ def record_evidence(result: SearchResult, dependences: Sequence[Dependence]) -> 
     """Return what the record says of the final model as a whole; ``dependences`` are of what it leaves."""
     problem = result.problem
     left = torque_shares(problem, result.final.point)
-    inertia, error, spread, asked = inertia_of_record(problem, result.final)
+    inertia, error, spread = inertia_of_record(problem, result.final)
     if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
         spread = np.inf
-    torque = missing_torque(problem, result.final.point, asked)
     follows = max((curve.comparison.gain for curve in dependences), default=0.0)
-    return RecordEvidence(float(left.max()), inertia, error, spread, torque, follows)
+    return RecordEvidence(float(left.max()), inertia, error, spread, follows)
 
 
 def effect_evidence(result: SearchResult) -> list[EffectEvidence]:
@@ -69,9 +68,7 @@ def _effect_evidence(result: SearchResult, label: str, base: float, remains: flo
         label, effect.kind, max(leaving.comparison.t, entry.comparison.t),
         max(leaving.comparison.gain, entry.comparison.gain), min(max(without - remains, before - after) / base, 1.0),
         size_over_error(problem, final, label), family, len(kinds) > 1,
-        problem.is_possible(label, final.point),
-        torque=missing_torque(problem, final.point.without_effects([label]), final.point), asked=label in result.asked,
-        left_where_it_acts=left_there,
+        problem.is_possible(label, final.point), asked=label in result.asked, left_where_it_acts=left_there,
     )  # fmt: skip
 
 
@@ -118,18 +115,13 @@ def _torques_within_band(problem: FitProblem, point: ModelPoint, label: str) -> 
         yield left, left - without, plain.active
 
 
-def missing_torque(problem: FitProblem, point: ModelPoint, other: ModelPoint | None = None) -> float:
-    """Return the power of what a model leaves within the band, white, in shares of the nominal one's, summed.
-
-    Args:
-        other: a model; what the first one leaves more than it is then meant.
-    """
+def missing_torque(problem: FitProblem, point: ModelPoint) -> float:
+    """Return the power of what a model leaves within the band, white, in shares of the nominal one's, summed."""
     total = 0.0
-    points = (problem.record_points(one) for one in (point, problem.start, other or point))
+    points = (problem.record_points(one) for one in (point, problem.start))
     for model, *seen in zip(problem.models, *points, strict=True):
         plain = band_only(model, problem.settings)
-        first, nominal, second = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen))
-        left = first - second if other else first
+        left, nominal = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen))
         total += float(np.sum(np.mean(left**2, axis=1) / (np.mean(nominal**2, axis=1) + 1e-300)))
     return total
 
@@ -161,19 +153,18 @@ def size_over_error(problem: FitProblem, fitted: FittedModel, label: str) -> flo
     return float(np.sqrt(max(square, 0.0) / len(places)))
 
 
-def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float, ModelPoint]:
+def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float]:
     """Return the inertia that the record asks for by itself, in units of the nominal one, its error and its spread.
 
     The priors are off, and torque is regressed on motion: an inertia far from the model file's tells that the record
     is of another machine.
 
     Returns:
-        Inertia, standard error, spread in the model file, (1, 0, 0) of a model without one; the point with it.
+        Inertia, standard error, spread in the model file; (1, 0, 0) of a model without one.
     """
-    shares, point = problem.models[0].inertia_shares(), fitted.point
+    shares = problem.models[0].inertia_shares()
     if not shares:
-        return 1.0, 0.0, 0.0, point
-    parameters = list(point.parameters)
+        return 1.0, 0.0, 0.0
     freed = replace(problem, models=tuple(model.without_priors(FREE_SPREAD) for model in problem.models))
     free = fit_model(freed, fitted.point, 3)
     weights, total = np.zeros(len(free.coordinates)), 0.0
@@ -182,11 +173,11 @@ def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, 
         if n is None:
             total += share
             continue
-        weights[n], parameters[n] = share, free.point.parameters[n]
+        weights[n] = share
         total += share * free.point.parameters[n] / problem.shared[n].nominal
     variance = max(float(weights @ covariance @ weights) for covariance in (free.jackknife, free.covariance))
     spread = max((entry.spread for entry in problem.shared if entry.name in shares), default=0.0)
-    return total, float(np.sqrt(variance)), spread, replace(point, parameters=tuple(parameters))
+    return total, float(np.sqrt(variance)), spread
 
 
 def possible_effects(

@@ -105,13 +105,6 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "the record does not determine the inertia, so the scale of its torque is unknown",
     ),
     GradeRule(
-        "same machine", Grade.POSSIBLE,
-        lambda e, r, s: not r.inertia_is_off(s.selection.prior_deviations)
-        or e.torque > s.grades.over_inertia**2 * r.inertia_torque,
-        "inertia that the record asks for, and the torque of its error", "grades.over_inertia",
-        "the record asks for another inertia and may be of another machine",
-    ),
-    GradeRule(
         "alone of its kind", Grade.LIKELY, lambda e, r, s: not e.foreign_family, "kinds in the family", "",
         "an effect of another kind explains the record as well",
     ),

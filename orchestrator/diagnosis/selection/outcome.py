@@ -90,8 +90,6 @@ class RecordEvidence:
         inertia: that the record asks for by itself, in units of the nominal one; 1.0: the model has none.
         inertia_error: its standard error, in the same unit.
         inertia_spread: how far the model file lets it be off, as a share.
-        inertia_torque: power of the torque by which it differs from that of the fit, in shares of what the nominal
-            model misses.
         follows: share of the squared error of what is left that the strongest curve of one signal takes.
     """
 
@@ -99,7 +97,6 @@ class RecordEvidence:
     inertia: float
     inertia_error: float
     inertia_spread: float
-    inertia_torque: float = np.inf
     follows: float = 0.0
 
     @property
@@ -141,7 +138,6 @@ class EffectEvidence:
         motion_share: share of the misfit of free runs on test data that comes back without it; nan: not run.
         test_torque: the same of what the torque balance leaves of test data, block by block; None: not worked out.
         runs_hold: free runs of the final model stay by the test data; else they drift, and the torque decides.
-        torque: power of its own torque, in shares of what the nominal model misses.
         asked: it was asked for, and stays in the model whatever its grade.
         left_where_it_acts: of a limit, what is left there over its own torque (rms), if it is more than elsewhere.
     """
@@ -158,7 +154,6 @@ class EffectEvidence:
     motion_share: float = np.nan
     test_torque: ScoreComparison | None = None
     runs_hold: bool = True
-    torque: float = 0.0
     asked: bool = False
     left_where_it_acts: float = 0.0
 
