@@ -69,12 +69,12 @@ class Served:
         return job["name"]
 
     def wait(self, name: str, until: Any = lambda job: job["state"] not in ("waiting", "running")) -> dict[str, Any]:
-        """Wait for a job."""
+        """Wait for a job, which a page may not have started yet."""
         job: dict[str, Any] = {}
 
         def is_there() -> Any:
-            job.update(self.job(name))
-            return until(job)
+            job.update(next((one for one in self.ask("GET", "state")[1]["jobs"] if one["name"] == name), {}))
+            return job and until(job)
 
         wait_until(is_there, lambda: job, pause=0.05)
         return job
