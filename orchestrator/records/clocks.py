@@ -16,7 +16,7 @@ from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice
 from orchestrator.records.stamps import seconds_of
 from orchestrator.records.units import parse_unit
-from orchestrator.records.words import TIME, words_of
+from orchestrator.records.words import names_time
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def read_own_time(source: RecordSource, place: int, clock: Clock, column: Column
     label = head.full or head.name
     stamps = [n for n, h in enumerate(source.heads) if h.raster == head.raster and n != place]
     known = [n for n in stamps if source.heads[n].name == "time"] or [
-        n for n in stamps if set(words_of(source.heads[n].name)) & TIME
+        n for n in stamps if names_time(source.heads[n].name)
     ]
     if len(known) != 1:
         rows, motor_rows = (source.load([n])[0].size for n in (place, motor))

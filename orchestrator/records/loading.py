@@ -29,7 +29,7 @@ from orchestrator.records.rasters import bring_to_motor, make_uniform
 from orchestrator.records.requests import SAMPLED
 from orchestrator.records.topics import has_topics, split_topics
 from orchestrator.records.units import angle_unit, parse_unit
-from orchestrator.records.words import TIME, words_of
+from orchestrator.records.words import names_time
 from orchestrator.shared.numbers import exact_text
 
 MOST_NAMED = 12  # columns in a note
@@ -146,7 +146,7 @@ def _unused(source: RecordSource, places: Sequence[int], rasters: Collection[int
     """Return a note that names the columns that are not used, or none; ``rasters`` have times that are."""
     rest = [
         (n, head) for n, head in enumerate(source.heads)
-        if n not in places and head.name != "time" and not (head.raster in rasters and set(words_of(head.name)) & TIME)
+        if n not in places and head.name != "time" and not (head.raster in rasters and names_time(head.name))
     ]  # fmt: skip
     names = [f"`{head.full or head.name or f'#{n + 1}'}`" for n, head in rest]
     if not names:

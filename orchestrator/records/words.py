@@ -39,6 +39,11 @@ def words_of(text: str) -> list[str]:
     return parts
 
 
+def names_time(text: str) -> bool:
+    """Return whether a channel's name has a word for a time."""
+    return not TIME.isdisjoint(words_of(text))
+
+
 def describes(text: str) -> bool:
     """Return whether a text only says more of what a channel is, as ``(motor)``, ``(7)`` and ``(act)`` do."""
     return all(word in DESCRIBING for word in words_of(text)) and not re.search("[%°‰µΩ]|[A-Za-z][.]", text)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.source import RecordSource, is_filled
-from orchestrator.records.words import TIME, words_of
+from orchestrator.records.words import names_time
 
 
 def split_lengths(source: RecordSource) -> RecordSource:
@@ -18,7 +18,7 @@ def split_lengths(source: RecordSource) -> RecordSource:
     Columns belong to the time that ends where they do; those that end elsewhere stay with the longest one.
     """
     heads = source.heads
-    times = [n for n, head in enumerate(heads) if head.kind == "number" and set(words_of(head.name)) & TIME]
+    times = [n for n, head in enumerate(heads) if head.kind == "number" and names_time(head.name)]
     if len(times) < 2 or len({head.raster for head in heads}) > 1:
         return source
     filled = [_filled(source, place) for place in times]

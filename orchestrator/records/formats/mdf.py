@@ -24,7 +24,7 @@ from orchestrator.records.formats.source import (
     in_a_line,
 )
 from orchestrator.records.units import parse_unit
-from orchestrator.records.words import TIME, words_of
+from orchestrator.records.words import names_time
 
 # What the master of a group of version 4 may be besides a time.
 MASTERS = {2: "angle", 3: "distance", 4: "index"}
@@ -103,7 +103,7 @@ def _master_head(channel: Any, group: int) -> Head:
     if word is None:
         stated = unit if known is not None else "s"
         return Head("time", stated, "number", group, "time" if group == 0 else f"time of group {group}")
-    name = word if not channel.name or set(words_of(channel.name)) & TIME else channel.name
+    name = word if not channel.name or names_time(channel.name) else channel.name
     return head_of(name, "" if word == "index" else unit, "number", group)
 
 
