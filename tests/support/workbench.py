@@ -59,8 +59,8 @@ class Served:
         return found["file"]
 
     def job(self, name: str) -> dict[str, Any]:
-        """Return what the workbench says of a job."""
-        return next(job for job in self.ask("GET", "state")[1]["jobs"] if job["name"] == name)
+        """Return what the workbench says of a job; nothing of one that was not started."""
+        return next((job for job in self.ask("GET", "state")[1]["jobs"] if job["name"] == name), {})
 
     def start(self, command: str, inputs: list[str], **options: Any) -> str:
         """Start a job and return its name."""
@@ -73,7 +73,7 @@ class Served:
         job: dict[str, Any] = {}
 
         def is_there() -> Any:
-            job.update(next((one for one in self.ask("GET", "state")[1]["jobs"] if one["name"] == name), {}))
+            job.update(self.job(name))
             return job and until(job)
 
         wait_until(is_there, lambda: job, pause=0.05)
