@@ -43,6 +43,14 @@ def test_the_oldest_versions_are_those_that_are_allowed():
     }
 
 
+@pytest.mark.slow
+def test_a_type_checker_finds_the_types_from_another_folder(tmp_path):
+    """Of an editable installation too: an import hook in place of a path entry would leave everything untyped."""
+    (tmp_path / "script.py").write_text("import orchestrator as oc\nreveal_type(oc.run_pair(alpha=0.02))\n")
+    shown = run([sys.executable, "-m", "mypy", "--cache-dir", str(tmp_path / "cache"), "script.py"], tmp_path)
+    assert 'Revealed type is "orchestrator.api.pair.PairResult"' in shown
+
+
 def test_a_tool_that_takes_no_arguments_starts_nothing_with_one():
     programs = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tools").glob("*.py")}
     programs = {path.stem: text for path, text in programs.items() if 'if __name__ == "__main__":' in text}

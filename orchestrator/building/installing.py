@@ -86,9 +86,14 @@ def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_dire
 
 
 def build_editable(wheel_directory: str, config_settings: Any = None, metadata_directory: str | None = None) -> str:
-    """Build an editable installation, its machine code in the source tree; return the name of its wheel."""
+    """Build an editable installation, its machine code in the source tree; return the name of its wheel.
+
+    ``editable_mode=compat`` makes a plain path entry of it. Setuptools' own default is an import hook, which type
+    checkers and editors do not run, so they would find no types.
+    """
     compile_all(INSTALLED)
-    return build_meta.build_editable(wheel_directory, config_settings, metadata_directory)
+    options = {"editable_mode": "compat"} | (config_settings or {})
+    return build_meta.build_editable(wheel_directory, options, metadata_directory)
 
 
 def compile_all(folder: Path, made_for: Platform = HERE) -> int:
