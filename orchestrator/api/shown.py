@@ -110,6 +110,9 @@ class Result:
     def __str__(self) -> str:
         return "\n".join(_text(plain_block(block)) for block in self.blocks())
 
+    def __repr__(self) -> str:
+        return str(self)
+
     def _repr_html_(self) -> str:
         return "\n".join(_html(plain_block(block)) for block in self.blocks())
 

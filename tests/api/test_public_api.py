@@ -99,6 +99,7 @@ def test_results_show_themselves(place):
     pair = oc.run_pair(alpha=0.02)
     assert "actual half-gap" in str(pair)
     assert "0.02" in str(pair)
+    assert repr(pair) == str(pair)  # what a prompt shows is the result, and no address
     assert pair._repr_html_().count("<tr>") == 1 + len(pair.blocks()[0].rows)
     with pytest.raises(KeyError, match=r"must be one of plant.theta_m, .* but is 'plant.x'"):
         oc.simulate("loop.toml")["plant.x"]
