@@ -1,8 +1,7 @@
 """Forecast of what loops do at rest beside simulations of them.
 
-Run as ``python -m benchmarks.rest_forecast [--loops 50] [--harmonics 20] [--seed 0]``. Drivetrain, drive and weights
-of the LQR are drawn; the simulator is the independent one, without friction and limit, from two starts. Further loops
-compare the describing function with the forecast.
+Run as ``python -m benchmarks.rest_forecast [--loops 50] [--seed 0]``. Drivetrain, drive and weights
+of the LQR are drawn; the simulator is the independent one, without friction and limit, from two starts.
 """
 
 import argparse
@@ -11,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
-from orchestrator.control.harmonic import harmonic_cycle
 from orchestrator.control.standstill import forecast_rest
 from orchestrator.plants.design import DrivetrainValues, design_regulator, five_state_model
 from tests.support import independent_plant
@@ -52,30 +50,10 @@ def draw_loop(rng: np.random.Generator) -> tuple[DrivetrainValues, tuple[float, 
     return values, design_regulator(five_state_model(values), np.diag(weights), price, STEP).gains
 
 
-def compare_harmonics(count: int, seed: int) -> int:
-    """Return how many of ``count`` loops with a cycle by the describing function have the computed one within 10 %."""
-    right = n = found = 0
-    while found < count:
-        values, gains = draw_loop(np.random.default_rng([seed, 1, n]))
-        n += 1
-        harmonic = harmonic_cycle(values, gains, STEP)
-        if harmonic is not None:
-            found += 1
-            f = forecast_rest(values, gains, STEP)
-            said = (harmonic.twist, harmonic.load, harmonic.frequency)
-            right += np.allclose(said, (f.twist, f.load, f.frequency), rtol=0.1)
-            print(
-                f"{n - 1} {' '.join(f'{x:.2f}' for x in said)}; {f.twist:.2f} {f.load:.2f} {f.frequency:.2f}",
-                flush=True,
-            )
-    return right
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--loops", type=int, default=50)
-    parser.add_argument("--harmonics", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     right = wrong = 0
@@ -107,9 +85,6 @@ def main() -> None:
             flush=True,
         )
     print(f"within 10 %: {right} of {arguments.loops}; called still, but cycles: {wrong}")
-    print("loop, describing function: twist/alpha, load/alpha, Hz; forecast: the same")
-    agreed = compare_harmonics(arguments.harmonics, arguments.seed)
-    print(f"describing function, twists of two half-gaps and more, within 10 %: {agreed} of {arguments.harmonics}")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 import math
 
-from orchestrator.control.harmonic import harmonic_cycle
 from orchestrator.control.standstill import LONGEST, forecast_rest
 from orchestrator.plants.design import DrivetrainValues
 from orchestrator.shared.results.regulator import ForecastFound
@@ -22,7 +21,6 @@ def rest_forecast(
         ScenarioError: the loop is unstable even without a gap.
     """
     f = forecast_rest(values, gains, sample_time, delay)
-    harmonic = harmonic_cycle(values, gains, sample_time, delay)
     m = f.margins
     return ForecastFound(
         cycles=f.cycles,
@@ -33,8 +31,6 @@ def rest_forecast(
         delay_margin=_finite(m.delay),
         rank=f.rank,
         settled=f.settled,
-        harmonic_load=None if harmonic is None else harmonic.load,
-        harmonic_frequency=None if harmonic is None else harmonic.frequency,
         lower_gain=m.lower or None,
         upper_gain=_finite(m.upper),
     )
@@ -50,8 +46,6 @@ def rest_text(f: ForecastFound, loop: str) -> str:
         rest = f"cycles at {f.frequency:.3g} Hz: its load by {f.load:.3g} half-gaps, its twist by {f.twist:.3g}"
     else:
         rest = "comes to rest"
-    if f.harmonic_load is not None:
-        rest += f" (describing function: {f.harmonic_load:.3g} half-gaps at {f.harmonic_frequency:.3g} Hz)"
     if not f.settled:
         rest += f"; this is its motion after {LONGEST:g} s, which still changes: it never settles, or takes longer"
     return f"Without friction, load and limit of the torque {loop} {rest}."

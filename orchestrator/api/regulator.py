@@ -68,7 +68,7 @@ class RegulatorResult(PlottedResult):
         frequencies = np.geomspace(LOWEST, 0.5 / self.sample_time, POINTS)
         angles = 2.0 * np.pi * frequencies * self.sample_time
         model = five_state_model(self.values)
-        response = loop_response(model, self.gains, self.sample_time, self.delay, angles)
+        response = loop_response(model, self.gains, self.sample_time, self.delay)(angles)
         return frequencies, np.abs(response), np.unwrap(np.angle(response))
 
     def results(self, place: Path | None = None) -> RegulatorFound:

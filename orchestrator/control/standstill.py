@@ -6,22 +6,23 @@ out the gap is small. It ends in rest or in the outermost cycle. So the motion i
 several starts, exactly between samples of the controller but for the instant of a contact, until it repeats.
 """
 
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.building.translation.kernels import Kernels
 from orchestrator.errors import ScenarioError
-from orchestrator.plants.design import (
-    DrivetrainValues,
-    LinearModel,
-    discretise,
-    five_state_model,
-    rank_report,
-    six_state_model,
-)  # fmt: skip
+from orchestrator.plants.design import DrivetrainValues, five_state_model, rank_report, six_state_model
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,8 @@ PIECE = 10.0  # after which a motion is judged [s]
 STILL = 0.05  # motion of the load in a piece, over the half-gap, that is rest
 REPEATED = 0.01  # relative difference of the motion of two pieces, below which it is a cycle
 STARTS = ((100.0, 0.0), (0.0, 30.0), (3.0, 0.0), (-1.5, 6.0))  # load angle and speed, over the half-gap
-FREQUENCIES = 20_000  # of the loop's margins
+FREQUENCIES = 4000  # of the loop's margins, between which they are refined
+REST = Kernels("orchestrator.control.rest_kernel")
 ROUNDING = 1e-10  # of an eigenvalue's size
 
 
@@ -91,16 +93,18 @@ def forecast_rest(
     matrices = _matrices(values, np.asarray(gains), sample_time, delay)
     parts = n_parts(sample_time)
     _require_stable(matrices, sample_time)
-    state = np.zeros((6 + delay + 1, len(STARTS)))
-    state[-1] = 1.0
-    state[2], state[3] = np.array(STARTS).T
-    state[0], state[1] = values.i * state[2], values.i * state[3]
+    state = np.zeros((len(STARTS), 6 + delay + 1))
+    state[:, -1] = 1.0
+    state[:, 2:4] = STARTS
+    state[:, :2] = values.i * state[:, 2:4]
     rows = round(PIECE / sample_time)
     before = np.full(len(STARTS), np.inf)
     settled = np.zeros(len(STARTS), dtype=bool)
+    twist, load = np.empty((2, len(STARTS), rows))
     for _ in range(round(LONGEST / PIECE)):
-        twist, load, state = _follow(matrices, state, (rows, parts), values.i)
-        size = 0.5 * np.ptp(load, axis=0)
+        for n, one in enumerate(state):
+            REST.follow(*matrices, one, np.empty_like(one), parts, values.i, twist[n], load[n])
+        size = 0.5 * np.ptp(load, axis=1)
         settled = (np.abs(size - before) < REPEATED * size) | (size < STILL)
         if settled.all():
             break
@@ -110,51 +114,64 @@ def forecast_rest(
     rank = rank_report(six_state_model(values)).controllable
     if size[largest] < STILL:
         return RestForecast(False, 0.0, 0.0, 0.0, bool(settled.all()), margins, rank)
-    frequency = _frequency(load[:, largest], sample_time)
-    amplitude = 0.5 * float(np.ptp(twist[:, largest]))
+    frequency = _frequency(load[largest], sample_time)
+    amplitude = 0.5 * float(np.ptp(twist[largest]))
     return RestForecast(True, amplitude, float(size[largest]), frequency, bool(settled.all()), margins, rank)
 
 
-def loop_margins(model: LinearModel, gains: tuple[float, ...], sample_time: float, delay: int = 0) -> Margins:
-    """Return the margins of the loop at the request [states of ``model``]."""
+def loop_margins(model: StateSpace, gains: tuple[float, ...], sample_time: float, delay: int = 0) -> Margins:
+    """Return the margins of the loop at the request [states of ``model``].
+
+    The sampled loop has poles near ``z = 1``, where the polynomials of ``control.stability_margins`` cancel: they say a
+    gain margin of 1.15 in place of 86. Its method ``frd`` knows no crossing at half the sampling frequency. So the
+    crossings are bracketed and refined here.
+    """
+    from scipy.optimize import brentq
+
     angles = np.geomspace(1e-4 * sample_time, np.pi, FREQUENCIES)
-    L = loop_response(model, gains, sample_time, delay, angles)
-    phase = np.unwrap(np.angle(L))
-    size = np.abs(L)
-    crossed = np.flatnonzero(np.diff(np.floor((phase - np.pi) / (2.0 * np.pi))) != 0)
-    factors = 1.0 / size[crossed]
+    loop = loop_response(model, gains, sample_time, delay)
+    L = loop(angles)
+    phase, size = np.unwrap(np.angle(L)), np.abs(L)
+
+    def crossings(at: Array, value: Callable[[complex], float]) -> Array:
+        found = [brentq(lambda a: value(complex(loop(np.array([a]))[0])), angles[n], angles[n + 1]) for n in at]
+        return np.array(found)
+
+    turned = np.flatnonzero(np.diff(np.floor((phase - np.pi) / (2.0 * np.pi))) != 0)
+    turned = turned[np.signbit(L.imag[turned]) != np.signbit(L.imag[turned + 1])]
+    factors = 1.0 / np.abs(loop(crossings(turned, lambda value: value.imag)))
     if L[-1].real < 0.0:  # at half the sampling frequency the response is real: a pole leaves at z = -1
         factors = np.append(factors, 1.0 / size[-1])
-    unity = np.flatnonzero(np.diff(size > 1.0))
-    over = np.mod(phase[unity] + np.pi, 2.0 * np.pi)
-    times = over / angles[unity] * sample_time
-    least = np.minimum(over, 2.0 * np.pi - over)
+    unity = crossings(np.flatnonzero(np.diff(size > 1.0)), lambda value: abs(value) - 1.0)
+    over = np.mod(np.angle(loop(unity)) + np.pi, 2.0 * np.pi)
     return Margins(
         float(factors[factors < 1.0].max(initial=0.0)),
         float(factors[factors > 1.0].min(initial=np.inf)),
-        float(least.min(initial=np.pi)),
-        float(times.min(initial=np.inf)),
+        float(np.minimum(over, 2.0 * np.pi - over).min(initial=np.pi)),
+        float((over / unity * sample_time).min(initial=np.inf)),
     )
 
 
 def loop_response(
-    model: LinearModel, gains: tuple[float, ...], sample_time: float, delay: int, angles: Array
-) -> NDArray[np.complex128]:
-    """Return ``L(z) = K (z - A)^-1 B z^-delay`` at the angles of ``z`` [rad], shape (n,)."""
-    A, B = discretise(model, sample_time)
-    z = np.exp(1j * angles)
-    poles, vectors = np.linalg.eig(A)
-    left = np.asarray(gains) @ vectors
-    right = np.linalg.solve(vectors, B[:, 0].astype(complex))
-    response: NDArray[np.complex128] = ((left * right) / (z[:, None] - poles)).sum(axis=1) * z**-delay
-    return response
+    model: StateSpace, gains: tuple[float, ...], sample_time: float, delay: int
+) -> Callable[[Array], NDArray[np.complex128]]:
+    """Return ``L(z) = K (z - A)^-1 B z^-delay`` as a function of angles of ``z`` [rad], shape (n,)."""
+    import control
+
+    sampled = control.c2d(control.ss(model.A, model.B, np.atleast_2d(gains), 0), sample_time)
+
+    def respond(angles: Array) -> NDArray[np.complex128]:
+        z = np.exp(1j * angles)
+        return np.asarray(sampled(z) * z**-delay, dtype=np.complex128)
+
+    return respond
 
 
 def _matrices(values: DrivetrainValues, gains: Array, sample_time: float, delay: int) -> tuple[Array, Array, Array]:
     """Return the steps of a part of a sample within the gap and on its flank, and the sampling at its end.
 
-    The state is the plant's, the requests that are held and under way (the one that acts first), and 1. On a flank the
-    wound twist is ``phi - 1`` there; ``_follow`` turns the sign of the state round for the other one.
+    The state is the plant's, the requests that are held and under way (the one that acts first), and 1. On the
+    upper flank the wound twist is ``phi - 1``.
     """
     from scipy.linalg import expm
 
@@ -195,27 +212,6 @@ def _require_stable(matrices: tuple[Array, Array, Array], sample_time: float) ->
             f"give {'a shorter `delay` or ' if late else ''}other gains",
             "delay",
         )
-
-
-def _follow(
-    matrices: tuple[Array, Array, Array], state: Array, counts: tuple[int, int], i: float
-) -> tuple[Array, Array, Array]:
-    """Return twist and load angle at each sample, shape (rows, starts), and the state behind them."""
-    gap, contact, sample = matrices
-    rows, parts = counts
-    twist, load = np.empty((rows, state.shape[1])), np.empty((rows, state.shape[1]))
-    for row in range(rows):
-        state = sample @ state
-        for _ in range(parts):
-            phi = state[0] / i - state[2]
-            side = np.where(phi > 1.0, 1.0, np.where(phi < -1.0, -1.0, 0.0))
-            turned = state * np.where(side < 0.0, -1.0, 1.0)
-            turned[-1] = 1.0
-            touching = contact @ turned
-            touching[:-1] *= np.where(side < 0.0, -1.0, 1.0)
-            state = np.where(side == 0.0, gap @ state, touching)
-        twist[row], load[row] = state[0] / i - state[2], state[2]
-    return twist, load, state
 
 
 def _frequency(load: Array, sample_time: float) -> float:

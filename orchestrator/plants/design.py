@@ -1,18 +1,25 @@
-"""Controller and estimator gains from the discrete Riccati equation, and the rank report that comes before them.
+"""Gains of controller and estimator from discrete Riccati equations, and the rank report that comes before them.
 
 Models are those of the thesis with its errata mended: the regulator works on the controllable five-state model, the
 estimator on six states with the load torque as an integrated disturbance. All gains are for a sampled system whose
-input is held over a sample. ``scipy.linalg`` is imported where it is used: worker processes design nothing.
+input is held over a sample. Models, sampling and Riccati equations are python-control's. It is imported where it is
+used: worker processes design nothing, and it takes a second.
 
 In all functions: ``sample_time`` [s].
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import DesignError
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 Array = NDArray[np.float64]
 
@@ -34,16 +41,6 @@ class DrivetrainValues:
     b_l: float = 1.0
     i: float = 3.984
     tau: float = 1.0
-
-
-@dataclass(frozen=True)
-class LinearModel:
-    """A linear model ``x' = A x + B u``, ``y = C x`` with named states."""
-
-    A: Array
-    B: Array
-    C: Array
-    states: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -85,8 +82,10 @@ class KalmanFilter:
     sample_time: float
 
 
-def six_state_model(values: DrivetrainValues) -> LinearModel:
+def six_state_model(values: DrivetrainValues) -> StateSpace:
     """Return the model of eq. 3.5 with states ``ESTIMATOR_STATES`` and outputs ``(theta_m, theta_l)``."""
+    import control
+
     v = values
     A = np.zeros((6, 6))
     A[0, 1] = A[2, 3] = 1.0
@@ -102,49 +101,33 @@ def six_state_model(values: DrivetrainValues) -> LinearModel:
     A[5, 5] = -1.0 / v.tau
     B = np.array([[0.0], [0.0], [0.0], [0.0], [0.0], [1.0 / v.tau]])
     C = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0]])
-    return LinearModel(A, B, C, ESTIMATOR_STATES)
+    return control.ss(A, B, C, 0, states=ESTIMATOR_STATES)
 
 
-def five_state_model(values: DrivetrainValues) -> LinearModel:
+def five_state_model(values: DrivetrainValues) -> StateSpace:
     """Return the model without the load torque, states ``REGULATOR_STATES``: what a regulator can control."""
+    import control
+
     six = six_state_model(values)
     keep = [0, 1, 2, 3, 5]
-    return LinearModel(six.A[np.ix_(keep, keep)], six.B[keep], six.C[:, keep], REGULATOR_STATES)
+    return control.ss(six.A[np.ix_(keep, keep)], six.B[keep], six.C[:, keep], 0, states=REGULATOR_STATES)
 
 
-def rank_report(model: LinearModel) -> RankReport:
+def rank_report(model: StateSpace) -> RankReport:
     """Return ranks, uncontrollable modes, stabilisability and detectability of ``model``.
 
-    Returns:
-        Ranks and the modes that are missed [1/s].
+    Ranks count the modes that pass the test of Popov, Belevitch and Hautus. The rank of python-control's ``ctrb`` is
+    fooled by scaling: 3 of 5 for a rotor of 1e-4 kg.m2 that drives 10 kg.m2.
     """
-    stuck = _uncontrollable_modes(model.A, model.B)
-    hidden = _uncontrollable_modes(model.A.T, model.C.T)
-    order = model.A.shape[0]
+    stuck, hidden = _uncontrollable_modes(model.A, model.B), _uncontrollable_modes(model.A.T, model.C.T)
     return RankReport(
-        order=order,
-        controllable=_krylov_rank(model.A, model.B),
-        observable=_krylov_rank(model.A.T, model.C.T),
+        order=model.nstates,
+        controllable=model.nstates - len(stuck),
+        observable=model.nstates - len(hidden),
         uncontrollable=tuple(stuck),
         stabilisable=all(mode.real < -RANK_TOLERANCE for mode in stuck),
         detectable=all(mode.real < -RANK_TOLERANCE for mode in hidden),
     )
-
-
-def _krylov_rank(A: Array, B: Array) -> int:
-    """Return the dimension of what ``B`` reaches, by an orthonormal staircase that scaling does not fool."""
-    scale = max(1.0, float(np.abs(A).max()))
-    basis = np.zeros((A.shape[0], 0))
-    fresh = B
-    while fresh.shape[1] and basis.shape[1] < A.shape[0]:
-        size = np.linalg.norm(fresh, axis=0)
-        fresh = fresh - basis @ (basis.T @ fresh)
-        fresh = fresh - basis @ (basis.T @ fresh)
-        left, values, _ = np.linalg.svd(fresh, full_matrices=False)
-        rank = int(np.sum(values > RANK_TOLERANCE * max(float(size.max(initial=0.0)), 1.0 / scale)))
-        basis = np.hstack([basis, left[:, :rank]])
-        fresh = A @ left[:, :rank]
-    return int(basis.shape[1])
 
 
 def _uncontrollable_modes(A: Array, B: Array) -> list[complex]:
@@ -157,29 +140,13 @@ def _uncontrollable_modes(A: Array, B: Array) -> list[complex]:
     return missed
 
 
-def discretise(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
-    """Return (A, B) of ``model`` with its input held over ``sample_time`` [s].
-
-    Returns:
-        Matrices of shape (states, states) and (states, inputs).
-    """
-    from scipy.linalg import expm
-
-    n, m = model.B.shape
-    augmented = np.zeros((n + m, n + m))
-    augmented[:n, :n] = model.A
-    augmented[:n, n:] = model.B
-    step = expm(augmented * sample_time)
-    return step[:n, :n], step[:n, n:]
-
-
-def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float) -> Regulator:
+def design_regulator(model: StateSpace, Q: Array, R: float, sample_time: float) -> Regulator:
     """Return the sampled LQR of ``model`` for the continuous weights ``Q`` and ``R`` times the sample time.
 
     Args:
         Q: (states, states) weights of the states.
     """
-    from scipy.linalg import eigvals, solve, solve_discrete_are
+    import control
 
     report = rank_report(model)
     if not report.stabilisable:
@@ -189,41 +156,38 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
             f"no input moves the mode at {modes} 1/s; leave the uncontrollable states out of the regulator and "
             "feed their estimate forward"
         )
-    A, B = map(np.ascontiguousarray, discretise(model, sample_time))
-    weight = np.array([[R * sample_time]])
+    sampled = control.c2d(model, sample_time)
     try:
-        X = solve_discrete_are(A, B, Q * sample_time, weight)
+        gains, _, poles = control.dlqr(sampled, Q * sample_time, np.array([[R * sample_time]]), method="scipy")
     except np.linalg.LinAlgError as error:
         raise DesignError(f"the regulator's Riccati equation has no solution: {error}") from None
-    gains = solve(B.T @ X @ B + weight, B.T @ X @ A)
-    poles = eigvals(A - B @ gains)
     if not np.all(np.abs(poles) < 1.0):
         raise DesignError("the regulator's Riccati equation has no stabilising solution for these weights")
-    k = tuple(float(g) for g in gains.ravel())
+    k = tuple(float(g) for g in np.ravel(gains))
     return Regulator(k, sample_time, tuple(complex(p) for p in poles))  # type: ignore[arg-type]
 
 
-def design_estimator(model: LinearModel, process: Array, measurement: Array, sample_time: float) -> KalmanFilter:
+def design_estimator(model: StateSpace, process: Array, measurement: Array, sample_time: float) -> KalmanFilter:
     """Return the stationary Kalman filter of ``model``.
 
     Args:
         process: intensities of the white noise on each state, 6 values, unit^2/s.
         measurement: variances of both encoders [rad2].
     """
-    from scipy.linalg import solve_discrete_are
+    import control
 
     if not rank_report(model).detectable:
         raise DesignError("`model` must be detectable, but a mode that does not decay reaches no output")
-    A, B = discretise(model, sample_time)
+    sampled = control.c2d(model, sample_time)
     Q = _noise_covariance(model.A, np.diag(process), sample_time)
     R = np.diag(measurement)
     try:
-        P = solve_discrete_are(A.T, model.C.T, Q, R)
+        _, P, _ = control.dlqe(sampled.A, np.eye(model.nstates), model.C, Q, R, method="scipy")
     except np.linalg.LinAlgError as error:
         raise DesignError(f"the estimator's Riccati equation has no solution: {error}") from None
     S = model.C @ P @ model.C.T + R
     L = P @ model.C.T @ np.linalg.inv(S)
-    return KalmanFilter(A, B[:, 0], L, np.linalg.inv(S), sample_time)
+    return KalmanFilter(sampled.A, sampled.B[:, 0], L, np.linalg.inv(S), sample_time)
 
 
 def _noise_covariance(A: Array, intensity: Array, h: float) -> Array:

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.plants.description import Plant
-from orchestrator.plants.design import LinearModel, discretise
 
 Array = NDArray[np.float64]
 LINEAR = Kernels("orchestrator.plants.kernels.linear")
@@ -36,11 +36,11 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
     A, B = plant.jacobian(p), plant.request_column(p)
     places = list(state_places(plant, p))
     rows = [plant.states.index(place) for place in places]
-    A, B = A[np.ix_(rows, rows)], B[rows, None]
-    model = LinearModel(A, B, C=np.eye(len(places)), states=())
-    before, by_early = discretise(model, first)
-    behind, by_late = discretise(model, h - first)
-    phi, by_early, by_late = behind @ before, (behind @ by_early).ravel(), by_late.ravel()
+    held = np.block([[A[np.ix_(rows, rows)], B[rows, None]], [np.zeros((1, len(rows) + 1))]])
+    (before, by_early), (behind, by_late) = (
+        (step[:-1, :-1], step[:-1, -1]) for step in (expm(held * first), expm(held * (h - first)))
+    )
+    phi, by_early = behind @ before, behind @ by_early
     shown = np.array([places.index(place) if place in places else -1 for place in (0, 2)])
 
     def run(start: Array, early: Array, late: Array, out: Array) -> None:

@@ -3,6 +3,7 @@
 import json
 import sys
 
+import control
 import numpy as np
 import pytest
 
@@ -10,7 +11,7 @@ from orchestrator.cli import main
 from orchestrator.control.loops import ControlTask
 from orchestrator.control.measures import bound_time
 from orchestrator.control.predictive import TOUCH, PredictiveLaw, PredictiveSlave
-from orchestrator.plants.design import DrivetrainValues, discretise, six_state_model
+from orchestrator.plants.design import DrivetrainValues, six_state_model
 from tests.support.c_fmu import have_compiler
 
 ALPHA = 0.02
@@ -64,7 +65,8 @@ def test_it_knows_the_move_ahead_and_the_torque_limit(law):
 def test_it_crosses_quickly_and_lands_softly(law, flank):
     task = law.task
     free = six_state_model(DrivetrainValues(tau=task.tau, k=0.0, c=0.0, b_m=0.0, b_l=0.0))
-    A, B = discretise(free, task.sample_time)
+    sampled = control.c2d(free, task.sample_time)
+    A, B = sampled.A, sampled.B
     x = at_rest(task, -flank * ALPHA, angle=-0.25 * flank)
     samples = 0
     bound = bound_time(task, task.impact_speed)

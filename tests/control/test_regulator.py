@@ -3,17 +3,11 @@
 import json
 import tomllib
 
-import numpy as np
 import pytest
 
 import orchestrator as oc
 from orchestrator.cli import main
-from orchestrator.control.harmonic import harmonic_cycle
-from orchestrator.control.standstill import forecast_rest
 from orchestrator.errors import ScenarioError
-from orchestrator.plants.design import DrivetrainValues, design_regulator, five_state_model
-
-STEP = 1e-3
 
 
 @pytest.fixture(scope="module")
@@ -69,23 +63,6 @@ def test_own_gains_are_judged_as_those_of_the_design(thesis):
     assert judged.forecast == thesis.forecast
     with pytest.raises(ScenarioError, match="must be left out beside"):
         oc.design_regulator(gains=thesis.gains, state_weights=(1.0, 1.0, 1.0, 1.0, 1.0))
-
-
-def test_the_describing_function_agrees_where_it_holds():
-    values = DrivetrainValues(tau=0.05)
-    weights = np.diag((10.0, 50.0, 1.0, 1.0, 0.01))
-    gains = design_regulator(five_state_model(values), weights, 2e-3, STEP).gains
-    found, harmonic = forecast_rest(values, gains, STEP), harmonic_cycle(values, gains, STEP)
-    assert harmonic is not None
-    assert found.twist > 2.0
-    assert (harmonic.twist, harmonic.load, harmonic.frequency) == pytest.approx(
-        (found.twist, found.load, found.frequency), rel=0.1
-    )
-
-
-def test_the_describing_function_is_silent_where_it_fails(thesis):
-    assert thesis.forecast.twist < 2.0
-    assert harmonic_cycle(DrivetrainValues(), thesis.gains, STEP) is None
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,13 @@
 """Forecast of a loop at rest, against integration with events and against eigenvalues."""
 
+import control
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from orchestrator.control.standstill import forecast_rest, loop_margins
+from orchestrator.control.standstill import REST, forecast_rest, loop_margins
 from orchestrator.errors import ScenarioError
-from orchestrator.plants.design import DrivetrainValues, design_regulator, discretise, five_state_model
+from orchestrator.plants.design import DrivetrainValues, design_regulator, five_state_model
 
 STEP = 1e-3
 THESIS = (10.0, 50.0, 1.0, 1.0, 0.01)
@@ -20,7 +21,8 @@ def gains_of(tau, weights):
 
 def spectral_radius(values, gains, delay):
     """Of the sampled loop whose request is late by whole samples."""
-    A, B = discretise(five_state_model(values), STEP)
+    sampled = control.c2d(five_state_model(values), STEP)
+    A, B = sampled.A, sampled.B
     n = 5 + delay
     whole = np.zeros((n, n))
     whole[:5, :5] = A
@@ -45,9 +47,31 @@ def test_the_margins_are_where_the_loop_becomes_unstable(tau):
     assert slow.phase < margins.phase
     for factor in (slow.lower, slow.upper):
         if 0.0 < factor < np.inf:
-            few = [spectral_radius(values, np.multiply(gains, factor * s), 2) for s in (0.99, 1.01)]
+            few = [spectral_radius(values, np.multiply(gains, factor * s), 2) for s in (1.0 - 1e-6, 1.0 + 1e-6)]
             assert min(few) < 1.0 < max(few)
     assert slow.upper < np.inf
+
+
+def test_the_margins_of_python_control_are_wrong_for_this_loop():
+    values, gains = gains_of(1.0, THESIS)
+    model = five_state_model(values)
+    loop = control.c2d(control.ss(model.A, model.B, np.atleast_2d(gains), 0), STEP)
+    assert control.stability_margins(loop)[0] < 2.0  # once both are near 86, python-control will do
+    assert control.stability_margins(loop, method="frd")[0] == np.inf
+    assert loop_margins(model, gains, STEP).upper == pytest.approx(86.2, abs=0.1)
+
+
+def test_the_kernel_is_the_same_in_python():
+    rng = np.random.default_rng(1)
+    gap, contact, sample = 0.3 * rng.normal(size=(3, 7, 7))
+    for turn in (gap, contact):
+        turn[-1] = np.eye(7)[-1]
+    runs = []
+    for follow in (REST.follow, REST.python.follow):
+        state, twist, load = np.append(np.full(6, 4.0), 1.0), *np.empty((2, 40))
+        follow(gap, contact, sample, state, np.empty(7), 3, 2.0, twist, load)
+        runs.append((*twist, *load, *state))
+    assert runs[0] == runs[1]
 
 
 @pytest.mark.parametrize("weights", [THESIS, LOAD])
@@ -56,7 +80,7 @@ def test_the_margins_are_where_the_loop_becomes_unstable(tau):
 def test_a_sampled_loop_bears_no_gain_without_end(tau, weights, delay):
     values, gains = gains_of(tau, weights)
     upper = loop_margins(five_state_model(values), gains, STEP, delay).upper
-    inside, outside = (spectral_radius(values, np.multiply(gains, upper * s), delay) for s in (0.995, 1.005))
+    inside, outside = (spectral_radius(values, np.multiply(gains, upper * s), delay) for s in (1.0 - 1e-6, 1.0 + 1e-6))
     assert inside < 1.0 < outside
     between = [spectral_radius(values, np.multiply(gains, g), delay) for g in np.geomspace(1.0, 0.995 * upper, 20)]
     assert max(between) < 1.0

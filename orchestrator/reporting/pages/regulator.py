@@ -54,7 +54,6 @@ def rest_facts(f: ForecastFound | None, loop: str) -> tuple[Facts, ...]:
         ("amplitude of the load [half-gaps]", f.load),
         ("amplitude of the twist [half-gaps]", f.twist),
         ("frequency [Hz]", f.frequency),
-        ("load by the describing function [half-gaps]", f.harmonic_load),
         ("phase margin without a gap [rad]", f.phase_margin),
         ("delay margin without a gap [ms]", None if f.delay_margin is None else 1e3 * f.delay_margin),
         ("smallest factor of the gain without a gap", f.lower_gain or 0.0),

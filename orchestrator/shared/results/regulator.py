@@ -9,9 +9,8 @@ class ForecastFound(msgspec.Struct, frozen=True):
     """A loop at rest, without friction and load, by its gains alone.
 
     ``twist`` and ``load`` are amplitudes over the half-gap, ``frequency`` [Hz]; ``settled``: the motion was followed
-    until it repeated itself or came to rest. ``harmonic_load`` and ``harmonic_frequency`` are by the describing
-    function, where it holds. Margins are those without a gap [rad], [s], as factors of the gain; None: there is none.
-    ``rank`` of six states.
+    until it repeated itself or came to rest. Margins are those without a gap [rad], [s],
+    as factors of the gain; None: there is none. ``rank`` of six states.
     """
 
     cycles: bool
@@ -22,8 +21,6 @@ class ForecastFound(msgspec.Struct, frozen=True):
     delay_margin: float | None
     rank: int
     settled: bool = True
-    harmonic_load: float | None = None
-    harmonic_frequency: float | None = None
     lower_gain: float | None = None
     upper_gain: float | None = None
 
