@@ -16,11 +16,11 @@ def follow(
         contact: (k, k) the same on the upper flank; on the lower one all signs are turned.
         sample: (k, k) what the controller does at a sample.
         state: (k,) the plant's, the requests under way, and 1; moved on in place.
-        moved: (k,) scratch.
-        parts: of a sample.
-        i: gear ratio.
-        twist: (n,) filled.
-        load: (n,) filled.
+        moved: (k,) scratch, filled anew at every part.
+        parts: into how many a sample is cut.
+        i: turns of the motor for one of the load.
+        twist: (n,) filled: motor angle over the gear ratio less load angle.
+        load: (n,) filled: angles of the load.
     """
     size = len(state)
     for n in range(len(load)):
