@@ -3,7 +3,7 @@
 Run as ``python -m benchmarks.compensation [--plants 200] [--seed 0]`` (with a C compiler). The plant is the
 independent simulator (Hunt-Crossley contact, LuGre friction), each parameter up to 5 % off; encoders of 10,000
 and 20,000 counts with noise of 3e-4 and 1.5e-4 rad; half-gap 0.02 rad, known to 1 %; torque limit 300 N.m.
-States come from one filter of :mod:`pyfmu_sources.backlash_estimator` that is told the half-gap; the request
+States come from one filter of :mod:`pyfmu_sources.estimators.backlash_estimator` that is told the half-gap; the request
 from the native FMU. The LQR has the thesis's weights, and others that damp the load.
 """
 
@@ -21,9 +21,9 @@ from numba import njit
 from orchestrator.building.native_build import ensure_native
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.plants.design import DrivetrainValues, design_regulator, five_state_model
-from pyfmu_sources.backlash_compensator_slave import BacklashCompensator
-from pyfmu_sources.backlash_estimator import SIZE, NoiseSettings, covariance
-from pyfmu_sources.gap_traversal import plan
+from pyfmu_sources.controllers.backlash_compensator_slave import BacklashCompensator
+from pyfmu_sources.controllers.gap_traversal import plan
+from pyfmu_sources.estimators.backlash_estimator import SIZE, NoiseSettings, covariance
 from tests.support import independent_plant
 from tests.support.fmu_calls import RawFmu
 

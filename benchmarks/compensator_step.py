@@ -25,7 +25,7 @@ from orchestrator.master.result import Recording
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.scenarios.scenario import Scenario, simulate
-from pyfmu_sources.backlash_compensator_slave import BacklashCompensator
+from pyfmu_sources.controllers.backlash_compensator_slave import BacklashCompensator
 from tests.support.played_slave import play
 
 TASK = ControlTask()

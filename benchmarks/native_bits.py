@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from orchestrator.building.native_build import ensure_native
-from pyfmu_sources.two_stage_train_slave import TwoStageTrain
+from pyfmu_sources.train.two_stage_train_slave import TwoStageTrain
 from tests.support.native_bits import EFFECTS, MODELS, TRAIN, Comparison, drivetrain_values
 
 

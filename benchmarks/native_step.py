@@ -15,8 +15,8 @@ from typing import Any
 
 from orchestrator.building.compilers import find_compiler
 from orchestrator.building.native_build import ensure_native
-from pyfmu_sources.drivetrain_slave import Drivetrain
-from pyfmu_sources.two_stage_train_slave import TwoStageTrain
+from pyfmu_sources.drivetrain.drivetrain_slave import Drivetrain
+from pyfmu_sources.train.two_stage_train_slave import TwoStageTrain
 from tests.support.native_hosts import StepHost
 
 STEP = 1e-3

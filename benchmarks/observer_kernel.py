@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from orchestrator.building.translation.kernel_arrays import Reals
 from orchestrator.building.translation.kinds import REAL, ArrayKind
-from pyfmu_sources.backlash_estimator import SIZE, Filter, correct, predict
+from pyfmu_sources.estimators.backlash_estimator import SIZE, Filter, correct, predict
 
 __all__ = ["observe"]
 

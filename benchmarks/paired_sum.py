@@ -23,7 +23,7 @@ from orchestrator.master.system import SignalSource, System
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import interval_95
-from pyfmu_sources.equations import PARAMETERS, DrivetrainParameters
+from pyfmu_sources.drivetrain.equations import PARAMETERS, DrivetrainParameters
 
 SIZES = (0.0, *(3e-4 * 1.25**n for n in range(34)))  # to half a radian
 

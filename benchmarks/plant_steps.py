@@ -12,9 +12,9 @@ from types import ModuleType
 
 import numpy as np
 
-from pyfmu_sources.backlash_models import BACKLASH_MODELS
-from pyfmu_sources.equations import DEFAULTS, NAMES, PARAMETERS, DrivetrainParameters
-from pyfmu_sources.parameter_rows import with_values
+from pyfmu_sources.drivetrain.equations import DEFAULTS, NAMES, PARAMETERS, DrivetrainParameters
+from pyfmu_sources.laws.backlash_models import BACKLASH_MODELS
+from pyfmu_sources.laws.parameter_rows import with_values
 from tests.support.compiled_plants import compiled_plant
 
 STEPS = (1e-5, 2e-4, 1e-3, 5e-3, 1e-2, 2e-2)

@@ -19,8 +19,8 @@ PROGRAMS = {
         """
 import numpy as np
 import orchestrator as oc
-from pyfmu_sources.equations import parameters
-from pyfmu_sources.equations import shaft_stiffness
+from pyfmu_sources.drivetrain.equations import parameters
+from pyfmu_sources.drivetrain.equations import shaft_stiffness
 
 pair = oc.run_pair(alpha=0.02, backlash_model="series")
 print(pair.crossings > 0, pair.machine["contact"].min(), round(shaft_stiffness(parameters(backlash_model=6.0)), 6))

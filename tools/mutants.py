@@ -76,7 +76,7 @@ ROOMS = (
     Room("likelihood", ("orchestrator/estimation/innovations.py",), ("tests/estimation/test_innovations.py",)),
     Room(
         "contact",
-        ("pyfmu_sources/contact.py", "pyfmu_sources/equations.py"),
+        ("pyfmu_sources/drivetrain/contact.py", "pyfmu_sources/drivetrain/equations.py"),
         ("tests/plants/test_contact.py", "tests/plants/test_effects_in_equations.py"),
     ),
     Room("journal", ("orchestrator/engine/journal.py",), ("tests/engine/test_engine_journal.py",)),

@@ -70,9 +70,9 @@ def _slaves_directly(job: BenchJob) -> Prepared:
 
 
 def _python_slaves(job: BenchJob) -> dict[str, Any]:
-    from pyfmu_sources.drivetrain_slave import Drivetrain
-    from pyfmu_sources.kalman_slave import KalmanEstimator
-    from pyfmu_sources.lqr_slave import LqrController
+    from pyfmu_sources.controllers.lqr_slave import LqrController
+    from pyfmu_sources.drivetrain.drivetrain_slave import Drivetrain
+    from pyfmu_sources.estimators.kalman_slave import KalmanEstimator
 
     kinds = {k.__name__: k for k in (Drivetrain, KalmanEstimator, LqrController)}
     slaves: dict[str, Any] = {n: kinds[Path(path).stem](instance_name=n) for n, path in job.fmus.items()}

@@ -7,7 +7,7 @@ import msgspec
 from orchestrator.diagnosis.report.law_export import LawRun, law_refusal
 from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.shared.results.diagnose import LawExportFound, LawRunFound, LearnedFound
-from pyfmu_sources.learned_plant import ON
+from pyfmu_sources.adapters.learned_plant import ON
 
 
 def request_law(diagnosis: Diagnosis) -> tuple[Diagnosis, bool]:

@@ -5,7 +5,7 @@ from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
 from orchestrator.shared.results import LiveFound
-from pyfmu_sources.equations import PARAMETERS
+from pyfmu_sources.drivetrain.equations import PARAMETERS
 
 SPAN = 2.0
 """Seconds after which the fitted model starts anew from the fit: as long as the free runs of a diagnosis."""

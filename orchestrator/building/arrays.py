@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from pyfmu_sources.fmu_variables import FmuVariable
+from pyfmu_sources.adapters.fmu_variables import FmuVariable
 
 _ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
 

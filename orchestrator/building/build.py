@@ -24,7 +24,7 @@ from orchestrator.building.launcher import Toolchain, find_toolchain
 from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of, recipes_of, with_law
 from orchestrator.errors import FmuError
 from orchestrator.fmi.ours import is_ours, record
-from pyfmu_sources.fmu_variables import with_starts
+from pyfmu_sources.adapters.fmu_variables import with_starts
 
 ROOT = Path(orchestrator.__file__).resolve().parents[1]
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
@@ -79,7 +79,7 @@ def _start_numbers(values: Mapping[str, float | str]) -> dict[str, float]:
 def _number(value: float | str) -> float:
     if not isinstance(value, str):
         return float(value)
-    from pyfmu_sources.model_xml import ENUMERATIONS
+    from pyfmu_sources.adapters.model_xml import ENUMERATIONS
 
     for items in ENUMERATIONS.values():
         names = [item for item, _ in items]

@@ -9,8 +9,8 @@ from xml.etree.ElementTree import Element, SubElement
 from orchestrator.building.arrays import Array, arrays
 from orchestrator.building.translation.slave import has_states
 from orchestrator.fmi.clocks import SELF_SAMPLING
-from pyfmu_sources.fmu_variables import FmuVariable, unit_exponents
-from pyfmu_sources.model_xml import AUTHOR, DATE, ENUMERATIONS, LICENSE, LOG_CATEGORIES, VERSION
+from pyfmu_sources.adapters.fmu_variables import FmuVariable, unit_exponents
+from pyfmu_sources.adapters.model_xml import AUTHOR, DATE, ENUMERATIONS, LICENSE, LOG_CATEGORIES, VERSION
 
 TYPES = {"Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration"}
 INDICATOR, CLOCK = "indicator", "sample"

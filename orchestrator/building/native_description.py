@@ -17,7 +17,7 @@ _SHARED = (
 
 def native_description(recipe: Recipe, cls: Any, indicators: int) -> Element:
     """Return the root element without fingerprint and GUID."""
-    root: Element = importlib.import_module("pyfmu_sources.model_xml").model_description(cls, recipe.name)
+    root: Element = importlib.import_module("pyfmu_sources.adapters.model_xml").model_description(cls, recipe.name)
     root.set("generationTool", "backlash-cosim")
     cosimulation = root.find("CoSimulation")
     assert cosimulation is not None

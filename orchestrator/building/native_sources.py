@@ -18,7 +18,7 @@ from orchestrator.building.translation.kinds import Tuple, kind_of
 from orchestrator.building.translation.slave import has_states, translate_slave
 from orchestrator.errors import FmuError
 from orchestrator.shared.equation_files import members
-from pyfmu_sources.fmu_variables import FmuVariable
+from pyfmu_sources.adapters.fmu_variables import FmuVariable
 
 RUNTIME = Path(__file__).parent / "native_fmu"
 HEADERS = ("translated.h", "pairs.h", "slave_types.h", "slave_core.h", "slave_states.h", "slave_exchange.h")

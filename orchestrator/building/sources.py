@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import FmuError
-from orchestrator.shared.equation_files import SOURCES, closure
+from orchestrator.shared.equation_files import SOURCES, closure, module_name
 from orchestrator.shared.syntax import parse_python
 from orchestrator.shared.version import __version__
 
@@ -19,7 +19,7 @@ SUFFIX = "_slave"
 LAW_SUFFIX, LAW_CLASS = "_law", "WithLaw"  # of the adapter of a plant with a learned law: module and class
 # Not themselves slaves, although their names end so.
 BASES = ("plant_slave", "sampled_slave")
-BRIDGE = "fmi3_bridge"
+BRIDGE = "adapters.fmi3_bridge"
 PLACEHOLDER = "{00000000-0000-0000-0000-000000000000}"
 """Stands for a GUID in C until the content that it follows from is known."""
 
@@ -42,13 +42,13 @@ class Recipe:
 
 @cache
 def catalogue() -> dict[str, Recipe]:
-    """Return the recipe of every adapter ``pyfmu_sources/*_slave.py``, by the name of its class."""
+    """Return the recipe of every adapter ``*_slave.py`` in a room of ``pyfmu_sources``, by the name of its class."""
     recipes = {}
-    for path in sorted(SOURCES.glob(f"*{SUFFIX}.py")):
+    for path in sorted(SOURCES.rglob(f"*{SUFFIX}.py"), key=lambda path: path.stem):
         if path.stem in BASES:
             continue
         classes = [node.name for node in parse_python(path.read_bytes()).body if isinstance(node, ast.ClassDef)]
-        recipes[classes[-1]] = Recipe(classes[-1], path.stem, classes[-1])
+        recipes[classes[-1]] = Recipe(classes[-1], module_name(path), classes[-1])
     return recipes
 
 
@@ -67,15 +67,15 @@ def recipes_of(names: Sequence[str] | None) -> list[Recipe]:
 
 def with_law(recipe: Recipe, law: Mapping[str, Any]) -> Recipe:
     """Return the recipe of a plant with a learned law."""
-    module = _law_module(recipe)
     if not takes_law(recipe):
-        raise FmuError(f"a learned law must act in a plant that has `pyfmu_sources/{module}.py`, but there is none")
-    return replace(recipe, module=module, class_name=recipe.class_name + LAW_CLASS, law=law)
+        place = f"pyfmu_sources/{_law_module(recipe).replace('.', '/')}.py"
+        raise FmuError(f"a learned law must act in a plant that has `{place}`, but there is none")
+    return replace(recipe, module=_law_module(recipe), class_name=recipe.class_name + LAW_CLASS, law=law)
 
 
 def takes_law(recipe: Recipe) -> bool:
     """Tell whether a plant has an adapter in which a learned law acts."""
-    return (SOURCES / f"{_law_module(recipe)}.py").exists()
+    return SOURCES.joinpath(*_law_module(recipe).split(".")).with_suffix(".py").exists()
 
 
 def _law_module(recipe: Recipe) -> str:

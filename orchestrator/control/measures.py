@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from orchestrator.control.loops import COUNTS, REST, ControlTask
 from orchestrator.master.result import Recording
-from pyfmu_sources.gap_traversal import Traversal, plan, point_at
+from pyfmu_sources.controllers.gap_traversal import Traversal, plan, point_at
 
 Array = NDArray[np.float64]
 
@@ -62,8 +62,8 @@ def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
 def bound_time(task: ControlTask, impact_speed: float) -> float:
     """Return the least time [s] of a traversal from rest that lands at ``impact_speed`` [rad/s] without torque.
 
-    See :mod:`pyfmu_sources.gap_traversal`: it is reached by the whole torque in three parts. It is 0 where no traversal
-    ends so quickly.
+    See :mod:`pyfmu_sources.controllers.gap_traversal`: it is reached by the whole torque in three parts. It is 0 where
+    no traversal ends so quickly.
     """
     t = _best(task, impact_speed)
     return t.first + t.second + t.third

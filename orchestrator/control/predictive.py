@@ -28,8 +28,8 @@ from orchestrator.master.protocol import ModelInterface, Signals, Transfer, Valu
 from orchestrator.master.system import Connection, Instance, System
 from orchestrator.plants.design import five_state_model, six_state_model
 from orchestrator.scenarios.definition import Scenario
-from pyfmu_sources.backlash_compensator import Tuning, impact_speed
-from pyfmu_sources.lqr import Estimate
+from pyfmu_sources.controllers.backlash_compensator import Tuning, impact_speed
+from pyfmu_sources.controllers.lqr import Estimate
 
 if TYPE_CHECKING:
     from control import StateSpace

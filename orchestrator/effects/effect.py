@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pyfmu_sources.parameter_rows import Parameter
+from pyfmu_sources.laws.parameter_rows import Parameter
 
 Array = NDArray[np.float64]
 Starts = Mapping[str, tuple[float, ...]]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from orchestrator.effects.effect import Effect, SignalScales
-from pyfmu_sources.parameter_rows import Parameter
+from pyfmu_sources.laws.parameter_rows import Parameter
 
 LEAD = Parameter("measurement.lead", "s", 0.0, 0.0, 1.0, "Time by which torques act before their stamp")
 SHIFT = Parameter("measurement.shift", "s", 0.0, -1.0, 1.0, "Time by which the load's angle is stamped later")

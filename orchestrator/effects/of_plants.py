@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.effects.effect import Effect, SignalScales, rms
 from orchestrator.effects.of_logs import is_within, longest_lag, longest_time, times
-from pyfmu_sources.parameter_rows import BIG, Parameter
+from pyfmu_sources.laws.parameter_rows import BIG, Parameter
 
 # Of the analysis alone: logarithm [rad] of the distance over which dry friction builds up, or of the penetration over
 # which the damping of teeth in contact does.

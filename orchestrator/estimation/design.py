@@ -22,7 +22,7 @@ from orchestrator.estimation.innovations import Array, affine_model, simulate
 from orchestrator.estimation.problem import make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import MINIMUM_ROWS, Record
-from pyfmu_sources.equations import DrivetrainParameters
+from pyfmu_sources.drivetrain.equations import DrivetrainParameters
 
 TORQUE_NOISE = 1e-2  # N.m.s^0.5
 DEFAULT_NOISE = (3.5e-4, 1.75e-4)  # rad

@@ -1,8 +1,8 @@
 """One-step prediction errors of the drivetrain: an extended Kalman filter over located contact events.
 
 Between two events the dead-zone model is affine in ``x = (theta_m, omega_m, theta_l, omega_l, T_m)``. Its matrices
-come from :func:`pyfmu_sources.equations.rates`; here they are discretised once per parameter set, the flank is
-followed inside each sample, and the covariance is carried through every change of flank by its saltation matrix.
+come from :func:`pyfmu_sources.drivetrain.equations.rates`; here they are discretised once per parameter set, the flank
+is followed inside each sample, and the covariance is carried through every change of flank by its saltation matrix.
 With the process noise at zero this is the output-error likelihood of the deterministic plant; with process noise it
 is the likelihood in innovation form, in which an imperfect model does not drift away from the record.
 """
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
-from pyfmu_sources.backlash_models import DEAD_ZONE
-from pyfmu_sources.equations import DrivetrainParameters, State, rates
-from pyfmu_sources.parameter_rows import BIG
+from pyfmu_sources.drivetrain.equations import DrivetrainParameters, State, rates
+from pyfmu_sources.laws.backlash_models import DEAD_ZONE
+from pyfmu_sources.laws.parameter_rows import BIG
 
 Array = NDArray[np.float64]
 KERNEL = Kernels("orchestrator.estimation.kernel")

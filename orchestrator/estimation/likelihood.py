@@ -24,7 +24,7 @@ from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels,
 from orchestrator.estimation.problem import IMPULSE, OFFSET, SAMPLED, SCALE, STATE_NAMES, GapProblem, UnknownProblem
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.shared.inference.inverse import pseudo_inverse
-from pyfmu_sources.equations import NAMES, DrivetrainParameters
+from pyfmu_sources.drivetrain.equations import NAMES, DrivetrainParameters
 
 JUMP = 100.0
 START_DAMPING = 1e-6

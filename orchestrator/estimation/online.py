@@ -5,7 +5,16 @@ from typing import Annotated, Any
 
 from orchestrator.building.translation.kernel_arrays import Reals
 from orchestrator.building.translation.kinds import REAL, ArrayKind
-from pyfmu_sources.backlash_estimator import FILTERS, SIZE, Filters, advance, begin, combine, contact, measure
+from pyfmu_sources.estimators.backlash_estimator import (
+    FILTERS,
+    SIZE,
+    Filters,
+    advance,
+    begin,
+    combine,
+    contact,
+    measure,
+)
 
 __all__ = ["follow"]
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.paired.experiment import Experiment
 from orchestrator.plants.design import KalmanFilter
-from pyfmu_sources.backlash_models import BACKLASH_MODELS
-from pyfmu_sources.equations import parameters
+from pyfmu_sources.drivetrain.equations import parameters
+from pyfmu_sources.laws.backlash_models import BACKLASH_MODELS
 
 Array = NDArray[np.float64]
 COLUMNS = ("theta_m", "theta_l", "theta_l_hat", "u", "contact", "T_m", "T_l_hat")

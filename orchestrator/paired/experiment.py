@@ -27,7 +27,7 @@ from orchestrator.plants.design import (
     five_state_model,
     six_state_model,
 )
-from pyfmu_sources.backlash_models import MODELS
+from pyfmu_sources.laws.backlash_models import MODELS
 
 Array = NDArray[np.float64]
 THESIS_SCALE = 48.0

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 from orchestrator.building.translation.kernel_arrays import Reals
 from orchestrator.building.translation.kinds import REAL, ArrayKind
-from pyfmu_sources.drivetrain import advance, consistent_start, initial_mode, prepare
-from pyfmu_sources.equations import COUNT, DrivetrainParameters
-from pyfmu_sources.kalman import Vector6, update
-from pyfmu_sources.lqr import control
+from pyfmu_sources.controllers.lqr import control
+from pyfmu_sources.drivetrain.drivetrain import advance, consistent_start, initial_mode, prepare
+from pyfmu_sources.drivetrain.equations import COUNT, DrivetrainParameters
+from pyfmu_sources.estimators.kalman import Vector6, update
 
 __all__ = ["run_loop"]
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.effects.effect import Effect
-from pyfmu_sources.parameter_rows import BIG, Parameter
+from pyfmu_sources.laws.parameter_rows import BIG, Parameter
 
 Array = NDArray[np.float64]
 
-STATES = 8  # places of the state, as in ``pyfmu_sources.equations``
+STATES = 8  # places of the state, as in ``pyfmu_sources.drivetrain.equations``
 STEP = 0.35  # of the fastest oscillation: a Runge-Kutta step, whose error then lies far below an encoder's count
 MOTION = "orchestrator.plants.kernels.motion"
 LEARNED_STEPS = (4, 16)
@@ -88,7 +88,8 @@ def _accept_all(values: Mapping[str, float]) -> str:
 class Plant:
     """One plant that records can be compared with.
 
-    The state of the analysis has eight places (as in ``pyfmu_sources.equations``), of which a plant may use fewer.
+    The state of the analysis has eight places (as in ``pyfmu_sources.drivetrain.equations``), of which a plant may
+    use fewer.
 
     Attributes:
         linear: names of the parameters of the plant with every effect off.

@@ -70,7 +70,7 @@ class Regulator:
 
 @dataclass(frozen=True)
 class KalmanFilter:
-    """Stationary Kalman filter of the sampled six-state model: see ``pyfmu_sources.kalman``.
+    """Stationary Kalman filter of the sampled six-state model: see ``pyfmu_sources.estimators.kalman``.
 
     ``A`` 6 x 6, ``B`` 6, ``L`` 6 x 2 (filter gain), ``S_inverse`` 2 x 2 (inverse innovation covariance, 1/rad2).
     """

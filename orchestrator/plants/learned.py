@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
 from orchestrator.shared.cores import cache_once
-from pyfmu_sources.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
-from pyfmu_sources.parameter_rows import BIG, Parameter
+from pyfmu_sources.laws.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
+from pyfmu_sources.laws.parameter_rows import BIG, Parameter
 
 Array = NDArray[np.float64]
 LEARNED = "orchestrator.plants.kernels.learned"

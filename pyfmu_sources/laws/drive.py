@@ -6,7 +6,7 @@ In all functions: ``u``: what it follows [N.m]; ``request``: behind the lag, at 
 
 from math import exp
 
-from ..parameter_rows import BIG, TINY, Parameter, mark_linear
+from .parameter_rows import BIG, TINY, Parameter, mark_linear
 
 INPUT = mark_linear(
     Parameter("effects.input_delay.delay", "s", 0.0, 0.0, 10.0, "Dead time of the requested torque"),

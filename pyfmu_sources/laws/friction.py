@@ -15,7 +15,7 @@ teeth carry; ``bristle``: its bending [rad]; ``slip``: direction in which it sli
 from math import exp
 from typing import NamedTuple
 
-from ..parameter_rows import BIG, TINY, Parameter, mark_linear
+from .parameter_rows import BIG, TINY, Parameter, mark_linear
 from .waves import periodic, wave_rows
 
 

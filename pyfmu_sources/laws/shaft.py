@@ -5,7 +5,7 @@ In all functions: ``speed`` [rad/s]; ``stiffness`` [N.m/rad].
 
 from math import exp
 
-from ..parameter_rows import BIG, TINY, Parameter, mark_linear
+from .parameter_rows import BIG, TINY, Parameter, mark_linear
 from .waves import wave_rows
 
 HARDENING = (Parameter("effects.hardening_stiffness.cubic", "N.m/rad3", 0.0, 0.0, BIG, "Cubic stiffness of the shaft"),)

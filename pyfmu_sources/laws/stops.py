@@ -3,7 +3,7 @@
 In all functions: ``angle`` [rad]; ``speed`` [rad/s]; ``stiffness`` [N.m/rad]; ``cubic`` [N.m/rad3].
 """
 
-from ..parameter_rows import BIG, Parameter, mark_linear
+from .parameter_rows import BIG, Parameter, mark_linear
 
 SPRING = (
     Parameter("effects.spring_load.stiffness", "N.m/rad", 0.0, -BIG, BIG, "Spring or cable that pulls the load back"),

@@ -5,7 +5,7 @@ In all functions: ``angle`` [rad]; ``phase``: at angle zero [rad].
 
 from math import cos, sin
 
-from ..parameter_rows import BIG, Parameter, mark_linear
+from .parameter_rows import BIG, Parameter, mark_linear
 
 LARGEST = 1.7976931348623157e308
 

@@ -10,9 +10,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 
 from orchestrator.building.compilers import find_compiler
-from pyfmu_sources import servo_axis
-from pyfmu_sources.axis_equations import DEFAULTS, NAMES
-from pyfmu_sources.parameter_rows import with_values
+from pyfmu_sources.axis import servo_axis
+from pyfmu_sources.axis.axis_equations import DEFAULTS, NAMES
+from pyfmu_sources.laws.parameter_rows import with_values
 from tests.support.model_exchange import (
     END,
     STEP,

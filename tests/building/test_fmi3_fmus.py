@@ -17,7 +17,7 @@ from orchestrator.building.compilers import find_compiler
 from orchestrator.building.native_sources import slave_class
 from orchestrator.building.sources import catalogue, recipe_of
 from orchestrator.checking.binaries import inspect
-from pyfmu_sources.fmu_variables import FmuVariable
+from pyfmu_sources.adapters.fmu_variables import FmuVariable
 from tests.support.fmi3_calls import Slave3
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")

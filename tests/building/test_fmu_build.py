@@ -19,8 +19,8 @@ from orchestrator.building.launcher import Toolchain, compile_launcher, find_too
 from orchestrator.errors import FmuError
 from orchestrator.paired.experiment import Experiment
 from orchestrator.plants import design
-from pyfmu_sources.backlash_models import BACKLASH_MODELS
-from pyfmu_sources.model_xml import ENUMERATIONS
+from pyfmu_sources.adapters.model_xml import ENUMERATIONS
+from pyfmu_sources.laws.backlash_models import BACKLASH_MODELS
 from tests.support.waiting import HANGS
 
 BUILD_HERE = "from orchestrator.building.build import *; ensure_built(['Drivetrain'], Path('.'))"
@@ -184,7 +184,7 @@ def test_two_versions_of_one_model_in_one_process(tmp_path: Path, fmus: dict[str
     copy = tmp_path / "changed"
     for package in ("orchestrator", "pyfmu_sources"):
         shutil.copytree(build.ROOT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
-    equations = copy / "pyfmu_sources" / "drivetrain_slave.py"
+    equations = copy / "pyfmu_sources" / "drivetrain" / "drivetrain_slave.py"
     text = equations.read_text(encoding="utf-8")
     assert "real[THETA_M] = x[0] + self._p.sensor_offset_motor_offset" in text
     equations.write_text(text.replace("real[THETA_M] = x[0] +", "real[THETA_M] = 2.0 * x[0] +"), encoding="utf-8")

@@ -12,8 +12,8 @@ from benchmarks.half_drivetrains import FOLDER, STOP, compare, log_contact, simu
 from orchestrator.building.compilers import find_compiler
 from orchestrator.cli import main
 from orchestrator.master.algorithms import Adaptive
-from pyfmu_sources.load_half_slave import LoadHalf
-from pyfmu_sources.motor_half_slave import MotorHalf
+from pyfmu_sources.halves.load_half_slave import LoadHalf
+from pyfmu_sources.halves.motor_half_slave import MotorHalf
 from tests.support.load_side import load_after
 from tests.support.motor_side import motor_after
 from tests.support.two_mass import TORQUE, solution

@@ -6,9 +6,11 @@ import pytest
 from orchestrator.building.build import build_variant
 from orchestrator.building.sources import Recipe, takes_law, with_law
 from orchestrator.errors import FmuError
-from pyfmu_sources.drivetrain_law import DrivetrainWithLaw
-from pyfmu_sources.drivetrain_slave import Drivetrain
-from pyfmu_sources.learned_law import (
+from pyfmu_sources.axis.servo_axis_law import ServoAxisWithLaw
+from pyfmu_sources.axis.servo_axis_slave import ServoAxis
+from pyfmu_sources.drivetrain.drivetrain_law import DrivetrainWithLaw
+from pyfmu_sources.drivetrain.drivetrain_slave import Drivetrain
+from pyfmu_sources.laws.learned_law import (
     CYCLE_L,
     CYCLE_M,
     DRIVE,
@@ -21,8 +23,6 @@ from pyfmu_sources.learned_law import (
     WITH_SPEED,
     law_torque,
 )
-from pyfmu_sources.servo_axis_law import ServoAxisWithLaw
-from pyfmu_sources.servo_axis_slave import ServoAxis
 
 ON = "effects.learned_law.on"
 H = 0.005
@@ -206,9 +206,9 @@ def test_knots_must_rise_where_the_law_is_on():
 
 
 def test_a_plant_without_an_adapter_has_no_law(tmp_path):
-    recipe = Recipe("LqrController", "lqr_slave", "LqrController")
+    recipe = Recipe("LqrController", "controllers.lqr_slave", "LqrController")
     assert not takes_law(recipe)
-    with pytest.raises(FmuError, match=r"pyfmu_sources/lqr_law\.py"):
+    with pytest.raises(FmuError, match=r"pyfmu_sources/controllers/lqr_law\.py"):
         with_law(recipe, law(DRIVE, LINE))
     with pytest.raises(FmuError, match="lqr_law"):
         build_variant("other", "LqrController", {}, tmp_path, law(DRIVE, LINE))

@@ -8,21 +8,22 @@ import pytest
 
 from orchestrator.building.build import ensure_built
 from orchestrator.building.compilers import find_compiler
-from pyfmu_sources.two_stage_train_slave import TwoStageTrain
+from orchestrator.building.sources import recipe_of
+from pyfmu_sources.train.two_stage_train_slave import TwoStageTrain
 from tests.support.native_bits import EFFECTS, MODELS, TRAIN, Comparison, drivetrain_values
 from tests.support.native_pair import Driver, random_calls
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
 
-NAMES = {
-    "Drivetrain": "drivetrain_slave",
-    "LqrController": "lqr_slave",
-    "KalmanEstimator": "kalman_slave",
-    "BacklashEstimator": "backlash_estimator_slave",
-    "BacklashCompensator": "backlash_compensator_slave",
-    "ServoAxis": "servo_axis_slave",
-    "TwoStageTrain": "two_stage_train_slave",
-}
+NAMES = (
+    "Drivetrain",
+    "LqrController",
+    "KalmanEstimator",
+    "BacklashEstimator",
+    "BacklashCompensator",
+    "ServoAxis",
+    "TwoStageTrain",
+)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def native(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
 @pytest.mark.parametrize("name", NAMES)
 def test_random_calls_give_the_same_as_the_python_fmu(native: dict[str, Path], name: str) -> None:
     python = ensure_built([name])[name]
-    table = getattr(importlib.import_module(f"pyfmu_sources.{NAMES[name]}"), name).table
+    table = getattr(importlib.import_module(f"pyfmu_sources.{recipe_of(name).module}"), name).table
     count, seeds = (60, 1) if name == "BacklashEstimator" else (300, 4)
     stepped = sum(random_calls([Driver(python), Driver(native[name])], table, count, seed) for seed in range(seeds))
     assert stepped > count * seeds // 6

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from orchestrator.building.compilers import find_compiler
-from pyfmu_sources import drivetrain
-from pyfmu_sources.equations import parameters
+from pyfmu_sources.drivetrain import drivetrain
+from pyfmu_sources.drivetrain.equations import parameters
 from tests.support.model_exchange import END, STEP, event_times, first_time, request, stepped_and_exchanged
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")

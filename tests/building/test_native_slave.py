@@ -34,7 +34,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     code = re.search(r"```python\n(\"\"\"The FMU ``LowPass``.*?)```", page, re.DOTALL)
     assert code is not None
     assert len(code[1].splitlines()) <= 50
-    (copy / "pyfmu_sources" / "low_pass_slave.py").write_text(code[1], encoding="utf-8")
+    (copy / "pyfmu_sources" / "controllers" / "low_pass_slave.py").write_text(code[1], encoding="utf-8")
     return copy
 
 
@@ -90,11 +90,11 @@ CLASHES = """    share = _share
 
 
 def test_locals_and_types_may_be_called_as_the_c_around_them_calls_others(project: Path) -> None:
-    text = (project / "pyfmu_sources" / "low_pass_slave.py").read_text(encoding="utf-8")
+    text = (project / "pyfmu_sources" / "controllers" / "low_pass_slave.py").read_text(encoding="utf-8")
     text = text.replace("LowPass", "Clashes").replace("import ClassVar", "import ClassVar, NamedTuple")
     text = text.replace("    return u + (y - u) * exp(-step / time_constant)\n", CLASHES)
     text = text.replace("\ndef filtered(", NAMES)
-    (project / "pyfmu_sources" / "clashes_slave.py").write_text(text, encoding="utf-8")
+    (project / "pyfmu_sources" / "controllers" / "clashes_slave.py").write_text(text, encoding="utf-8")
     built = build_native(project, "Clashes")
     assert built.returncode == 0, built.stderr
     require_lag(project, project / "native" / "Clashes.fmu")
@@ -103,8 +103,8 @@ def test_locals_and_types_may_be_called_as_the_c_around_them_calls_others(projec
 @pytest.mark.parametrize("native", [[], ["--native", "--platforms", "here"]])
 @pytest.mark.parametrize("name", ["_stop", "real", "advance"])
 def test_hidden_state_must_not_be_called_as_what_every_slave_has(project: Path, name: str, native: list[str]) -> None:
-    text = (project / "pyfmu_sources" / "low_pass_slave.py").read_text(encoding="utf-8")
-    other = project / "pyfmu_sources" / "odd_slave.py"
+    text = (project / "pyfmu_sources" / "controllers" / "low_pass_slave.py").read_text(encoding="utf-8")
+    other = project / "pyfmu_sources" / "controllers" / "odd_slave.py"
     other.write_text(text.replace("    _y: float", f"    _y: float\n    {name}: float").replace("LowPass", "Odd"))
     try:
         built = run(project, "-m", "orchestrator", "build", *native, "Odd", "--directory", "x")
@@ -135,9 +135,9 @@ def test_hidden_state_must_not_be_called_as_what_every_slave_has(project: Path, 
     ],
 )
 def test_what_is_outside_the_subset_is_refused_with_file_and_line(project: Path, line: str, message: str) -> None:
-    source = project / "pyfmu_sources" / "low_pass_slave.py"
+    source = project / "pyfmu_sources" / "controllers" / "low_pass_slave.py"
     text = source.read_text(encoding="utf-8")
-    other = project / "pyfmu_sources" / "odd_slave.py"
+    other = project / "pyfmu_sources" / "controllers" / "odd_slave.py"
     changed = text.replace("    return u + (y - u) * exp(-step / time_constant)", line).replace("LowPass", "Odd")
     assert changed != text.replace("LowPass", "Odd")
     other.write_text(changed, encoding="utf-8")

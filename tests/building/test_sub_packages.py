@@ -17,7 +17,7 @@ from tests.support.copies import ROOT, copy_project, run_in_copy
 SHAPES = {
     "__init__.py": '"""Shapes."""\n',
     "decay.py": (
-        '"""Decay."""\n\nfrom math import exp\n\nfrom ..event_numbers import NO_EVENT\n\n\n'
+        '"""Decay."""\n\nfrom math import exp\n\nfrom ..hybrid.event_numbers import NO_EVENT\n\n\n'
         "def share_left(step: float, time_constant: float) -> float:\n"
         '    """Return what is left of a distance after a ``step`` [s]."""\n'
         "    return exp(-step / time_constant) + float(NO_EVENT - NO_EVENT)\n"
@@ -60,9 +60,9 @@ def project(tmp_path: Path) -> Path:
     code, count = re.subn(r"\n\ndef filtered\(.*?\n\n\n", "\n\n", found[1], flags=re.DOTALL)
     assert count == 1
     code = code.replace("from math import exp\n", "").replace(
-        "from .slave_base", "from .shapes.filters import filtered\nfrom .slave_base"
+        "from ..adapters.slave_base", "from ..shapes.filters import filtered\nfrom ..adapters.slave_base"
     )
-    (tmp_path / "pyfmu_sources" / "low_pass_slave.py").write_text(code, encoding="utf-8")
+    (tmp_path / "pyfmu_sources" / "controllers" / "low_pass_slave.py").write_text(code, encoding="utf-8")
     (tmp_path / "low_pass.py").write_text(KERNEL, encoding="utf-8")
     for name, text in SHAPES.items():
         (tmp_path / "pyfmu_sources" / "shapes").mkdir(exist_ok=True)
@@ -104,7 +104,14 @@ def test_an_import_that_an_fmu_could_not_follow_is_refused(
         equation_files.closure("odd")
     source.write_text('"""Right."""\n\nfrom .shapes import filters\n', encoding="utf-8")
     found = [path.relative_to(tmp_path / "pyfmu_sources").as_posix() for path in equation_files.closure("odd")]
-    assert found == ["event_numbers.py", "odd.py", "shapes/__init__.py", "shapes/decay.py", "shapes/filters.py"]
+    assert found == [
+        "hybrid/__init__.py",
+        "hybrid/event_numbers.py",
+        "odd.py",
+        "shapes/__init__.py",
+        "shapes/decay.py",
+        "shapes/filters.py",
+    ]
     equation_files.closure.cache_clear()
 
 

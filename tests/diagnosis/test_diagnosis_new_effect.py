@@ -14,7 +14,7 @@ from pathlib import Path
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.records.model_file import read_model
-from pyfmu_sources import axis_equations as axis
+from pyfmu_sources.axis import axis_equations as axis
 from tests.support.axis_record import axis_record
 
 p = axis.DEFAULTS._replace(J=1.04, b=1.95, fan_coefficient=0.2)
@@ -32,8 +32,8 @@ from orchestrator.diagnosis.model.torque_balance import TorqueBalance
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import record_from_columns
-from pyfmu_sources import drivetrain
-from pyfmu_sources.equations import DEFAULTS
+from pyfmu_sources.drivetrain import drivetrain
+from pyfmu_sources.drivetrain.equations import DEFAULTS
 
 h, rng = 0.005, np.random.default_rng(3)
 time = h * np.arange(1800)

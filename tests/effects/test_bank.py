@@ -8,9 +8,10 @@ import pytest
 from orchestrator.effects.effect import Effect, PlaceScales
 from orchestrator.effects.of_fmus import BANK, PORT, FmuEffect
 from orchestrator.effects.of_plants import DRIVETRAIN_BANK
-from pyfmu_sources import axis_equations, equations
+from pyfmu_sources.axis import axis_equations
+from pyfmu_sources.drivetrain import equations
 from pyfmu_sources.laws import port
-from pyfmu_sources.parameter_rows import with_values
+from pyfmu_sources.laws.parameter_rows import with_values
 
 ROUNDS, SAMPLES = 6, 4000
 PLACE = PlaceScales(0.01, 1.0, 2.0, np.linspace(-1.0, 1.0, 50), speed=1.0, span=2.0, cycles=(5.0,))

@@ -23,8 +23,8 @@ from orchestrator.records.model_file import default_model, read_model
 from orchestrator.records.record import Record, record_from_columns
 from orchestrator.shared.results import as_plain, read
 from orchestrator.shared.results.estimate import EstimateFound
-from pyfmu_sources.equations import DEFAULTS
-from pyfmu_sources.parameter_rows import with_values
+from pyfmu_sources.drivetrain.equations import DEFAULTS
+from pyfmu_sources.laws.parameter_rows import with_values
 from tests.support.hidden_effects import one_encoder_case
 from tests.support.independent_plant import make_record, write_csv
 from tests.support.online_loop import run_case

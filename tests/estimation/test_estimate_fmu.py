@@ -10,8 +10,8 @@ from orchestrator.estimation.methods import ekf
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import Record, record_from_columns
 from orchestrator.scenarios.scenario import load_scenario, simulate
-from pyfmu_sources.backlash_estimator import FILTERS, FORGOTTEN, SIZE, WEIGHT, NoiseSettings, covariance
-from pyfmu_sources.backlash_estimator_slave import (
+from pyfmu_sources.estimators.backlash_estimator import FILTERS, FORGOTTEN, SIZE, WEIGHT, NoiseSettings, covariance
+from pyfmu_sources.estimators.backlash_estimator_slave import (
     ALPHA_DEVIATION,
     ALPHA_HAT,
     CONTACT_HAT,
@@ -117,7 +117,7 @@ def test_the_fmu_estimates_the_gap(record: Record) -> None:
 
 
 def test_a_filter_that_diverges_is_dropped() -> None:
-    from pyfmu_sources import backlash_estimator as source
+    from pyfmu_sources.estimators import backlash_estimator as source
 
     filters = [[0.0] * SIZE for _ in range(FILTERS)]
     source.begin(filters, 0.0, 1.0, 0.0, 0.0, NoiseSettings())

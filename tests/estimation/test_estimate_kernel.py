@@ -6,7 +6,7 @@ import scipy.linalg
 
 from orchestrator.estimation.innovations import KERNEL, _discrete, affine_model
 from orchestrator.estimation.kernel import BLUR
-from pyfmu_sources.equations import parameters
+from pyfmu_sources.drivetrain.equations import parameters
 
 STEP, TORQUE = 0.005, 40.0
 

@@ -6,8 +6,8 @@ from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
 from orchestrator.estimation.innovations import FADING, Innovations, NoiseLevels, affine_model, innovations, simulate
-from pyfmu_sources import contact, drivetrain
-from pyfmu_sources import equations as dt
+from pyfmu_sources.drivetrain import contact, drivetrain
+from pyfmu_sources.drivetrain import equations as dt
 
 H = 0.005
 U = np.where(np.arange(30) % 10 < 5, 40.0, -40.0)

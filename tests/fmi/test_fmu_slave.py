@@ -8,8 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pyfmu_sources import kalman, kalman_slave, lqr_slave
-from pyfmu_sources.drivetrain_slave import (
+from pyfmu_sources.adapters.fmu_variables import unit_exponents
+from pyfmu_sources.adapters.plant_slave import U
+from pyfmu_sources.adapters.slave_base import SlaveBase
+from pyfmu_sources.controllers import lqr_slave
+from pyfmu_sources.controllers.lqr_slave import LqrController
+from pyfmu_sources.drivetrain.drivetrain_slave import (
     CONTACT,
     FIRST_PARAMETER,
     OMEGA_M,
@@ -19,11 +23,8 @@ from pyfmu_sources.drivetrain_slave import (
     THETA_M,
     Drivetrain,
 )
-from pyfmu_sources.fmu_variables import unit_exponents
-from pyfmu_sources.kalman_slave import KalmanEstimator
-from pyfmu_sources.lqr_slave import LqrController
-from pyfmu_sources.plant_slave import U
-from pyfmu_sources.slave_base import SlaveBase
+from pyfmu_sources.estimators import kalman, kalman_slave
+from pyfmu_sources.estimators.kalman_slave import KalmanEstimator
 
 OUTPUTS = [THETA_M, THETA_L, OMEGA_M, T_M, T_SHAFT]
 

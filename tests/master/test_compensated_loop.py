@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.building.starts import default_starts
 from orchestrator.scenarios.scenario import load_scenario, simulate
-from pyfmu_sources.backlash_compensator_slave import BacklashCompensator
+from pyfmu_sources.controllers.backlash_compensator_slave import BacklashCompensator
 from tests.support.c_fmu import have_compiler
 from tests.support.played_slave import play
 

@@ -5,7 +5,7 @@ import pytest
 from control import c2d
 
 from orchestrator.plants.design import DrivetrainValues, six_state_model
-from pyfmu_sources.backlash_compensator import (
+from pyfmu_sources.controllers.backlash_compensator import (
     CROSS,
     HOLD,
     PLAIN,
@@ -21,8 +21,8 @@ from pyfmu_sources.backlash_compensator import (
     lead_after,
     start_state,
 )
-from pyfmu_sources.gap_traversal import Traversal, go_on, plan
-from pyfmu_sources.lqr import control
+from pyfmu_sources.controllers.gap_traversal import Traversal, go_on, plan
+from pyfmu_sources.controllers.lqr import control
 
 GAINS = (-124.680427, 127.392214, 725.091101, 3.38145167, 1.72123183)
 TRAIN = Train(0.4, 5.6, 0.1, 1.0, 3.984, 1.0 / 3300.0, 5e-3)

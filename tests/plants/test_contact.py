@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from pyfmu_sources import backlash_models as models
-from pyfmu_sources import contact as c
-from pyfmu_sources import equations as dt
-from pyfmu_sources import equations as eq
+from pyfmu_sources.drivetrain import contact as c
+from pyfmu_sources.drivetrain import equations as dt
+from pyfmu_sources.drivetrain import equations as eq
+from pyfmu_sources.laws import backlash_models as models
 
 I, K, C, J_M, J_L, ALPHA = 3.984, 3300.0, 1.0, 0.4, 5.6, 0.01
 REST = (0.0, 0.0, 0.0, 0.0)  # bristles, memory of the shaft, filtered request

@@ -4,12 +4,14 @@ import math
 
 import pytest
 
-from pyfmu_sources import axis_equations, drivetrain, equations, train_equations
-from pyfmu_sources.drivetrain_slave import Drivetrain
-from pyfmu_sources.equations import NAMES, parameters
-from pyfmu_sources.parameter_rows import BIG, Parameter, with_values
-from pyfmu_sources.servo_axis_slave import ServoAxis
-from pyfmu_sources.two_stage_train_slave import TwoStageTrain
+from pyfmu_sources.axis import axis_equations
+from pyfmu_sources.axis.servo_axis_slave import ServoAxis
+from pyfmu_sources.drivetrain import drivetrain, equations
+from pyfmu_sources.drivetrain.drivetrain_slave import Drivetrain
+from pyfmu_sources.drivetrain.equations import NAMES, parameters
+from pyfmu_sources.laws.parameter_rows import BIG, Parameter, with_values
+from pyfmu_sources.train import train_equations
+from pyfmu_sources.train.two_stage_train_slave import TwoStageTrain
 
 # What a row is set to, by its unit; a half of what is usual where that is not zero.
 SIZES = {

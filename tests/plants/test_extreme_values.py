@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from pyfmu_sources import smooth_mode
-from pyfmu_sources.drivetrain_slave import MODEL, Drivetrain
-from pyfmu_sources.servo_axis_slave import ServoAxis
-from pyfmu_sources.slave_base import TOO_STIFF
-from pyfmu_sources.two_stage_train_slave import TwoStageTrain
+from pyfmu_sources.adapters.slave_base import TOO_STIFF
+from pyfmu_sources.axis.servo_axis_slave import ServoAxis
+from pyfmu_sources.drivetrain import smooth_mode
+from pyfmu_sources.drivetrain.drivetrain_slave import MODEL, Drivetrain
+from pyfmu_sources.train.two_stage_train_slave import TwoStageTrain
 
 STEP, STEPS = 1e-3, 10
 EXTREMES = (

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import linprog
 
-from pyfmu_sources.gap_traversal import end_of, plan, point_at, request_at
+from pyfmu_sources.controllers.gap_traversal import end_of, plan, point_at, request_at
 
 INERTIA = 0.4 * 3.984
 DRIVES = {"slow": 1.0, "fast": 5e-3}

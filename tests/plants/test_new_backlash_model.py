@@ -16,8 +16,11 @@ from scipy.integrate import solve_ivp
 from orchestrator.paired.experiment import BACKLASH_MODELS, Experiment
 from orchestrator.records.model_file import default_model
 from orchestrator.diagnosis.data.records import check_model
-from pyfmu_sources import backlash_models as models, contact, drivetrain, equations as dt
-from pyfmu_sources.model_xml import ENUMERATIONS
+from pyfmu_sources.laws import backlash_models as models
+from pyfmu_sources.drivetrain import contact
+from pyfmu_sources.drivetrain import drivetrain
+from pyfmu_sources.drivetrain import equations as dt
+from pyfmu_sources.adapters.model_xml import ENUMERATIONS
 
 number = models.BACKLASH_MODELS.index("soft_teeth")
 print(number, ENUMERATIONS["BacklashModel"][-1][0], BACKLASH_MODELS[-1])
@@ -47,7 +50,7 @@ print(off < 1e-6, abs(y[2]) > 0.01)
 
 def test_a_backlash_model_is_one_row(tmp_path: Path) -> None:
     copy_project(tmp_path)
-    path = tmp_path / "pyfmu_sources" / "backlash_models.py"
+    path = tmp_path / "pyfmu_sources" / "laws" / "backlash_models.py"
     text = path.read_text()
     end = text.index("    # Further models follow here")
     path.write_text(text[:end] + ROW + text[end:])

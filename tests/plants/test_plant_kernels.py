@@ -11,7 +11,7 @@ from orchestrator.plants.description import Plant
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.plants.known.servo_axis import PLANT as AXIS
 from orchestrator.plants.learned import with_law
-from pyfmu_sources.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
+from pyfmu_sources.laws.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
 
 N, H = 60, 2e-3
 PLANTS = (DRIVETRAIN, AXIS, with_law(DRIVETRAIN), with_law(AXIS))

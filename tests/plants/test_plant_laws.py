@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pyfmu_sources import axis_equations
-from pyfmu_sources.equations import NAMES, parameters
-from pyfmu_sources.parameter_rows import with_values
+from pyfmu_sources.axis import axis_equations
+from pyfmu_sources.drivetrain.equations import NAMES, parameters
+from pyfmu_sources.laws.parameter_rows import with_values
 from tests.support import independent_plant as truth
 from tests.support.compiled_plants import compiled_plant
 

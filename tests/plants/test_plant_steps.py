@@ -6,10 +6,11 @@ import time
 import numpy as np
 import pytest
 
-from pyfmu_sources import axis_equations, drivetrain, smooth_mode
-from pyfmu_sources.backlash_models import BACKLASH_MODELS
-from pyfmu_sources.equations import parameters
-from pyfmu_sources.parameter_rows import with_values
+from pyfmu_sources.axis import axis_equations
+from pyfmu_sources.drivetrain import drivetrain, smooth_mode
+from pyfmu_sources.drivetrain.equations import parameters
+from pyfmu_sources.laws.backlash_models import BACKLASH_MODELS
+from pyfmu_sources.laws.parameter_rows import with_values
 from tests.support.compiled_plants import compiled_plant
 
 RIGID = ("hysteresis", "rigid_impact")

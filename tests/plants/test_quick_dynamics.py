@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyfmu_sources import axis_equations, drivetrain, servo_axis, smooth_mode
-from pyfmu_sources.equations import NAMES, parameters
-from pyfmu_sources.parameter_rows import with_values
+from pyfmu_sources.axis import axis_equations, servo_axis
+from pyfmu_sources.drivetrain import drivetrain, smooth_mode
+from pyfmu_sources.drivetrain.equations import NAMES, parameters
+from pyfmu_sources.laws.parameter_rows import with_values
 
 
 def axis(values: dict[str, float]) -> tuple[float, ...]:

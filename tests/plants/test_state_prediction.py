@@ -5,9 +5,9 @@ import pytest
 from scipy.linalg import expm
 
 from orchestrator.plants.design import DrivetrainValues, five_state_model
-from pyfmu_sources.backlash_estimator_slave import BacklashEstimator
-from pyfmu_sources.gap_traversal import move
-from pyfmu_sources.state_prediction import Train, foresee, foresee_late, n_under_way, oldest_share
+from pyfmu_sources.controllers.gap_traversal import move
+from pyfmu_sources.controllers.state_prediction import Train, foresee, foresee_late, n_under_way, oldest_share
+from pyfmu_sources.estimators.backlash_estimator_slave import BacklashEstimator
 from tests.support.played_slave import play
 
 TRAIN = Train(0.4, 5.6, 0.1, 1.0, 3.984, 1.0 / 3300.0, 5e-3)

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from benchmarks.plant_steps import effects, main
-from pyfmu_sources.backlash_models import BACKLASH_MODELS
+from pyfmu_sources.laws.backlash_models import BACKLASH_MODELS
 
 
 @pytest.mark.parametrize("words", [[], ["--extreme"]])

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from pyfmu_sources import drivetrain
-from pyfmu_sources.equations import parameters
-from pyfmu_sources.event_numbers import NO_EVENT
-from pyfmu_sources.parameter_rows import with_values
-from pyfmu_sources.train_equations import (
+from pyfmu_sources.drivetrain import drivetrain
+from pyfmu_sources.drivetrain.equations import parameters
+from pyfmu_sources.hybrid.event_numbers import NO_EVENT
+from pyfmu_sources.laws.parameter_rows import with_values
+from pyfmu_sources.train.train_equations import (
     DEFAULTS,
     NAMES,
     Mode,
@@ -20,9 +20,9 @@ from pyfmu_sources.train_equations import (
     stage_torques,
     twists,
 )
-from pyfmu_sources.train_modes import after_events
-from pyfmu_sources.train_steps import advance, advance_to_event
-from pyfmu_sources.train_transition import prepare
+from pyfmu_sources.train.train_modes import after_events
+from pyfmu_sources.train.train_steps import advance, advance_to_event
+from pyfmu_sources.train.train_transition import prepare
 from tests.support.two_stage_record import COUNTS, MISMATCHED, NOISE, make_two_stage_record
 from tests.support.two_stage_record import FRICTION as FRICTION_OF_RECORDS
 from tests.support.two_stage_solution import solve_two_stages, start_values

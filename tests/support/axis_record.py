@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestrator.records.record import Record, record_from_columns
-from pyfmu_sources import servo_axis as axis
-from pyfmu_sources.axis_equations import AxisParameters
+from pyfmu_sources.axis import servo_axis as axis
+from pyfmu_sources.axis.axis_equations import AxisParameters
 
 MODEL = """
 fmu = "ServoAxis"

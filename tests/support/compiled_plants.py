@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from orchestrator.building.translation.kernels import Kernels
-from pyfmu_sources import drivetrain, servo_axis
+from pyfmu_sources.axis import servo_axis
+from pyfmu_sources.drivetrain import drivetrain
 
 STEPS = Kernels("tests.support.plant_kernels", checked=True)
 

@@ -6,8 +6,8 @@ from typing import Any
 from orchestrator.master.protocol import EventUpdate, ModelInterface, Signals, StepOutcome, Transfer, Value, Variable
 from orchestrator.master.signals import Signal, Square
 from orchestrator.master.system import Connection, Instance, SignalSource, System
-from pyfmu_sources.load_half_slave import LoadHalf
-from pyfmu_sources.motor_half_slave import MotorHalf
+from pyfmu_sources.halves.load_half_slave import LoadHalf
+from pyfmu_sources.halves.motor_half_slave import MotorHalf
 from tests.support.mock_slave import MockSlave
 
 TORQUE = Square(amplitude=40.0, period=0.8)

@@ -5,7 +5,7 @@ import random
 from pathlib import Path
 from typing import Any
 
-from pyfmu_sources.drivetrain_slave import Drivetrain
+from pyfmu_sources.drivetrain.drivetrain_slave import Drivetrain
 from tests.support.native_pair import Driver
 
 MODELS = ("none", "dead_zone", "nordin", "hysteresis", "rigid_impact", "elastic_impact")

@@ -4,11 +4,11 @@ from typing import Annotated, Any
 
 from orchestrator.building.translation.kernel_arrays import Reals
 from orchestrator.building.translation.kinds import REAL, WHOLE, ArrayKind
-from pyfmu_sources.axis_equations import COUNT as AXIS_COUNT
-from pyfmu_sources.axis_equations import AxisParameters
-from pyfmu_sources.drivetrain import advance, prepare
-from pyfmu_sources.equations import COUNT, DrivetrainParameters
-from pyfmu_sources.servo_axis import advance as advance_servo_axis
+from pyfmu_sources.axis.axis_equations import COUNT as AXIS_COUNT
+from pyfmu_sources.axis.axis_equations import AxisParameters
+from pyfmu_sources.axis.servo_axis import advance as advance_servo_axis
+from pyfmu_sources.drivetrain.drivetrain import advance, prepare
+from pyfmu_sources.drivetrain.equations import COUNT, DrivetrainParameters
 
 __all__ = ["advance_axis", "advance_drivetrain"]
 

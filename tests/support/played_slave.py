@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pyfmu_sources.slave_base import SlaveBase
+from pyfmu_sources.adapters.slave_base import SlaveBase
 
 
 def play(

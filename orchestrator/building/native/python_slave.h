@@ -77,7 +77,7 @@ static const char *open_slave(const char *resources)
     enter_thread();
     const int lock = gil_ensure();
     void *path = python.system("path"), *done = python.call(path, "insert", "is", 0, resources);
-    bridge = done ? python.import(PACKAGE ".fmi3_bridge") : NULL;
+    bridge = done ? python.import(PACKAGE ".adapters.fmi3_bridge") : NULL;
     if (!bridge)
         python.print();
     void *removed = python.call(path, "remove", "s", resources);

@@ -1,6 +1,6 @@
 /* One slave behind FMI of either version: life cycle, refusals, messages, values, sample clock.
  *
- * It does in C what pyfmu_sources/slave_base.py and sampled_slave.py do in Python, with the same statuses and
+ * It does in C what pyfmu_sources/adapters/slave_base.py and sampled_slave.py do in Python, with the same statuses and
  * messages. The file that includes it defines the slave: the type SLAVE with its values and hidden state, the
  * functions slave_*, the tables `variables` and `lists`, and the constants GUID, VARIABLES, FIXED_BYTES and
  * FEEDTHROUGH; CONTINUOUS_STATES is there for model exchange, SAMPLE_TIME is the value reference of a sampled slave's

@@ -206,4 +206,4 @@ def _c_type(value: float | int) -> str:
     return "int64_t" if isinstance(value, int) else "double"
 
 
-BASE_MODULES = ("pyfmu_sources.slave_base", "pyfmu_sources.sampled_slave")
+BASE_MODULES = ("pyfmu_sources.adapters.slave_base", "pyfmu_sources.adapters.sampled_slave")

@@ -20,7 +20,7 @@ from orchestrator.shared.equation_files import PACKAGE, module_name, read_import
 from orchestrator.shared.syntax import parse_expression, parse_python
 
 # Their classes are the runtime's business.
-NOT_TRANSLATED = ("slave_base", "sampled_slave")
+NOT_TRANSLATED = ("adapters.slave_base", "adapters.sampled_slave")
 
 
 @dataclass(frozen=True)

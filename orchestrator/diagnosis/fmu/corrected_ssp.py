@@ -34,7 +34,7 @@ from orchestrator.scenarios.ssp.common import (
 from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.equation_files import members
 from orchestrator.shared.results.any_fmu import DeliveredFound, PartFound
-from pyfmu_sources.attachment import SERIES
+from pyfmu_sources.adapters.attachment import SERIES
 
 PLANT = "plant"
 CO_SIMULATION = "CoSimulation"
@@ -129,13 +129,13 @@ def effect_parts(problem: FmuProblem, model: FmuModel) -> tuple[Part, ...]:
 
 def build_effect_fmu(folder: Path) -> Path:
     """Return the effect FMU, built in ``folder`` from the laws' own source, its package named by their content."""
-    sources = members("attachment")
+    sources = members("adapters.attachment")
     package = folder / f"effect_{digest(part for name in sources for part in (name.encode(), sources[name]))[:16]}"
     for name, content in sources.items():
         (package / name).parent.mkdir(parents=True, exist_ok=True)
         (package / name).write_bytes(content)
     script = folder / f"attachment_{package.name}.py"
-    script.write_text(f"{OWNED}\nfrom {package.name}.attachment import AttachedEffect\n", encoding="utf-8")
+    script.write_text(f"{OWNED}\nfrom {package.name}.adapters.attachment import AttachedEffect\n", encoding="utf-8")
     target = folder / "built"
     target.mkdir()
     run = subprocess.run(

@@ -10,7 +10,7 @@ from orchestrator.diagnosis.data.signals import triangle_average
 from orchestrator.diagnosis.model.interface import LawArgument, ModelPoint
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
 from orchestrator.plants.learned import Argument, arguments_of
-from pyfmu_sources.learned_law import DRIVE, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
+from pyfmu_sources.laws.learned_law import DRIVE, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
 
 Array = NDArray[np.float64]
 

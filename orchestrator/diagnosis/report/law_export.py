@@ -20,7 +20,7 @@ from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.learned import names, with_law
-from pyfmu_sources.learned_plant import ON
+from pyfmu_sources.adapters.learned_plant import ON
 
 Array = NDArray[np.float64]
 

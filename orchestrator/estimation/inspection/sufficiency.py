@@ -15,7 +15,7 @@ from orchestrator.plants.known.two_stage_train import TRAIN
 from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible, smooth
 from orchestrator.records.record import Record
-from pyfmu_sources.equations import DrivetrainParameters
+from pyfmu_sources.drivetrain.equations import DrivetrainParameters
 
 SIZES = (5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05)  # rad, half-gaps that are tried
 MOST_ROWS = 3000  # for one bound

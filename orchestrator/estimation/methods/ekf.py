@@ -12,7 +12,7 @@ from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
-from pyfmu_sources.backlash_estimator import NoiseSettings
+from pyfmu_sources.estimators.backlash_estimator import NoiseSettings
 
 ONLINE = Kernels("orchestrator.estimation.online", checked=True)
 UNMEASURED = 1e6  # rad, standard deviation that stands for an encoder that is absent

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from orchestrator.building.translation.kernel_arrays import Pairs, Reals
 from orchestrator.plants.kernels.point import Point, travel_bound
-from pyfmu_sources.contact import consistent_start
-from pyfmu_sources.drivetrain import advance, has_nonlinear_effect, initial_mode, step_table
-from pyfmu_sources.equations import (
+from pyfmu_sources.drivetrain.contact import consistent_start
+from pyfmu_sources.drivetrain.drivetrain import advance, has_nonlinear_effect, initial_mode, step_table
+from pyfmu_sources.drivetrain.equations import (
     COUNT,
     DrivetrainParameters,
     State,
@@ -25,9 +25,9 @@ from pyfmu_sources.equations import (
     twist_rate,
     twist_slope,
 )
-from pyfmu_sources.equations import rates as fmu_rates
+from pyfmu_sources.drivetrain.equations import rates as fmu_rates
 from pyfmu_sources.laws.friction import rest_level, sliding_friction
-from pyfmu_sources.parameter_rows import BIG
+from pyfmu_sources.laws.parameter_rows import BIG
 
 __all__ = ["run"]
 

@@ -22,7 +22,7 @@ from orchestrator.plants.kernels.drivetrain import reaches as reaches_of_plant
 from orchestrator.plants.kernels.drivetrain import rest_levels as rest_levels_of_plant
 from orchestrator.plants.kernels.drivetrain import values_of as values_of_plant
 from orchestrator.plants.kernels.point import Point
-from pyfmu_sources.learned_law import (
+from pyfmu_sources.laws.learned_law import (
     DRIVE,
     KNOTS,
     L_KNOTS,

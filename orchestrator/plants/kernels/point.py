@@ -1,7 +1,7 @@
 """The state in which plants are compared with records: eight numbers, of which a plant may use fewer.
 
-Their places are those of ``pyfmu_sources.equations``: angle and speed of motor and load, the drive's torque, angle and
-speed of an added inertia, the memory of the shaft.
+Their places are those of ``pyfmu_sources.drivetrain.equations``: angle and speed of motor and load, the drive's torque,
+angle and speed of an added inertia, the memory of the shaft.
 """
 
 Point = tuple[float, float, float, float, float, float, float, float]

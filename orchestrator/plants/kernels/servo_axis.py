@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from orchestrator.building.translation.kernel_arrays import Pairs, Reals
 from orchestrator.plants.kernels.point import Point, travel_bound
-from pyfmu_sources.axis_equations import COUNT, AxisParameters, friction_of, initial_mode, start
-from pyfmu_sources.axis_equations import rates as fmu_rates
+from pyfmu_sources.axis.axis_equations import COUNT, AxisParameters, friction_of, initial_mode, start
+from pyfmu_sources.axis.axis_equations import rates as fmu_rates
+from pyfmu_sources.axis.servo_axis import advance
 from pyfmu_sources.laws.friction import breakaway_torque, sliding_friction
-from pyfmu_sources.parameter_rows import BIG
-from pyfmu_sources.servo_axis import advance
+from pyfmu_sources.laws.parameter_rows import BIG
 
 __all__ = ["run"]
 

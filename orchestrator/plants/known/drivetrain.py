@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from orchestrator.effects.of_logs import EARLY_TORQUE, LATE_LOAD, LEAD, SAMPLED, SAMPLED_TORQUE, SHIFT
 from orchestrator.effects.of_plants import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, Drive, Plant, Resonance, Shaft
-from pyfmu_sources import equations as dt
-from pyfmu_sources.backlash_models import GRADUAL, MODELS
+from pyfmu_sources.drivetrain import equations as dt
+from pyfmu_sources.laws.backlash_models import GRADUAL, MODELS
 from pyfmu_sources.laws.friction import breakaway_torque
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from orchestrator.effects.of_logs import EARLY_TORQUE, LEAD, SAMPLED, SAMPLED_TORQUE
 from orchestrator.effects.of_plants import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, Drive, Plant
-from pyfmu_sources import axis_equations as ap
+from pyfmu_sources.axis import axis_equations as ap
 from pyfmu_sources.laws.friction import breakaway_torque
 
 Array = NDArray[np.float64]

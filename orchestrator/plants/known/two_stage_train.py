@@ -7,7 +7,7 @@ intermediate shaft.
 from collections.abc import Mapping
 
 from orchestrator.plants.description import Body, Drive, Plant, Shaft
-from pyfmu_sources import train_equations as te
+from pyfmu_sources.train import train_equations as te
 
 TRAIN = "TwoStageTrain"
 

@@ -8,7 +8,7 @@ from orchestrator.diagnosis.fmu.problem import at_input
 from orchestrator.diagnosis.fmu.record import divide_samples
 from orchestrator.effects.effect import PlaceScales
 from orchestrator.effects.of_fmus import BANK, FmuEffect
-from pyfmu_sources.attachment import SERIES, AttachedEffect
+from pyfmu_sources.adapters.attachment import SERIES, AttachedEffect
 
 STEP = 0.01
 

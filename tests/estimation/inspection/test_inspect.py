@@ -15,7 +15,7 @@ from orchestrator.estimation.inspection.sufficiency import Sufficiency
 from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.records.model_file import read_model
 from orchestrator.records.record import record_from_columns
-from pyfmu_sources.axis_equations import DEFAULTS
+from pyfmu_sources.axis.axis_equations import DEFAULTS
 from tests.support.axis_record import MODEL, axis_record
 from tests.support.drive_record import COUNTS, HALF_GAP, RATED, write_log
 from tests.support.independent_plant import make_record, write_csv

@@ -1,0 +1,1 @@
+"""What makes FMUs of equations: variables, slaves and their description."""

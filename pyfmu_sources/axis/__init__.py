@@ -1,0 +1,1 @@
+"""The servo axis: one body and its drive."""

@@ -1,0 +1,1 @@
+"""Controllers: LQR, and a compensator of the gap."""

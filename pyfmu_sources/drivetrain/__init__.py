@@ -1,0 +1,1 @@
+"""The drivetrain: a motor and a load with a gap between them."""

@@ -1,0 +1,1 @@
+"""Estimators: Kalman filter, and one that finds the gap."""

@@ -1,0 +1,1 @@
+"""The two halves of a drivetrain, cut at its shaft."""

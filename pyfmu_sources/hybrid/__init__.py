@@ -1,0 +1,1 @@
+"""What a hybrid machine is made of, whatever the plant."""

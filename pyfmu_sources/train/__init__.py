@@ -1,0 +1,1 @@
+"""The train of two stages, each with a gap."""
