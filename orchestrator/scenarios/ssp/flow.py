@@ -119,10 +119,14 @@ class Flow:
                 found[target] = given
                 continue
             unit = None if given.unit is None else units.resolve(given.unit, {**self._structure.units, **given.units})
-            number = given.factor * float(given.text) + given.offset
-            begin = _Value(1.0, 0.0, self._unit_for(target, unit))
-            value = self._carry(root, target, self._step(begin, self._connector_unit(root), root))
-            number = value.factor * number + value.offset
+            begin = self._step(_Value(1.0, 0.0, self._unit_for(target, unit)), self._connector_unit(root), root)
+            if (given.factor, given.offset) != (1.0, 0.0):
+                # A mapping transforms a value in the unit of its target: the first that is stated on the way.
+                stated = (self._connector_unit(node) for node in self._path(root, target))
+                begin = self._step(begin, next((u for u in stated if u is not None), self._own_unit(target)), root)
+                begin = _Value(given.factor * begin.factor, given.factor * begin.offset + given.offset, begin.unit)
+            value = self._carry(root, target, begin)
+            number = value.factor * float(given.text) + value.offset
             text = f"{number:.0f}" if number.is_integer() and abs(number) < 1e15 else repr(number)
             found[target] = Given(given.type, text, None, {})
         return found
@@ -170,18 +174,20 @@ class Flow:
 
     def _carry(self, root: Node, target: Node, value: _Value) -> _Value:
         """Return a value that has gone from ``root`` to ``target``."""
-        path: list[Node] = []
-        node = target
-        while node != root:
-            path.append(node)
-            node = self._structure.drivers[node][0]
-        for node in reversed(path):
+        for node in self._path(root, target)[1:]:
             _, factor, offset = self._structure.drivers[node]
             value = self._step(value, self._connector_unit(node), node)
             if (factor, offset) != (1.0, 0.0):
                 unit = self._unit_for(target, self._connector_unit(node))
                 value = _Value(factor * value.factor, factor * value.offset + offset, unit)
         return self._step(value, self._own_unit(target), target)
+
+    def _path(self, root: Node, target: Node) -> list[Node]:
+        """Return the connectors from ``root`` to ``target``, both of them included."""
+        path = [target]
+        while path[-1] != root:
+            path.append(self._structure.drivers[path[-1]][0])
+        return path[::-1]
 
     def _start_at(self, root: Node, target: Node) -> _Value:
         unit = self._unit_for(target, self._own_unit(root))

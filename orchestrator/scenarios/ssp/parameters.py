@@ -2,17 +2,19 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
+from urllib.parse import unquote
 
 from lxml import etree
 
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import FmuError, ScenarioError
 from orchestrator.master import units
 from orchestrator.master.problems import Problem
 from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.master.values import nearest
-from orchestrator.scenarios.ssp.common import EXPONENTS, file_of_uri, parse, tag
+from orchestrator.scenarios.ssp.common import EXPONENTS, MAXIMUM_XML, file_of_uri, parse, tag
+from orchestrator.shared.isolation.archives import open_archive
 
 WHOLE = ("Integer", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
 TYPES = {
@@ -21,6 +23,8 @@ TYPES = {
     **{kind: kind for kind in ("Boolean", "String", "Enumeration")},
 }
 """The type that a master knows, by the element of SSP."""
+FILE_TYPES = {"ssv": "application/x-ssp-parameter-set", "ssm": "application/x-ssp-parameter-mapping"}
+LINEAR = "LinearTransformation"
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class Given:
         type: ``Real``, ``Integer``, ``Boolean``, ``String`` or ``Enumeration``.
         unit: its unit, if it has one.
         units: units declared beside it.
+        factor, offset: of a mapping: the value in the unit of its target, times ``factor``, plus ``offset``.
         texts: the values of an array's elements; empty for a scalar.
         mapped: a mapping names the variable; else the entry's own name does.
     """
@@ -56,62 +61,100 @@ def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
     return found
 
 
-def parameter_values(
-    element: etree._Element, place: str, folder: Path, problems: list[Problem]
-) -> list[tuple[str, Given]]:
+@dataclass(frozen=True)
+class Place:
+    """Where the parameter bindings of an element are read.
+
+    Attributes:
+        path: of the element, for messages.
+        folder: of the unpacked archive.
+        component: the element's own file, against which a ``sourceBase`` of ``component`` is resolved; None: it is a
+            system.
+        problems: what is wrong is added here.
+        remarks: what is passed over is added here.
+    """
+
+    path: str
+    folder: Path
+    component: Path | None
+    problems: list[Problem]
+    remarks: list[str] = field(default_factory=list)
+
+    def refuse(self, where: str, text: str) -> None:
+        """Add a problem at ``where`` in the element."""
+        self.problems.append(Problem(f"{self.path}.{where}", text))
+
+
+def parameter_values(element: etree._Element, place: Place) -> list[tuple[str, Given]]:
     """Return names, prefix included, and values of an element's parameter bindings, in their order."""
     found: list[tuple[str, Given]] = []
     bindings = element.findall(f"{tag('ssd', 'ParameterBindings')}/{tag('ssd', 'ParameterBinding')}")
     for k, binding in enumerate(bindings):
-        path = f"{place}.ParameterBindings[{k}]"
-        values = _set(binding, "ParameterValues", "ParameterSet", "ssv", path, folder, problems)
+        where = f"ParameterBindings[{k}]"
+        values = _content(binding, "ParameterSet", "ssv", where, place)
         if values is None:
             continue
-        prefix = binding.get("prefix", "")
-        named = _values(values)
+        named = _values(values, where, place)
         mapping = binding.find(tag("ssd", "ParameterMapping"))
         if mapping is not None:
-            rules = _content(mapping, "ParameterMapping", "ssm", path, folder, problems)
-            named = [] if rules is None else _map_values(named, rules)
-        found += [(prefix + name, given) for name, given in named]
+            rules = _content(mapping, "ParameterMapping", "ssm", f"{where}.ParameterMapping", place)
+            named = [] if rules is None else _map_values(named, rules, where, place)
+        found += [(binding.get("prefix", "") + name, given) for name, given in named]
     return found
 
 
-def _set(
-    binding: etree._Element, wrapper: str, name: str, space: str, path: str, folder: Path, problems: list[Problem]
-) -> etree._Element | None:
-    if binding.get("source") is not None:
-        return _content(binding, name, space, path, folder, problems)
-    inline = binding.find(f"{tag('ssd', wrapper)}/{tag(space, name)}")
-    if inline is None:
-        problems.append(Problem(path, f"must have a source or hold a {name}, but has neither"))
-    return inline
-
-
-def _content(
-    element: etree._Element, name: str, space: str, path: str, folder: Path, problems: list[Problem]
-) -> etree._Element | None:
-    source = element.get("source")
+def _content(element: etree._Element, name: str, space: str, where: str, place: Place) -> etree._Element | None:
+    """Return the set or mapping that an element holds or names; None after telling what is wrong."""
+    source, kind = element.get("source"), element.get("type", FILE_TYPES[space])
+    if kind != FILE_TYPES[space]:
+        place.refuse(f"{where}.type", f"must be {FILE_TYPES[space]}, but is {kind!r}")
+        return None
     if source is None:
-        return element.find(tag(space, name))
-    file = file_of_uri(folder, source)
-    if file is None:
-        problems.append(Problem(f"{path}.source", f"must be a file of the archive, but is {source!r}"))
-        return None
+        inline = element.find(
+            tag(space, name) if space == "ssm" else f"{tag('ssd', 'ParameterValues')}/{tag(space, name)}"
+        )
+        if inline is None:
+            place.refuse(where, f"must have a source or hold a {name}, but has neither")
+        return inline
     try:
-        return parse(file.read_bytes(), space, source)
-    except ScenarioError as error:
-        problems.append(Problem(f"{path}.source", str(error)))
+        content = _read_source(source, element.get("sourceBase") == "component", place)
+        return parse(content, space, source)
+    except (ScenarioError, FmuError) as error:
+        place.refuse(f"{where}.source", str(error))
         return None
 
 
-def _values(values: etree._Element) -> list[tuple[str, Given]]:
+def _read_source(source: str, within_component: bool, place: Place) -> bytes:
+    if not within_component:
+        file = file_of_uri(place.folder, source)
+        if file is None:
+            raise ScenarioError(f"must be a file of the archive, but is {source!r}")
+        return file.read_bytes()
+    if place.component is None:
+        raise ScenarioError(f"must not have the sourceBase component, as a system has no file, but {source!r} does")
+    with open_archive(place.component) as (archive, members):
+        found = (members.get(str(PurePosixPath(text))) for text in (unquote(source), source))
+        member = next((one for one in found if one is not None), None)
+        if member is None or member.file_size > MAXIMUM_XML:
+            raise ScenarioError(
+                f"must be a file in {place.component.name} of at most {MAXIMUM_XML >> 20} MB, as its sourceBase is "
+                f"component, but is {source!r}"
+            )
+        return archive.read(member)
+
+
+def _values(values: etree._Element, where: str, place: Place) -> list[tuple[str, Given]]:
     declared = read_units(values, "ssv")
-    found = []
+    found: dict[str, Given] = {}
     for parameter in values.findall(f"{tag('ssv', 'Parameters')}/{tag('ssv', 'Parameter')}"):
+        name = str(parameter.get("name"))
+        if name in found:
+            place.refuse(f"{where}.{name}", "must be given once in a set, but is given twice")
         for element in parameter:
             kind = TYPES.get(etree.QName(element).localname) if isinstance(element.tag, str) else None
             if kind is None:
+                if element.tag == tag("ssv", "Binary"):
+                    place.refuse(f"{where}.{name}", "must be a number, Boolean, String or Enumeration, but is Binary")
                 continue
             text, texts = (
                 element.get("value", ""),
@@ -119,30 +162,80 @@ def _values(values: etree._Element) -> list[tuple[str, Given]]:
             )
             if kind not in ("String", "Enumeration") and parameter.find(tag("ssc", "Dimension")) is not None:
                 texts = tuple(text.split())
-            given = Given(kind, text or " ".join(texts), element.get("unit"), declared, texts=texts)
-            found.append((str(parameter.get("name")), given))
-    return found
+            found[name] = Given(kind, text or " ".join(texts), element.get("unit"), declared, texts=texts)
+    return list(found.items())
 
 
-def _map_values(values: list[tuple[str, Given]], rules: etree._Element) -> list[tuple[str, Given]]:
-    by_name = dict(values)
+def _map_values(
+    values: list[tuple[str, Given]], rules: etree._Element, where: str, place: Place
+) -> list[tuple[str, Given]]:
+    by_name, used = dict(values), set()
     found = []
     for entry in rules.findall(tag("ssm", "MappingEntry")):
-        given = by_name.get(str(entry.get("source")))
+        source, target = str(entry.get("source")), str(entry.get("target"))
+        given = by_name.get(source)
+        used.add(source)
         if given is None:
+            place.remarks.append(
+                f"the mapping of {source!r} to {target!r} is passed over, for the set has no such parameter"
+            )
             continue
-        linear = entry.find(tag("ssc", "LinearTransformation"))
-        if linear is not None:
-            factor, offset = float(linear.get("factor", "1")), float(linear.get("offset", "0"))
-            given = replace(given, unit=None, factor=factor, offset=offset)
-        found.append((str(entry.get("target")), replace(given, mapped=True)))
+        try:
+            found.append((target, _transform(replace(given, mapped=True), entry)))
+        except ValueError as error:
+            place.refuse(f"{where}.ParameterMapping.{source}", str(error))
+    for name in [name for name in by_name if name not in used]:
+        place.remarks.append(
+            f"the value of the parameter {name!r} is passed over, for the mapping of its set has no entry for it"
+        )
     return found
+
+
+def _transform(given: Given, entry: etree._Element) -> Given:
+    """Return a value as an entry of a mapping hands it on; unit conversions are done first, unless it forbids them."""
+    if entry.get("suppressUnitConversion") in {"true", "1"}:
+        given = replace(given, unit=None)
+    rule = next((e for e in entry if str(e.tag).endswith("Transformation")), None)
+    if rule is None:
+        return given
+    kind = etree.QName(rule).localname
+    if kind == LINEAR:
+        if given.type not in ("Real", "Integer"):
+            raise ValueError(f"must be a number for a {LINEAR}, but is a {given.type}")
+        return replace(given, factor=float(rule.get("factor", "1")), offset=float(rule.get("offset", "0")))
+    if kind != f"{given.type}MappingTransformation":
+        raise ValueError(f"must be of the type of its {kind}, but is a {given.type}")
+    table = {_plain(str(e.get("source")), given.type): str(e.get("target")) for e in rule.iter(tag("ssc", "MapEntry"))}
+    texts = given.texts or (given.text,)
+    lacking = [text for text in texts if _plain(text, given.type) not in table]
+    if lacking:
+        raise ValueError(f"must be one of the values that its {kind} has, but is {lacking[0]!r}")
+    mapped = tuple(table[_plain(text, given.type)] for text in texts)
+    return replace(given, text=" ".join(mapped), texts=mapped if given.texts else ())
+
+
+def _plain(text: str, kind: str) -> str:
+    """Return the one spelling of a Boolean or Integer that others mean too."""
+    text = text.strip()
+    if kind == "Boolean":
+        return {"1": "true", "0": "false"}.get(text, text)
+    return str(int(text)) if kind == "Integer" else text
 
 
 def own_value(
-    model: ModelInterface, name: str, given: Given, declared: Mapping[str, Unit], place: str, problems: list[Problem]
+    model: ModelInterface,
+    name: str,
+    given: Given,
+    declared: Mapping[str, Unit],
+    place: str,
+    problems: list[Problem],
+    connector: Unit | None = None,
 ) -> Value | None:
-    """Return a value as the model's variable takes it, or ``None`` after adding what is wrong to ``problems``."""
+    """Return a value as the model's variable takes it, or ``None`` after adding what is wrong to ``problems``.
+
+    Args:
+        connector: unit that the package states for the variable; None: that of the model.
+    """
     variable = model.variables.get(name)
     path = f"{place}.{name}"
     if variable is None:
@@ -150,7 +243,9 @@ def own_value(
         problems.append(Problem(path, text))
         return None
     try:
-        return _as_type(variable.type, given) if variable.type != "Real" else _real(model, name, given, declared)
+        if variable.type != "Real":
+            return _as_type(variable.type, given)
+        return _real(given, declared, connector, units.unit_of(variable, model.units))
     except ValueError as error:
         problems.append(Problem(path, f"must be a {variable.type}, but is {given.text!r}{error}"))
         return None
@@ -166,9 +261,9 @@ def _as_type(kind: str, given: Given) -> Value:
         return text in {"true", "1"}
     if kind == "Enumeration" and given.type == "Enumeration":
         return text
-    value = _number(text)
+    value = given.factor * _number(text) + given.offset
     if not value.is_integer():
-        raise ValueError("")
+        raise ValueError("" if given.factor == 1.0 and given.offset == 0.0 else f", which its mapping makes {value:g}")
     return int(value)
 
 
@@ -182,13 +277,18 @@ def _number(text: str) -> float:
     return value
 
 
-def _real(model: ModelInterface, name: str, given: Given, declared: Mapping[str, Unit]) -> float:
-    value = given.factor * _number(given.text) + given.offset
-    unit = units.unit_of(model.variables[name], model.units)
-    if given.unit is None or unit is None:
-        return value
-    theirs = units.resolve(given.unit, {**declared, **given.units})
-    ratio = units.conversion(theirs, unit)
+def _real(given: Given, declared: Mapping[str, Unit], connector: Unit | None, own: Unit | None) -> float:
+    """Return a number in its variable's ``own`` unit: converted to its connector's, mapped there, converted again."""
+    theirs = None if given.unit is None else units.resolve(given.unit, {**declared, **given.units})
+    stated = own if connector is None else replace(connector, difference=own.difference if own else None)
+    value = _convert(_number(given.text), theirs, stated)
+    return _convert(given.factor * value + given.offset, stated or theirs, own)
+
+
+def _convert(value: float, source: Unit | None, target: Unit | None) -> float:
+    ratio = units.conversion(source, target)
     if ratio is None:
-        raise ValueError(f" in {given.unit!r}, which does not measure what {unit.name} does")
+        assert source is not None
+        assert target is not None
+        raise ValueError(f" in {source.name!r}, which does not measure what {target.name} does")
     return ratio[0] * value + ratio[1]

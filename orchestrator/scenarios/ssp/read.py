@@ -35,7 +35,7 @@ from orchestrator.scenarios.ssp.common import (
     tag,
 )
 from orchestrator.scenarios.ssp.flow import Flow, Node, Structure, instance_names
-from orchestrator.scenarios.ssp.parameters import Given, own_value, parameter_values, read_units
+from orchestrator.scenarios.ssp.parameters import Given, Place, own_value, parameter_values, read_units
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.scratch import Scratch
 
@@ -187,7 +187,10 @@ def _component(element: etree._Element, name: str, structure: Structure) -> None
 
 
 def _bind(element: etree._Element, path: str, structure: Structure) -> None:
-    for name, value in parameter_values(element, f"$.{path or 'System'}", structure.folder, structure.problems):
+    place = Place(f"$.{path or 'System'}", structure.folder, structure.components.get(path), structure.problems)
+    values = parameter_values(element, place)
+    structure.remarks += [RunRemark(path or "System", text) for text in place.remarks]
+    for name, value in values:
         # The innermost binding is read first and the outer one wins, as the standard has it.
         owner, parameter = path, name
         while (owner, parameter) not in structure.kinds:
@@ -355,7 +358,11 @@ def _instances(
             if owner == name and variable not in description.model.variables and not given.mapped:
                 _pass_over(structure, description, owner, variable, "the value of the parameter")
             elif owner == name:
-                value = own_value(description.model, variable, given, structure.units, f"$.{name}", structure.problems)
+                # What comes from a system's connector has passed the component's already.
+                unit = None if (owner, variable) in handed else structure.connector_units.get((owner, variable))
+                value = own_value(
+                    description.model, variable, given, structure.units, f"$.{name}", structure.problems, unit
+                )
                 if value is not None:
                     start[variable] = value
         path = structure.components[name]
