@@ -1,13 +1,19 @@
 """Fits, blocks left out and comparisons, on a model that is linear: what they must be is worked out by hand."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from orchestrator.diagnosis.inference.fitting import compare, fit_model
+from orchestrator.diagnosis.inference.problem import fit_problem
+from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParameter
+from orchestrator.diagnosis.report.estimates import parameter_estimates
 from orchestrator.diagnosis.selection.search import settle
-from tests.support.linear_model import linear_problem
+from orchestrator.diagnosis.settings import FitSettings
+from tests.support.linear_model import LinearModel, linear_problem
 
 LABEL = "drag@motor"
 
@@ -125,3 +131,31 @@ def test_blocks_have_as_many_rows_that_say_something(fitted):
     assert len(counts) == blocks.max() + 1 >= 10
     assert counts.min() >= counts.max() - 1
     assert np.all(np.diff(blocks) >= 0)
+
+
+class _StartedModel(LinearModel):
+    """A linear model whose first rows are off by a value of that record alone."""
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self.parameters = (*self.parameters, UncertainParameter("x", 0.0, 1.0, "m", True, scale=0.5))
+
+    def residuals(self, points: Sequence[ModelPoint]) -> list[np.ndarray]:
+        decay = np.exp(-np.arange(self.size) / 50.0)
+        return [y - p.parameters[1] * decay for y, p in zip(super().residuals(points), points, strict=True)]
+
+
+def test_a_value_of_one_record_is_reported_with_its_number() -> None:
+    rng, models = np.random.default_rng(3), []
+    for start in (0.4, -0.3):
+        ramp = rng.standard_normal(2000)
+        data = 1.1 * ramp + start * np.exp(-np.arange(2000) / 50.0) + 0.01 * rng.standard_normal(2000)
+        models.append(_StartedModel(data, ramp, {}, 0.01))
+    problem = fit_problem(models, FitSettings())
+    found = parameter_estimates(problem, fit_model(problem, problem.start), 0.95)
+    assert [*found] == ["slope", "x of record 1", "x of record 2"]
+    for name, truth in (("slope", 1.1), ("x of record 1", 0.4), ("x of record 2", -0.3)):
+        assert found[name].value == pytest.approx(truth, abs=4.0 * found[name].standard_error)
+        assert 0.0 < found[name].standard_error < 0.03
+    assert found["x of record 1"].unit == "m"
+    assert [*fit_problem(models[:1], FitSettings()).reported] == ["slope", "x"]

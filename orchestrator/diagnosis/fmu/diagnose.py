@@ -1,5 +1,6 @@
 """Diagnosis of any FMU, once through: probes, residuals, search, grades, what is left, test data. Its calibration."""
 
+import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -205,17 +206,16 @@ def calibrate_fmu(
     problem, fitted = found.workings.search.problem, found.workings.search.final
     covariance = value_covariance(fitted)
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    names = [entry.name for entry in problem.shared]
+    places = problem.reported
     learned = {
-        entry.name: float(np.clip(1.0 - errors[k] / np.log1p(entry.spread), 0.0, 1.0))
-        for k, entry in enumerate(problem.shared)
+        name: float(np.clip(1.0 - errors[k] / problem.parameters[k].deviation, 0.0, 1.0)) for name, k in places.items()
     }
     correlation = covariance / errors / errors[:, None]
     pairs = tuple(
-        (names[i], names[j]) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > CONFOUNDED
+        (b, a) for (a, j), (b, i) in itertools.combinations(places.items(), 2) if abs(correlation[i, j]) > CONFOUNDED
     )
     notes = [*found.notes]
-    stopped = {entry.name: _stopping_limit(entry, fitted.point.parameters[k]) for k, entry in enumerate(problem.shared)}
+    stopped = {name: _stopping_limit(problem.parameters[k], fitted.point.parameters[k]) for name, k in places.items()}
     notes += [f"{text}: a value beyond it may fit better" for text in stopped.values() if text]
     notes += [
         f"the record hardly determines `{name}`: excite what it acts on"

@@ -23,6 +23,7 @@ from orchestrator.diagnosis.model.interface import (
     ResidualModel,
     UncertainParameter,
     Values,
+    as_uncertain,
 )
 from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, FmuEffect
 from pyfmu_sources.laws.port import COMPLIANCE
@@ -68,9 +69,9 @@ class FmuResiduals(ResidualModel):
     def fmu_model(self, point: ModelPoint) -> FmuModel:
         """Return parameters and effects at a point as runs of the FMU take them."""
         p = np.empty(len(self._order))
-        for place, entry, value in zip(self._order, self.parameters, point.parameters, strict=False):
+        for place, value in zip(self._order, point.parameters, strict=False):
             own = self.problem.map.uncertain[place]
-            p[place] = np.clip(own.value + value if entry.local else value, own.minimum, own.maximum)
+            p[place] = np.clip(value, own.minimum, own.maximum)
         found = [self.placed[label].at(values) for label, values in point.effects.items()]
         return FmuModel(p, tuple(effect for effect, _ in found), tuple(values for _, values in found))
 
@@ -247,21 +248,18 @@ class FmuResiduals(ResidualModel):
 def _order(problem: FmuProblem) -> list[int]:
     """Return the places of the uncertain values of a map in the order of the analysis: those of one record last."""
     uncertain = problem.map.uncertain
-    shared = [k for k, u in enumerate(uncertain) if u.value != 0.0 and u.name not in problem.map.initial]
+    shared = [k for k, u in enumerate(uncertain) if u.name not in problem.map.initial]
     return [*shared, *(k for k in range(len(uncertain)) if k not in shared)]
 
 
 def _parameters(problem: FmuProblem, starts: int) -> tuple[UncertainParameter, ...]:
     found = []
     for k in _order(problem):
-        u = problem.map.uncertain[k]
-        if u.value == 0.0 or u.name in problem.map.initial:
-            low, high = u.minimum - u.value, u.maximum - u.value
-            found.append(UncertainParameter(u.name, u.uncertainty, 1.0, u.unit, True, low, high))
-        else:
-            share = u.uncertainty / abs(u.value)
-            found.append(UncertainParameter(u.name, u.value, share, u.unit, False, u.minimum, u.maximum))
-    return (*found, *(UncertainParameter(f"{START} {k + 1}", 1.0, 1.0, local=True) for k in range(starts)))
+        found.append(as_uncertain(problem.map.uncertain[k], problem.map.uncertain[k].name in problem.map.initial))
+    return (
+        *found,
+        *(UncertainParameter(f"{START} {k + 1}", 0.0, 1.0, "", True, scale=1.0, reported=False) for k in range(starts)),
+    )
 
 
 def port_arguments(models: Sequence[FmuResiduals]) -> list[LawArgument]:

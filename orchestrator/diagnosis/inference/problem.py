@@ -54,13 +54,25 @@ class FitProblem:
         return (*self.shared, *(entry for model in self.models for entry in model.parameters if entry.local))
 
     @property
+    def reported(self) -> dict[str, int]:
+        """Return the places of the parameters to report by name; a value of one record has its number behind it."""
+        found = {entry.name: n for n, entry in enumerate(self.shared)}
+        place = len(self.shared)
+        for number, model in enumerate(self.models, 1):
+            for entry in (entry for entry in model.parameters if entry.local):
+                if entry.reported:
+                    found[entry.name if len(self.models) == 1 else f"{entry.name} of record {number}"] = place
+                place += 1
+        return found
+
+    @property
     def effects(self) -> dict[str, CandidateEffect]:
         """Return the effects by label."""
         return dict(self.models[0].effects)
 
     @property
     def start(self) -> ModelPoint:
-        """Return the nominal point: no effect, local parameters zero."""
+        """Return the nominal point: no effect."""
         return ModelPoint.nominal(self.parameters)
 
     @cached_property
@@ -166,9 +178,9 @@ class FitProblem:
         for coordinate, step in zip(coordinates, steps, strict=True):
             if isinstance(coordinate, int):
                 entry = self.parameters[coordinate]
-                moved = parameters[coordinate] + float(step) * entry.nominal
-                least = FARTHEST * entry.nominal
-                moved = moved if entry.local else max(moved, least) if least > 0 else min(moved, least)
+                moved, least = parameters[coordinate] + float(step) * entry.unit_step, FARTHEST * entry.nominal
+                if entry.scale is None:
+                    moved = max(moved, least) if least > 0 else min(moved, least)
                 parameters[coordinate] = entry.limit(moved)
             else:
                 label, place = coordinate
@@ -197,9 +209,9 @@ class FitProblem:
         return slopes
 
     def _small_step(self, point: ModelPoint, number: int) -> float:
-        """Return a small share of a parameter's nominal value, away from a limit that is near."""
+        """Return a small share of what a parameter moves in, away from a limit that is near."""
         entry, value = self.parameters[number], point.parameters[number]
-        step = SMALL_SHARE * entry.nominal
+        step = SMALL_SHARE * entry.unit_step
         return -SMALL_SHARE if entry.limit(value + step) != value + step else SMALL_SHARE
 
     def held(self, point: ModelPoint, coordinates: Sequence[Coordinate], gradient: Array) -> NDArray[np.bool_]:
@@ -211,7 +223,7 @@ class FitProblem:
         return np.array(
             [
                 isinstance(one, int)
-                and self.parameters[one].stops(point.parameters[one], -slope * self.parameters[one].nominal)
+                and self.parameters[one].stops(point.parameters[one], -slope * self.parameters[one].unit_step)
                 for one, slope in zip(coordinates, gradient.tolist(), strict=True)
             ],
             dtype=bool,
@@ -240,12 +252,11 @@ class FitProblem:
 
 
 def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:
-    """Return a parameter's distance from its nominal value in standard deviations, and its slope by a share of it."""
-    if entry.local:
-        return value / entry.nominal, 1.0
-    deviation = float(np.log1p(entry.spread))
+    """Return a parameter's distance from its nominal value in standard deviations, and its slope by a unit step."""
+    if entry.scale is not None:
+        return (value - entry.nominal) / entry.scale / entry.deviation, 1.0 / entry.deviation
     ratio = value / entry.nominal
-    return float(np.log(ratio)) / deviation, 1.0 / ratio / deviation
+    return float(np.log(ratio)) / entry.deviation, 1.0 / ratio / entry.deviation
 
 
 def fit_problem(models: Sequence[ResidualModel], settings: FitSettings, first: ModelPoint | None = None) -> FitProblem:

@@ -9,6 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.records.model_file import ModelParameter
+
 Array = NDArray[np.float64]
 Values = tuple[float, ...]
 
@@ -18,12 +20,13 @@ class UncertainParameter:
     """A parameter that is fitted with every model.
 
     Attributes:
-        nominal: value before the record; the fit moves in shares of it.
+        nominal: value before the record.
         spread: how far it may be off, as a share: the prior is log-normal with standard deviation ``log(1 + spread)``.
-        local: it belongs to one record alone, may have any value, and ``nominal`` is only its scale; the prior is
-            normal
-            about zero.
+        local: it belongs to one record alone.
         minimum, maximum: limits of the fitted value, which no fit goes beyond.
+        scale: of a value that may have either sign, what the fit moves in shares of; the prior is normal with
+            standard deviation ``spread`` times that. None: ``nominal`` is, and the value keeps its sign.
+        reported: False of what nobody named, such as the state that a record begins with.
     """
 
     name: str
@@ -33,6 +36,18 @@ class UncertainParameter:
     local: bool = False
     minimum: float = -np.inf
     maximum: float = np.inf
+    scale: float | None = None
+    reported: bool = True
+
+    @property
+    def unit_step(self) -> float:
+        """Return what the fit moves in shares of, in the unit of the parameter."""
+        return self.nominal if self.scale is None else self.scale
+
+    @property
+    def deviation(self) -> float:
+        """Return the standard deviation of the prior, as a share."""
+        return float(np.log1p(self.spread)) if self.scale is None else self.spread
 
     def limit(self, value: float) -> float:
         """Return a value within the limits.
@@ -56,6 +71,27 @@ class UncertainParameter:
             Whether the value stands at the limit that lies that way.
         """
         return (way > 0.0 and value >= self.maximum) or (way < 0.0 and value <= self.minimum)
+
+
+def as_uncertain(given: ModelParameter, local: bool = False) -> UncertainParameter:
+    """Return what is fitted of a parameter that a model file or a map gives.
+
+    A value at zero, or nearer to it than it may be off where its limits allow either sign, has a normal prior.
+
+    Args:
+        given: with an uncertainty above 0.
+        local: it belongs to one record alone, such as a start value; its prior is normal.
+
+    Returns:
+        The parameter.
+    """
+    near = abs(given.value) < given.uncertainty and given.minimum < 0.0 < given.maximum
+    if local or near or given.value == 0.0:
+        return UncertainParameter(
+            given.name, given.value, 1.0, given.unit, local, given.minimum, given.maximum, given.uncertainty
+        )
+    share = given.uncertainty / abs(given.value)
+    return UncertainParameter(given.name, given.value, share, given.unit, False, given.minimum, given.maximum)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +200,7 @@ class ModelPoint:
 
     @staticmethod
     def nominal(parameters: Sequence["UncertainParameter"]) -> "ModelPoint":
-        """Return the nominal values of parameters, those of a record alone at zero, without effects.
+        """Return the nominal values of parameters, without effects.
 
         Args:
             parameters: of the model, those of one record last.
@@ -172,7 +208,7 @@ class ModelPoint:
         Returns:
             The point at which every fit without effects begins.
         """
-        return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in parameters))
+        return ModelPoint(tuple(entry.nominal for entry in parameters))
 
     def with_effect(self, label: str, values: Values) -> "ModelPoint":
         """Return the point with an effect added or moved.

@@ -40,6 +40,7 @@ from orchestrator.diagnosis.model.interface import (
     ResidualModel,
     UncertainParameter,
     Values,
+    as_uncertain,
 )
 from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters, in_metres
 from orchestrator.diagnosis.settings import BalanceSettings, DiagnosisSettings
@@ -92,14 +93,15 @@ class TorqueBalance(ResidualModel):
 
     def _uncertain(self, model: Model) -> tuple[UncertainParameter, ...]:
         known = tuple(
-            UncertainParameter(entry.name, entry.value, entry.uncertainty / abs(entry.value), entry.unit)
-            for entry in model.uncertain
-            if entry.value != 0.0
+            as_uncertain(entry) for entry in model.uncertain if entry.value != 0.0 or entry.name in self.plant.linear
         )
         lag = self.plant.value(self.nominal, self.plant.drive.lag)
         if lag <= 3.0 * self.step:
             return known
-        return (*known, UncertainParameter(INITIAL_TORQUE, rms(self.signals.torque), 1.0, "N.m", local=True))
+        return (
+            *known,
+            UncertainParameter(INITIAL_TORQUE, 0.0, 1.0, "N.m", True, scale=rms(self.signals.torque), reported=False),
+        )
 
     def _active(self, speed: Array) -> Array:
         """Return the rows (n,) at which a body moves: at rest dry friction takes whatever is left there."""

@@ -33,11 +33,12 @@ def parameter_estimates(problem: FitProblem, fitted: FittedModel, level: float) 
     """Return the estimates of the model's own parameters."""
     covariance, width = value_covariance(fitted), interval_width(problem, level)
     result = {}
-    for n, entry in enumerate(problem.shared):
+    for name, n in problem.reported.items():
+        entry = problem.parameters[n]
         value = fitted.point.parameters[n]
-        error = abs(entry.nominal) * float(np.sqrt(covariance[n, n]))
+        error = abs(entry.unit_step) * float(np.sqrt(covariance[n, n]))
         interval = (entry.limit(value - width * error), entry.limit(value + width * error))
-        result[entry.name] = ParameterEstimate(value, error, interval, entry.unit, entry.nominal)
+        result[name] = ParameterEstimate(value, error, interval, entry.unit, entry.nominal)
     return result
 
 

@@ -123,7 +123,7 @@ def torque_comparison(
         own, shared = found.problem.record_points(point), len(problem.shared)
         local: list[float] = []
         for number, balance, share in records:  # of a record that was not fitted nothing is known
-            unknown = (0.0,) * (len(balance.parameters) - shared)
+            unknown = [entry.nominal for entry in balance.parameters[shared:]]
             local += own[number].parameters[shared:] if share else unknown
         return ModelPoint((*point.parameters[:shared], *local), point.effects)
 

@@ -86,3 +86,22 @@ def test_limits_that_stop_nothing_change_no_value_and_end_the_interval(free, tmp
     for name in ("m", "c"):
         other, before = found.diagnosis.parameters[name], free.calibration.diagnosis.parameters[name]
         assert other.interval == pytest.approx(before.interval, abs=0.1 * before.standard_error)
+
+
+@pytest.mark.parametrize("nominal", [0.0, 1e-3, -0.05])
+def test_a_value_near_zero_is_fitted_over_all_records_and_reported(nominal: float, tmp_path: Path) -> None:
+    """Damping of 0.8 that the map begins with at zero, next to it, or with the wrong sign; two records share it."""
+    cases = [record(SPRING, (), np.random.default_rng(11), rows) for rows in (600, 700)]
+    assert cases[0].parameters == cases[1].parameters
+    logs = [write_record(tmp_path / f"{n}.csv", case) for n, case in enumerate(cases)]
+    fmu, path = write_fmu(tmp_path / "spring.fmu", SPRING, ""), write_map(tmp_path / "map.toml", SPRING, True)
+    old = 'c = { uncertainty = "5 %" }'
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, f"c = {{ value = {nominal}, uncertainty = 1.0 }}"))
+    fitted = calibrate(logs, fmu, path).results(tmp_path).parameters
+    assert [*fitted] == ["m", "k", "c"]
+    low, high = fitted["c"].interval
+    assert low < cases[0].parameters[2] < high
+    assert high - low < 0.05
+    assert fitted["c"].nominal == nominal
+    assert fitted["c"].learned > 0.9
