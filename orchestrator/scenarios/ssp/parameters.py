@@ -277,12 +277,14 @@ def _number(text: str) -> float:
     return value
 
 
-def _real(given: Given, declared: Mapping[str, Unit], connector: Unit | None, own: Unit | None) -> float:
-    """Return a number in its variable's ``own`` unit: converted to its connector's, mapped there, converted again."""
+def _real(given: Given, declared: Mapping[str, Unit], connector: Unit | None, model_unit: Unit | None) -> float:
+    """Return a number in its variable's unit: converted to its connector's, mapped there, converted again."""
     theirs = None if given.unit is None else units.resolve(given.unit, {**declared, **given.units})
-    stated = own if connector is None else replace(connector, difference=own.difference if own else None)
+    stated = model_unit
+    if connector is not None:
+        stated = replace(connector, difference=model_unit.difference if model_unit else None)
     value = _convert(_number(given.text), theirs, stated)
-    return _convert(given.factor * value + given.offset, stated or theirs, own)
+    return _convert(given.factor * value + given.offset, stated or theirs, model_unit)
 
 
 def _convert(value: float, source: Unit | None, target: Unit | None) -> float:
