@@ -83,7 +83,7 @@ def as_uncertain(given: ModelParameter, local: bool = False) -> UncertainParamet
         local: it belongs to one record alone, such as a start value; its prior is normal.
 
     Returns:
-        The parameter.
+        What a fit begins with: nominal value, prior and limits.
     """
     near = abs(given.value) < given.uncertainty and given.minimum < 0.0 < given.maximum
     if local or near or given.value == 0.0:
