@@ -19,14 +19,14 @@
             └── ChatteringError   events that do not come to an end at one time
 """
 
-from orchestrator.plain_text import plain_text
+from orchestrator.plain_text import plain_text, shorten
 
 
 class OrchestratorError(Exception):
     """Base of every error that the project raises on purpose; its text is one line for the user.
 
-    Texts hold names and messages from files and libraries: line breaks in them become spaces, and what a terminal
-    would act on is written as an escape.
+    Texts hold names and messages from files and libraries: line breaks in them become spaces, what a terminal
+    would act on is written as an escape, and of long ones the middle is left out.
 
     Args:
         text: it calls arguments by their names in Python, in backticks.
@@ -34,7 +34,7 @@ class OrchestratorError(Exception):
     """
 
     def __init__(self, text: str = "", *arguments: str) -> None:
-        super().__init__(plain_text(text if text.isprintable() else " ".join(text.split())))
+        super().__init__(shorten(plain_text(text if text.isprintable() else " ".join(text.split()))))
         self.arguments = arguments
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 SCRATCH = "backlash-cosim-"
 """What the names of all temporary folders of this project begin with."""
 
+_LONGEST_WORD, _LONGEST_TEXT = 300, 2000  # letters: a path of many folders, a sentence with several names
 _shown: dict[str, str] = {}
 
 
@@ -25,3 +26,14 @@ def plain_text(text: str) -> str:
         for folder, shown in reversed(list(_shown.items())):  # what is unpacked may come of what was unpacked before
             text = text.replace(folder, shown)
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def shorten(text: str) -> str:
+    """Return a message without the middle of words and sentences that nobody would read to their end."""
+    if len(text) <= _LONGEST_WORD:
+        return text
+    return _cut(" ".join(_cut(word, _LONGEST_WORD) for word in text.split(" ")), _LONGEST_TEXT)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most * 2 // 3]}...{text[3 - most // 3 :]}"

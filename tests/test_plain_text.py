@@ -12,7 +12,7 @@ from orchestrator.commands._trust import note
 from orchestrator.errors import FmuError
 from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.scenarios.ssp.read import open_ssp
-from orchestrator.shared.isolation.scratch import Scratch
+from orchestrator.shared.scratch import Scratch
 from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
 
 ODD = "a\nb\r\tc\x07\x1b[2J\x9b31m\u202ed\u2028e\u200bf\ud800"
@@ -26,6 +26,27 @@ def steers(text: str) -> list[str]:
 def test_what_would_steer_a_terminal_is_an_escape() -> None:
     assert plain_text(ODD) == PLAIN
     assert plain_text("two  blanks, é, 漢, N·m") == "two  blanks, é, 漢, N·m"
+
+
+LONG = ("x" * 70_000, "x y " * 20_000)
+
+
+@pytest.mark.parametrize("value", LONG)
+def test_of_a_long_value_in_a_message_the_middle_is_left_out(value: str, tmp_path: Path, capsys) -> None:
+    (tmp_path / "a.toml").write_text(f'kind = "{value}"\n')
+    (tmp_path / f"{'long' * 40}.csv").write_text("time\n")
+    model = str(tmp_path / "a.toml")
+    for words in (
+        ["simulate", "--scenario", model], ["estimate", "a.csv", "--model", model], ["simulate", "--alpha", value],
+    ):  # fmt: skip
+        with pytest.raises(SystemExit, match=r"^2$"):  # by the parser, or by what follows
+            raise SystemExit(main(words))
+        (line,) = capsys.readouterr().err.splitlines()
+        assert len(line) < 2100
+        assert line.startswith("error: ")
+    error = FmuError(f"{tmp_path}/{'long' * 40}.csv: `kind` must be `a`, but is '{value}': choose")
+    assert f"{tmp_path}/{'long' * 40}.csv: `kind` must be `a`, but is 'x" in str(error)
+    assert str(error).endswith(": choose")
 
 
 class Named(Result):

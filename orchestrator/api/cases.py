@@ -1,7 +1,5 @@
 """What all sweeps share: where cases run, what is varied, and a table that streams from a journal."""
 
-import shutil
-import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,6 +24,7 @@ from orchestrator.engine import (
 )
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.results import ColumnFound
+from orchestrator.shared.scratch import Scratch
 
 DEFAULT_SAMPLES = 16
 MOST_ROWS_SHOWN = 40
@@ -83,20 +82,20 @@ class RunOptions:
         open_pool, limits = choose_pool(self.workers, self.scheduler, self.tls), self.limits
         if self.parquet:
             require_parquet()
-        journal, folder = self.journal, None
+        journal, scratch = self.journal, None
         if journal is None:
-            folder = Path(tempfile.mkdtemp(prefix="sweep-"))
-            journal = folder / "sweep.journal"
+            scratch = Scratch("sweep")
+            journal = scratch.path / "sweep.journal"
         try:
             sweep = run_cases(
                 cases, work, journal, open_pool=open_pool, limits=limits, resume=self.resume, on_progress=self.progress
             )
         except BaseException:
-            if folder is not None:
-                shutil.rmtree(folder, ignore_errors=True)
+            if scratch is not None:
+                scratch.close()
             raise
-        if folder is not None:
-            weakref.finalize(sweep, shutil.rmtree, folder, ignore_errors=True)
+        if scratch is not None:
+            weakref.finalize(sweep, scratch.close)
         return sweep
 
 

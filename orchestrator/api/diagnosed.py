@@ -1,6 +1,5 @@
 """A diagnosis as it is shown, drawn, written and built."""
 
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -29,6 +28,7 @@ from orchestrator.errors import OutputError
 from orchestrator.records.record import Record
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound
+from orchestrator.shared.scratch import Scratch
 
 
 @dataclass(frozen=True, repr=False)
@@ -92,8 +92,8 @@ class DiagnosisResult(AnyDiagnosisResult):
 
     @cached_property
     def _simulation(self) -> tuple[BeforeAfter, LawRun | None]:
-        with tempfile.TemporaryDirectory(prefix="diagnose-") as folder:
-            return self._co_simulated(self.build(folder))
+        with Scratch("diagnose") as scratch:
+            return self._co_simulated(self.build(scratch.path))
 
     def _co_simulated(self, fmu: Path) -> tuple[BeforeAfter, LawRun | None]:
         law = self.diagnosis.law if self.with_law else None

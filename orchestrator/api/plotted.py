@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 from orchestrator.api.shown import Result
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.output import write_result
+from orchestrator.shared.scratch import Scratch
 
 if TYPE_CHECKING:
     from orchestrator.reporting import Plot, Report
@@ -103,8 +103,8 @@ class PlottedResult(Result):
         """The plots of the page."""
         from orchestrator.reporting import Plot, Report, report_from_directory
 
-        with tempfile.TemporaryDirectory(prefix="figures-") as name:
-            folder = Path(name)
+        with Scratch("figures") as scratch:
+            folder = scratch.path
             self.write_data(folder)
             write_result(folder, self.command, self.arguments, self.seed, self.results(folder))
             page = report_from_directory(folder, self.command)

@@ -2,12 +2,15 @@
 
 import io
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
 from orchestrator.errors import FmuError
 from orchestrator.shared.output import write_whole
 
+DAMAGE = (OSError, KeyError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError)
+"""What reading an archive raises whose bits were flipped: also for compression and encryption that it has not."""
 EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -38,5 +41,5 @@ def read_archive(path: Path) -> dict[str, bytes]:
             return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
     except FileNotFoundError:
         raise FmuError(f"`fmu` must exist, but {path} does not") from None
-    except (OSError, zipfile.BadZipFile) as error:
+    except DAMAGE as error:
         raise FmuError(f"`fmu` must be a zip archive, but {path} is not: {error}") from None

@@ -9,7 +9,6 @@ import json
 import os
 import platform
 import re
-import subprocess
 import sys
 import sysconfig
 import zipfile
@@ -20,10 +19,13 @@ from pathlib import Path
 from typing import Any
 
 import orchestrator
+from orchestrator.building.archive import DAMAGE
 from orchestrator.building.launcher import Toolchain, find_toolchain
 from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of, recipes_of, with_law
 from orchestrator.errors import FmuError
 from orchestrator.fmi.ours import is_ours, record
+from orchestrator.shared.cache import tell_damage
+from orchestrator.shared.tool_runs import run_tool
 from pyfmu_sources.adapters.fmu_variables import with_starts
 
 ROOT = Path(orchestrator.__file__).resolve().parents[1]
@@ -103,6 +105,8 @@ def python_toolchain(toolchain: Toolchain) -> tuple[str, ...]:
 def bring_up_to_date(path: Path, current: str, force: bool, build: Callable[[Path, str], None]) -> Path:
     """Return the FMU at ``path``, built if it has another fingerprint than ``current``, or is not what we built."""
     if force or stamp_of(path) != current or not is_trusted(path):
+        if path.exists() and _is_damaged(path):
+            tell_damage(path)
         build(path, current)
         record(path)
     return path
@@ -113,7 +117,7 @@ def is_trusted(path: Path) -> bool:
     if is_ours(path):
         return True
     own = (ROOT / "fmus" / folder for folder in ("", "native", "fmi3", "fmi3/native"))
-    if path.parent.resolve() in own and (ROOT / "pyproject.toml").exists():
+    if path.parent.resolve() in own and (ROOT / "pyproject.toml").exists() and not _is_damaged(path):
         record(path)
         return True
     return False
@@ -124,9 +128,18 @@ def stamp_of(path: Path) -> str | None:
     try:
         with zipfile.ZipFile(path) as archive:
             found = _STAMP.search(archive.read("modelDescription.xml"))
-    except (OSError, KeyError, zipfile.BadZipFile):
+    except DAMAGE:
         return None
     return found[1].decode() if found else None
+
+
+def _is_damaged(path: Path) -> bool:
+    """Whether an archive is not whole, by the sums in it."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return archive.testzip() is not None
+    except DAMAGE:
+        return True
 
 
 def _build(recipe: Recipe, path: Path, current: str) -> None:
@@ -143,14 +156,7 @@ def _build(recipe: Recipe, path: Path, current: str) -> None:
     inherited = os.environ.get("PYTHONPATH")
     paths = [str(ROOT), *([inherited] if inherited else [])]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "PYTHONDONTWRITEBYTECODE": "1"}
-    run = subprocess.run(
-        [sys.executable, "-m", "orchestrator.building.worker"],
-        input=json.dumps(request),
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    run = run_tool([sys.executable, "-m", "orchestrator.building.worker"], None, environment, json.dumps(request))
     if run.returncode != 0:
         lines = run.stderr.strip().splitlines() or ["no message"]
         raise FmuError(f"cannot build {recipe.name}: {lines[-1]}")

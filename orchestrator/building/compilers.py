@@ -7,7 +7,6 @@ import platform
 import struct
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,6 +14,8 @@ from pathlib import Path
 
 from orchestrator.errors import FmuError
 from orchestrator.shared.machine_code import UNFOLDED, compiler_environment, local_compiler
+from orchestrator.shared.scratch import Scratch
+from orchestrator.shared.tool_runs import run_tool
 
 # No contraction of a product and a sum: it would round once where Python rounds twice.
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall", "-Wextra", "-Wpedantic", *UNFOLDED)
@@ -105,10 +106,10 @@ def _first_line(path: str) -> str:
 def compile_library(compiler: Compiler, target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:
     """Return the shared library of an FMU for one platform, the same bytes for the same sources and compiler."""
     machines = target.zig if compiler.is_zig else ("",)
-    with tempfile.TemporaryDirectory() as folder:
+    with Scratch("compile") as scratch:
         for file, content in sources.items():
-            (Path(folder) / file).write_bytes(content)
-        parts = [_compile(compiler, target, machine, name, Path(folder)) for machine in machines]
+            (scratch.path / file).write_bytes(content)
+        parts = [_compile(compiler, target, machine, name, scratch.path) for machine in machines]
     return parts[0] if len(parts) == 1 else universal(parts)
 
 
@@ -134,9 +135,8 @@ def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder
 
 def _run(compiler: Compiler, command: Sequence[str], folder: Path, what: str) -> None:
     """Run the compiler."""
-    environment = compiler_environment()
     try:
-        run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env=environment)
+        run = run_tool(command, folder, compiler_environment(folder))
     except OSError as error:
         raise FmuError(f"the C compiler {compiler.identity} cannot be run: {error.strerror}") from None
     lines = run.stderr.splitlines()

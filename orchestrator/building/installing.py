@@ -8,7 +8,6 @@ build alone. Where nothing compiles, the package is installed without machine co
 import os
 import shutil
 import sysconfig
-import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from setuptools.build_meta import build_sdist, get_requires_for_build_sdist, pre
 
 from orchestrator.building.translation.library import HEADERS, library_stem, library_text
 from orchestrator.shared.machine_code import HERE, INSTALLED, Platform, library_file, local_compiler, make_library
+from orchestrator.shared.scratch import Scratch
 
 __all__ = [
     "build_editable", "build_sdist", "build_wheel", "get_requires_for_build_editable", "get_requires_for_build_sdist",
@@ -74,14 +74,14 @@ def build_wheel(wheel_directory: str, config_settings: Any = None, metadata_dire
     """
     name = _platform(config_settings)
     options = {key: value for key, value in (config_settings or {}).items() if key != "platform"}
-    with _machine_code_of(PLATFORMS.get(name, HERE)) as count, tempfile.TemporaryDirectory() as base:
+    with _machine_code_of(PLATFORMS.get(name, HERE)) as count, Scratch("wheel") as scratch:
         if name and count < len(LIBRARIES):
             raise SystemExit(f"zig must compile {len(LIBRARIES)} kernels for {name}, but has made {count}")
         if count:
             name = name or sysconfig.get_platform().replace("-", "_").replace(".", "_")
             options["--build-option"] = [*options.get("--build-option", []), f"--plat-name={name}"]
         # A folder of its own: in the usual one lie the libraries of the last wheel, too.
-        options["--global-option"] = [*options.get("--global-option", []), "build", f"--build-base={base}"]
+        options["--global-option"] = [*options.get("--global-option", []), "build", f"--build-base={scratch.path}"]
         return build_meta.build_wheel(wheel_directory, options, metadata_directory)
 
 
@@ -114,8 +114,8 @@ def compile_all(folder: Path, made_for: Platform = HERE) -> int:
 @contextmanager
 def _machine_code_of(made_for: Platform) -> Iterator[int]:
     """Have the kernels of a platform in the tree while a wheel is made of it; yield how many there are."""
-    with tempfile.TemporaryDirectory(dir=INSTALLED.parent) as place:
-        kept = Path(place) / "kept"
+    with Scratch("wheel", INSTALLED.parent) as scratch:
+        kept = scratch.path / "kept"
         if INSTALLED.exists():
             INSTALLED.rename(kept)
         try:

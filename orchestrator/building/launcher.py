@@ -3,16 +3,16 @@
 import os
 import platform
 import shutil
-import subprocess
 import sys
 import sysconfig
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import FmuError
 from orchestrator.shared.machine_code import local_compiler
+from orchestrator.shared.scratch import Scratch
+from orchestrator.shared.tool_runs import run_tool
 
 NATIVE = Path(__file__).parent / "native"
 SOURCE = "launcher.c"
@@ -68,10 +68,11 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
 def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], *options: str) -> bytes:
     """Return a shared library that finds a Python, the same bytes wherever it is compiled."""
     assert toolchain.compiler is not None
-    with tempfile.TemporaryDirectory() as folder:
+    with Scratch("compile") as scratch:
+        folder = scratch.path
         shutil.copytree(NATIVE, folder, dirs_exist_ok=True)
         for name, content in files.items():
-            (Path(folder) / name).write_bytes(content)
+            (folder / name).write_bytes(content)
         library = str(toolchain.libpython) if toolchain.libpython else ""
         command = [
             toolchain.compiler,
@@ -82,13 +83,13 @@ def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], 
             *("-o", "launcher.so", source, "-ldl", "-lpthread", "-lm"),
         ]
         try:
-            run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+            run = run_tool(command, folder, os.environ | {"TMPDIR": str(folder)})
         except OSError as error:
             raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
         if run.returncode != 0:
             reason = next((line for line in run.stderr.splitlines() if "error" in line), "no message")
             raise FmuError(f"the C compiler {toolchain.compiler} failed on {source}: {reason}")
-        return (Path(folder) / "launcher.so").read_bytes()
+        return (folder / "launcher.so").read_bytes()
 
 
 def _quote(text: str) -> str:

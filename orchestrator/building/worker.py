@@ -5,7 +5,6 @@ Reads a recipe as JSON from standard input and writes the FMU to the path in it.
 
 import json
 import sys
-import tempfile
 from importlib.metadata import distribution
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,6 +16,8 @@ from orchestrator.building.stamping import content_guid, final_text, stamp
 from orchestrator.building.starts import default_starts
 from orchestrator.errors import OrchestratorError
 from orchestrator.shared.equation_files import members as source_members
+from orchestrator.shared.scratch import Scratch
+from orchestrator.shared.stopping import stop_on_signals
 
 RUNTIME = ("_version", "default_experiment", "enums", "fmi2slave", "logmsg", "variables")
 LINUX = "binaries/linux64"
@@ -56,8 +57,8 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
     )  # fmt: skip
     sources |= {"entry.py": entry.encode(), "__init__.py": b'"""The sources of one FMU."""\n'}
     loaded = LOADED.format(owned=OWNED, package=package, name=recipe.class_name)
-    with tempfile.TemporaryDirectory() as folder:
-        members = _build_by_pythonfmu(Path(folder), package, sources, loaded, recipe.name)
+    with Scratch("build") as scratch:
+        members = _build_by_pythonfmu(scratch.path, package, sources, loaded, recipe.name)
     write_archive(target, _complete(members, package, runtime, fingerprint, recipe))
 
 
@@ -117,6 +118,7 @@ def pythonfmu_license() -> bytes:
 
 def main() -> int:
     """Read the recipe from standard input; return 0, or 2 with one line on standard error."""
+    stop_on_signals()
     request = json.load(sys.stdin)
     recipe = Recipe(request["name"], request["module"], request["class_name"], request["starts"], request["law"])
     try:

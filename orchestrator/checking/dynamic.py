@@ -39,7 +39,7 @@ from orchestrator.errors import ChildError, OutputError
 from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import Limits
-from orchestrator.shared.isolation.scratch import Scratch
+from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.stopwatch import Stopwatch
 
 _PROBES: dict[str, probes.Probe] = {

@@ -9,7 +9,7 @@ from typing import Any, TextIO, cast
 from orchestrator.commands._lines import fold
 from orchestrator.commands._parser import word_error
 from orchestrator.errors import InputError, OrchestratorError
-from orchestrator.plain_text import plain_text
+from orchestrator.plain_text import plain_text, shorten
 from orchestrator.shared.stopping import stop_in_words
 
 
@@ -37,7 +37,7 @@ def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
     except BrokenPipeError:
         raise  # whoever read the output has gone: the program ends without a word
     except (OSError, MemoryError) as error:  # no descriptors, no memory, a full disk behind standard output
-        _say(f"error: {plain_text(str(error) or 'out of memory')}")
+        _say(f"error: {shorten(plain_text(str(error) or 'out of memory'))}")
         return 1
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from orchestrator.commands._lines import fold
-from orchestrator.plain_text import plain_text
+from orchestrator.plain_text import plain_text, shorten
 
 LARGEST_WHOLE_NUMBER = 10**18
 _NUMBERS = re.compile(r"-\.?\d")  # begins a value and no option: argparse's own knows neither 1e-3 nor lists
@@ -36,7 +36,9 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where help is, and exit with 2."""
-        self.exit(2, fold(f"error: {plain_text(_word_message(message))}; see {self.prog} --help", sys.stderr) + "\n")
+        self.exit(
+            2, fold(f"error: {shorten(plain_text(_word_message(message)))}; see {self.prog} --help", sys.stderr) + "\n"
+        )
 
 
 def _whole(text: str) -> int:

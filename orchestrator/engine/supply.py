@@ -11,7 +11,7 @@ from pathlib import Path
 from orchestrator.errors import OutputError
 from orchestrator.plain_text import name_folder
 from orchestrator.shared.isolation.archives import unpack
-from orchestrator.shared.isolation.scratch import Scratch
+from orchestrator.shared.scratch import Scratch
 
 
 class Supply:

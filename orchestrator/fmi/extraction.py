@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orchestrator.errors import FmuError
 from orchestrator.shared.isolation.archives import CHUNK, unpack
-from orchestrator.shared.isolation.scratch import Scratch
+from orchestrator.shared.scratch import Scratch
 
 _lock = threading.Lock()
 _folders: dict[tuple[int, str], Path] = {}

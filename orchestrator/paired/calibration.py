@@ -26,7 +26,7 @@ from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import difference_sum
 from orchestrator.paired.monotone import monotone_cubic
 from orchestrator.paired.settings import MapSettings
-from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.cache import cache_directory, is_intact, note_hash, tell_damage
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.equation_files import closure
 from orchestrator.shared.output import write_whole
@@ -133,16 +133,16 @@ def load_or_calibrate(
     if (SHIPPED / name).exists():
         return msgspec.json.decode((SHIPPED / name).read_bytes(), type=Calibration)
     path = cache_directory("calibrations") / name
+    if is_intact(path):
+        return msgspec.json.decode(path.read_bytes(), type=Calibration)
     if path.exists():
-        try:
-            return msgspec.json.decode(path.read_bytes(), type=Calibration)
-        except msgspec.DecodeError:
-            path.unlink()
+        tell_damage(path)
     if progress is not None:
         progress(f"calibrating the {experiment.name} experiment at encoder noise {experiment.encoder_noise:g} rad")
     calibration = calibrate(experiment, settings)
     with contextlib.suppress(OSError):  # a full cache costs time, no result
         write_whole(path, calibration_text(calibration))
+        note_hash(path)
     return calibration
 
 

@@ -25,9 +25,9 @@ from orchestrator.scenarios.inside import UnpackedRun
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
-from orchestrator.shared.isolation.scratch import Scratch
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.results import WallsFound
+from orchestrator.shared.scratch import Scratch
 
 DEFAULT_TIME_LIMIT = 300.0
 DEFAULT_MEMORY_LIMIT = 2048 * MEBIBYTE

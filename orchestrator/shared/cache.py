@@ -1,6 +1,11 @@
-"""Where the project keeps what it can make again: compiled code, calibrations."""
+"""Where the project keeps what it can make again: compiled code, FMUs, calibrations.
+
+Beside a file whose content nothing else vouches for lies its hash; what was damaged is made anew, and said.
+"""
 
 import atexit
+import hashlib
+import logging
 import os
 import shutil
 import tempfile
@@ -9,8 +14,8 @@ from pathlib import Path
 
 
 def require_room(folder: Path) -> None:
-    """Write a file and remove it; raise ``OSError`` where that fails. An empty one can be made on a full disk, too."""
-    with tempfile.NamedTemporaryFile(dir=folder) as probe:
+    """Write a file without a name; raise ``OSError`` where that fails. An empty one can be made on a full disk, too."""
+    with tempfile.TemporaryFile(dir=folder) as probe:
         probe.write(bytes(1 << 16))
         probe.flush()
 
@@ -36,3 +41,24 @@ def _temporary() -> Path:
     folder = Path(tempfile.mkdtemp(prefix=f"backlash-cosim-{os.getpid()}-cache-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
+
+
+def is_intact(path: Path) -> bool:
+    """Return whether a file is what its hash beside it says."""
+    try:
+        noted = path.with_suffix(".sha256").read_bytes()
+        return hashlib.sha256(path.read_bytes()).hexdigest().encode() == noted
+    except OSError:
+        return False
+
+
+def note_hash(path: Path) -> Path:
+    """Write the hash of a file beside it; return where."""
+    noted = path.with_suffix(".sha256")
+    noted.write_text(hashlib.sha256(path.read_bytes()).hexdigest(), encoding="ascii")
+    return noted
+
+
+def tell_damage(path: Path) -> None:
+    """Say that a file of ours was damaged and is made anew: a disk or a memory may be failing."""
+    logging.getLogger(__name__).warning("%s was damaged, and is made anew", path)

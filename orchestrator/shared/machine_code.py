@@ -11,15 +11,16 @@ import importlib.util
 import os
 import platform
 import shutil
-import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from orchestrator.shared.cache import cache_directory
+from orchestrator.errors import OutputError
+from orchestrator.shared.cache import cache_directory, is_intact, note_hash, tell_damage
+from orchestrator.shared.scratch import Scratch
+from orchestrator.shared.tool_runs import run_tool
 
 INSTALLED = Path(__file__).parents[1] / "machine_code"
 """Folder of the libraries that were compiled when the package was installed."""
@@ -61,10 +62,11 @@ def compiler_command(target: Platform = HERE) -> tuple[str, ...] | None:
     return (sys.executable, "-m", "ziglang", "cc", *(("-target", target.zig) if target.zig else ()))
 
 
-def compiler_environment() -> dict[str, str]:
-    """Return the environment of a compiler: what zig keeps lies in the user's cache."""
+def compiler_environment(temporary: Path) -> dict[str, str]:
+    """Return the environment of a compiler with its temporary folder: what zig keeps lies in the user's cache."""
     place = str(cache_directory("zig"))
-    return {**os.environ, "ZIG_GLOBAL_CACHE_DIR": place, "ZIG_LOCAL_CACHE_DIR": place}
+    own = {"ZIG_GLOBAL_CACHE_DIR": place, "ZIG_LOCAL_CACHE_DIR": place, "TMPDIR": str(temporary)}
+    return {**os.environ, **own}
 
 
 def machine_code_folder() -> Path:
@@ -97,13 +99,15 @@ def compile_text(
     """
     name, folder = library_file(stem), machine_code_folder()
     for place in (*([shipped] if shipped is not None else []), folder):
-        if _is_intact(place / name):
+        if is_intact(place / name):
             return place / name
+    if (folder / name).exists():
+        tell_damage(folder / name)
     try:
         make_library(folder / name, text(), headers)
-    except OSError:  # behind walls, or a cache that is full: there is a way without
+    except (OSError, OutputError):  # behind walls, or a cache that is full: there is a way without
         return None
-    return folder / name if _is_intact(folder / name) else None
+    return folder / name if is_intact(folder / name) else None
 
 
 def library_file(stem: str, target: Platform = HERE) -> str:
@@ -121,23 +125,13 @@ def make_library(target: Path, text: str, headers: Sequence[Path] = (), made_for
     apple = ("-fPIC", "-g0", "-Wl,-x", f"-Wl,-install_name,@rpath/{target.name}")
     before = {"linux": ("-fPIC", "-s"), "darwin": apple, "win32": ("-s",)}.get(made_for.system, ())
     behind = () if made_for.system == "win32" else ("-lm",)
-    with tempfile.TemporaryDirectory(dir=target.parent) as place:
-        source, made = Path(place) / "kernel.c", Path(place) / target.name
+    with Scratch("compile", target.parent) as scratch:
+        source, made = scratch.path / "kernel.c", scratch.path / target.name
         source.write_text(text, encoding="utf-8")
         for header in headers:
-            shutil.copyfile(header, Path(place) / header.name)
+            shutil.copyfile(header, scratch.path / header.name)
         command = [*compiler, *FLAGS, *before, "-o", str(made), str(source), *behind]
-        run = subprocess.run(command, capture_output=True, check=False, env=compiler_environment())
-        if run.returncode == 0:
-            noted = made.with_suffix(".sha256")
-            noted.write_text(hashlib.sha256(made.read_bytes()).hexdigest(), encoding="ascii")
+        if run_tool(command, environment=compiler_environment(scratch.path)).returncode == 0:
+            noted = note_hash(made)
             made.replace(target)
             noted.replace(target.with_suffix(".sha256"))
-
-
-def _is_intact(path: Path) -> bool:
-    try:
-        noted = path.with_suffix(".sha256").read_bytes()
-        return hashlib.sha256(path.read_bytes()).hexdigest().encode() == noted
-    except OSError:
-        return False

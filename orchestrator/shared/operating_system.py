@@ -10,11 +10,14 @@
 | symbolic links, and removal of an open file | yes | yes | Windows: no |
 | end of a whole process group | yes | yes | the child alone |
 | lock of an open file (filelock) | yes | yes | Windows: yes |
+| lock of a folder | yes | yes | no |
+| exchange of two folders in one step | most file systems | APFS | no |
 
 Standard library alone, but for the lock: a child imports it before its walls are up.
 """
 
 import contextlib
+import ctypes
 import errno
 import mmap
 import os
@@ -22,7 +25,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 try:
@@ -157,6 +160,39 @@ def lock(descriptor: int) -> bool:
         if error.errno == errno.ENOSYS:
             return True
         raise
+
+
+@contextlib.contextmanager
+def hold_folder(folder: Path) -> Iterator[None]:
+    """Keep other processes that ask for the same folder waiting, where the system can lock one that we may read."""
+    try:
+        from fcntl import LOCK_EX, flock
+
+        descriptor = os.open(folder, os.O_RDONLY)
+    except (ImportError, OSError):
+        yield
+        return
+    try:
+        with contextlib.suppress(OSError):  # a file system without locks
+            flock(descriptor, LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def exchange(first: Path, second: Path) -> None:
+    """Exchange two folders in one step.
+
+    Raises:
+        OSError: the system, or the file system, cannot.
+    """
+    name, start, end = ("renameat2", (-100,), (-100,)) if sys.platform == "linux" else ("renamex_np", (), ())
+    try:
+        call = getattr(ctypes.CDLL(None, use_errno=True), name)
+    except (AttributeError, TypeError):  # an older C library, or Windows
+        raise OSError(errno.ENOSYS, "no call exchanges folders here") from None
+    if call(*start, os.fsencode(first), *end, os.fsencode(second), 2):  # RENAME_EXCHANGE, RENAME_SWAP
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
 
 
 def write_at(descriptor: int, data: bytes, offset: int) -> int:

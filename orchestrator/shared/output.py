@@ -7,7 +7,6 @@ import math
 import os
 import secrets
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
@@ -17,30 +16,35 @@ from typing import Any
 from orchestrator.errors import OutputError
 from orchestrator.shared.cache import require_room
 from orchestrator.shared.operating_system import PLAIN_FILE, alive
+from orchestrator.shared.publishing import STAGING, make_staging, publish
 from orchestrator.shared.results import as_plain
 from orchestrator.shared.version import __version__
 
-STAGING = ".partial-"
 _LONGEST_PREFIX = 32  # letters: the name beside a file must fit where the file's own does
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by writes, which name no file
 
 
 @contextmanager
 def stage_output(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path]:
-    """Yield a staging directory whose files are moved into ``directory`` when the block ends without error."""
+    """Yield a staging directory that becomes ``directory`` when the block ends without error.
+
+    Args:
+        directory: made when missing; what else is in it stays.
+        replaces: names of files of an earlier result that do not stay where this one has none.
+    """
     made = make_directories(directory)
+    place = directory.resolve()
     try:
-        _remove_abandoned(directory)
-        staging = Path(tempfile.mkdtemp(prefix=f"{STAGING}{os.getpid()}-", dir=directory))
+        for folder in (place, place.parent):
+            _remove_abandoned(folder)
+        staging = make_staging(place)
     except OSError as error:
         remove_empty(made)
         raise _unwritable(directory, error) from None
     try:
         yield staging
         stale = [name for name in replaces if not (staging / name).exists()]
-        _publish(staging, directory)
-        for name in stale:
-            (directory / name).unlink(missing_ok=True)
+        publish(staging, place, stale)
     except OSError as error:
         named = error.filename is not None and str(staging) in str(error.filename)
         # A write that fails names no file: it may have been standard output, a cache or a temporary file.
@@ -105,21 +109,12 @@ def write_arrays(path: Path, columns: Mapping[str, Any]) -> None:
         raise OutputError(f"cannot write {path}: {error.strerror}") from None
 
 
-def _remove_abandoned(directory: Path) -> None:
+def _remove_abandoned(folder: Path) -> None:
     """Remove the staging directories of processes that were killed."""
-    for path in directory.glob(f"{STAGING}*-*"):
+    for path in folder.glob(f"{STAGING}*-*"):
         owner = path.name.removeprefix(STAGING).partition("-")[0]
         if owner.isdigit() and not alive(int(owner)):
             shutil.rmtree(path, ignore_errors=True)
-
-
-def _publish(staging: Path, directory: Path) -> None:
-    for source in sorted(staging.rglob("*")):
-        target = directory / source.relative_to(staging)
-        if source.is_dir():
-            target.mkdir(exist_ok=True)
-        else:
-            os.replace(source, target)
 
 
 def make_directories(directory: Path) -> list[Path]:

@@ -5,6 +5,8 @@ Standard library alone, and little of it: signals may come while the rest is loa
 
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 
 _SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
@@ -39,6 +41,28 @@ def end_on_signals() -> None:
     for number in _SIGNALS:
         if signal.getsignal(number) is _stop:
             signal.signal(number, signal.SIG_DFL)
+
+
+@contextmanager
+def signals_held() -> Iterator[None]:
+    """Let the signals wait that end this process until the block has ended; outside the main thread none comes."""
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    came: list[int] = []
+    try:
+        for number, handler in before.items():
+            if handler not in (signal.SIG_IGN, None):
+                signal.signal(number, lambda number, _: came.append(number))
+    except ValueError:  # another thread
+        yield
+        return
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            if handler is not None:
+                signal.signal(number, handler)
+        for number in came:
+            signal.raise_signal(number)
 
 
 def _stop(number: int, _: FrameType | None) -> None:

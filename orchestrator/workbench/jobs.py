@@ -210,7 +210,7 @@ def _is_complete(job: Job) -> bool:
 def _of_earlier_servers(session: SessionFolder) -> list[Job]:
     """Return the jobs that are noted in the session's directory, the oldest first."""
     found = []
-    for note in session.results.glob(f"*/{JOB_FILE}"):
+    for note in session.results.glob(f"[!.]*/{JOB_FILE}"):
         try:
             said = json.loads(note.read_text(encoding="utf-8"))
             job = Job(

@@ -1,6 +1,7 @@
 """Building FMUs: compliance, reproducible bytes, staleness, variants, two versions in one process."""
 
 import os
+import random
 import shutil
 import subprocess
 import sys
@@ -105,6 +106,28 @@ def test_what_is_up_to_date_is_left_alone_and_what_is_not_is_built(tmp_path: Pat
         path.write_bytes(stale)
         build.ensure_built(["Drivetrain"], tmp_path)
         assert path.read_bytes() == fmus["Drivetrain"].read_bytes()
+
+
+def test_whichever_bits_of_an_fmu_of_ours_are_flipped_it_is_made_anew_and_said(
+    tmp_path: Path, fmus: dict[str, Path], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    whole = fmus["Drivetrain"].read_bytes()
+    path = tmp_path / "Drivetrain.fmu"
+    rng = random.Random(1)
+    # Also where everything in the folder counts as built here, as beside the sources.
+    monkeypatch.setattr(build, "is_ours", lambda path: False)
+    monkeypatch.setattr(build, "ROOT", tmp_path.parent / "no project")
+    for _ in range(40):
+        damaged = bytearray(whole)
+        for place in rng.sample(range(len(whole)), 3):
+            damaged[place] ^= 1 << rng.randrange(8)
+        path.write_bytes(damaged)
+        caplog.clear()
+        current = build.stamp_of(fmus["Drivetrain"])
+        build.bring_up_to_date(path, current, False, lambda path, _: path.write_bytes(whole))
+        assert path.read_bytes() == whole
+        seen = [record.getMessage() for record in caplog.records]
+        assert seen == [f"{path} was damaged, and is made anew"]
 
 
 def test_the_fingerprint_sees_sources_start_values_and_compiler() -> None:

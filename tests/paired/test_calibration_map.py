@@ -188,7 +188,9 @@ def test_a_noisy_map_that_does_not_grow_is_refused() -> None:
         calibrate_loop(Loop(drowned), SMALL)
 
 
-def test_calibrations_are_stored_once_and_remade_when_damaged(tmp_path, monkeypatch, clean: Calibration) -> None:
+def test_calibrations_are_stored_once_and_remade_when_damaged(
+    tmp_path, monkeypatch, caplog, clean: Calibration
+) -> None:
     said: list[str] = []
     monkeypatch.setattr(module, "cache_directory", lambda name: tmp_path)
     monkeypatch.setattr(module, "calibrate", lambda experiment, settings: clean)
@@ -197,13 +199,17 @@ def test_calibrations_are_stored_once_and_remade_when_damaged(tmp_path, monkeypa
     assert "default experiment at encoder noise 0 rad" in said[0]
     assert load_or_calibrate(CLEAN, said.append, SMALL).log_sum == clean.log_sum
     assert len(said) == 1
-    (path,) = tmp_path.iterdir()
-    path.write_text("{")
-    assert load_or_calibrate(CLEAN, said.append, SMALL).log_sum == clean.log_sum
-    assert len(said) == 2
+    (path,) = tmp_path.glob("*.json")
+    text = path.read_text()
+    for damaged in ("{", text.replace(":0.", ":1.", 1).replace(": 0.", ": 1.", 1)):
+        assert damaged != text
+        path.write_text(damaged)
+        assert load_or_calibrate(CLEAN, said.append, SMALL).log_sum == clean.log_sum
+        assert caplog.messages.pop() == f"{path} was damaged, and is made anew"
+    assert len(said) == 3
     assert load_or_calibrate(CLEAN, None, SMALL).settings == SMALL
     load_or_calibrate(CLEAN, said.append, MapSettings(clean_sizes=43))
-    assert len(said) == 3
+    assert len(said) == 4
 
 
 def test_the_digest_names_experiment_settings_and_sources(monkeypatch, tmp_path) -> None:

@@ -60,14 +60,148 @@ def test_a_full_disk_elsewhere_is_not_blamed_on_the_results(tmp_path):
 def test_what_a_killed_process_left_is_cleared_away(tmp_path):
     code = (
         "import os, signal, sys; from pathlib import Path; from orchestrator.shared.output import stage_output\n"
-        f"with stage_output(Path({str(tmp_path)!r})) as d:\n    (d / 'a').write_text('a')\n"
+        f"with stage_output(Path({str(tmp_path / 'out')!r})) as d:\n    (d / 'a').write_text('a')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False)
-    assert len(list(tmp_path.iterdir())) == 1
-    with stage_output(tmp_path) as mine, stage_output(tmp_path) as other:
-        assert sorted(tmp_path.iterdir()) == sorted([mine, other])
-    assert list(tmp_path.iterdir()) == []
+    out = tmp_path / "out"
+    assert len(list(tmp_path.iterdir())) == 2
+    with stage_output(out) as mine, stage_output(out) as other:
+        assert sorted(tmp_path.iterdir()) == sorted([mine, other, out])
+    assert list(tmp_path.iterdir()) == [out]
+
+
+KILLED_AT_EACH_CALL = """
+import json, os, signal, sys
+from pathlib import Path
+from orchestrator.shared import output
+from orchestrator.shared.stopping import stop_on_signals
+
+out, here, number = Path(sys.argv[1]), sys.argv[2], getattr(signal, sys.argv[3])
+CALLS = ("os.link", "os.mkdir", "os.rename", "os.utime", "os.chmod", "os.remove", "os.rmdir", "ctypes.call_function")
+seen, signals_at = 0, 0
+
+def hook(event, arguments):
+    global seen
+    if signals_at and event.startswith(CALLS):
+        seen += 1
+        if seen == signals_at:
+            os.kill(os.getpid(), number)
+
+def publish(content, names):
+    with output.stage_output(out, ("gone",)) as folder:
+        for name in names:
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(content)
+
+def state():
+    return {p.relative_to(out).as_posix(): p.read_text() for p in sorted(out.rglob("*")) if p.is_file()}
+
+out.mkdir()
+if here == "inside":
+    os.chdir(out)
+(out / "journal").write_text("kept")
+sys.addaudithook(hook)
+states = []
+for n in range(1, 60):
+    publish("old", ("a", "b", "deep/c", "gone"))
+    child = os.fork()
+    if not child:
+        stop_on_signals()
+        signals_at = n
+        try:
+            publish("new", ("a", "b", "deep/c", "deep/d"))
+        except KeyboardInterrupt:
+            os._exit(3)
+        os._exit(0)
+    states.append((os.waitpid(child, 0)[1], state()))
+    publish("next", ("a",))
+    left = [p.name for folder in (out, out.parent) for p in folder.iterdir() if p.name.startswith(".")]
+    assert left == [], left
+    if states[-1][0] == 0 and states[-1][1].get("a") == "new":
+        break
+print(json.dumps(states))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="folders are exchanged on Linux")
+@pytest.mark.parametrize("ending", ["SIGKILL", "SIGTERM", "SIGINT"])
+def test_whatever_a_signal_interrupts_the_result_is_the_old_one_or_the_new_one(ending: str, tmp_path: Path) -> None:
+    words = [sys.executable, "-c", KILLED_AT_EACH_CALL, str(tmp_path / "out"), "beside", ending]
+    done = subprocess.run(words, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=True)
+    states = json.loads(done.stdout)
+    old = {"a": "old", "b": "old", "deep/c": "old", "gone": "old", "journal": "kept"}
+    new = {"a": "new", "b": "new", "deep/c": "new", "deep/d": "new", "journal": "kept"}
+    # `d` is of no result that follows: a file in a folder that nothing replaces stays.
+    seen = [{name: text for name, text in state.items() if (name, text) != ("deep/d", "new") or state["a"] == "new"}
+            for _, state in states]  # fmt: skip
+    assert all(state in (old, new) for state in seen)
+    assert len(seen) > 8
+    assert seen[0] == old
+    assert seen[-1] == new
+    assert states[0][0] != 0
+
+
+@pytest.mark.parametrize("ending", ["SIGTERM", "SIGINT"])
+def test_a_folder_that_one_works_in_stays_and_signals_wait_until_it_is_whole(ending: str, tmp_path: Path) -> None:
+    words = [sys.executable, "-c", KILLED_AT_EACH_CALL, str(tmp_path / "out"), "inside", ending]
+    done = subprocess.run(words, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=True)
+    contents = [{state[name] for name in ("a", "b", "deep/c")} for _, state in json.loads(done.stdout)]
+    assert all(len(content) == 1 for content in contents)
+    assert {"old"} in contents
+    assert {"new"} in contents
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="folders are exchanged on Linux")
+def test_of_two_commands_at_once_a_reader_sees_one_whole_result(tmp_path: Path) -> None:
+    code = (
+        "import sys; from pathlib import Path; from orchestrator.shared.output import stage_output\n"
+        f"for n in range(100):\n    with stage_output(Path({str(tmp_path / 'out')!r})) as d:\n"
+        "        for name in 'abcdef': (d / name).write_text(sys.argv[1] + str(n))"
+    )
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    both = [subprocess.Popen([sys.executable, "-c", code, word], env=environment) for word in ("x", "y")]
+    seen = set()
+    while any(process.poll() is None for process in both):
+        try:
+            folder = os.open(tmp_path / "out", os.O_RDONLY)
+        except FileNotFoundError:
+            continue
+        try:
+            texts = {Path(f"/proc/self/fd/{folder}/{name}").read_text() for name in "abcdef"}
+        except FileNotFoundError:  # an older one, that is being removed
+            continue
+        finally:
+            os.close(folder)
+        assert len(texts) == 1
+        seen |= texts
+    assert [process.returncode for process in both] == [0, 0]
+    assert len(seen) > 2
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+    assert len({(tmp_path / "out" / name).read_text() for name in "abcdef"}) == 1
+
+
+def test_a_folder_with_more_than_a_result_stays_the_folder_that_it_is(tmp_path: Path) -> None:
+    out = tmp_path / "home"
+    out.mkdir()
+    (out / "link").symlink_to(tmp_path)
+    number = out.stat().st_ino
+    with stage_output(out) as folder:
+        (folder / "a").write_text("a")
+    assert out.stat().st_ino == number
+    assert sorted(p.name for p in out.iterdir()) == ["a", "link"]
+    (out / "link").unlink()
+    with stage_output(out) as folder:
+        (folder / "b").write_text("b")
+    assert out.stat().st_ino != number
+    assert sorted(p.name for p in out.iterdir()) == ["a", "b"]
+    assert out.stat().st_mode & 0o777 == 0o777 & ~_umask()
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
 
 
 def test_text_is_replaced_at_once_and_never_seen_in_part(tmp_path, monkeypatch):

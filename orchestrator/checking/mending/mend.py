@@ -1,6 +1,5 @@
 """The repair of one FMU: archive, description, token, library; what is mended shows what else is wrong."""
 
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from orchestrator.checking.static import check_static
 from orchestrator.checking.xml_reading import parse
 from orchestrator.errors import FmuError
 from orchestrator.shared.isolation.archives import ArchiveLimits
+from orchestrator.shared.scratch import Scratch
 
 _MOST_ROUNDS = 5
 
@@ -46,9 +46,9 @@ def mend_fmu(path: Path, target: Path, limits: ArchiveLimits | None = None) -> R
         raise FmuError(f"the mended FMU must be another file, but is {path} itself")
     members, done = read_members(path, limits)
     left: list[str] = []
-    with tempfile.TemporaryDirectory(prefix="fmu-check-") as folder:
+    with Scratch("mend") as scratch:
         for number in range(_MOST_ROUNDS):
-            findings = _findings(Path(folder) / f"{number}.fmu", members, limits)
+            findings = _findings(scratch.path / f"{number}.fmu", members, limits)
             guid, mended = _mend_xml(members, findings)
             if number == 0:
                 library, left = mend_library(members, guid, findings)

@@ -1,8 +1,6 @@
 """The corrected system as SSP 1.0: the original FMU untouched, effect FMUs wired around it, and their values."""
 
-import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +32,8 @@ from orchestrator.scenarios.ssp.common import (
 from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.equation_files import members
 from orchestrator.shared.results.any_fmu import DeliveredFound, PartFound
+from orchestrator.shared.scratch import Scratch
+from orchestrator.shared.tool_runs import run_tool
 from pyfmu_sources.adapters.attachment import SERIES
 
 PLANT = "plant"
@@ -75,8 +75,8 @@ def write_corrected(path: Path, problem: FmuProblem, model: FmuModel) -> Deliver
     members = {f"resources/{fmu.name}": fmu.read_bytes() for fmu in system.members.values()}
     attachment = ""
     if parts:
-        with tempfile.TemporaryDirectory() as folder:
-            built = build_effect_fmu(Path(folder)).read_bytes()
+        with Scratch("effects") as scratch:
+            built = build_effect_fmu(scratch.path).read_bytes()
         attachment = f"AttachedEffect_{digest([built])[:8]}.fmu"
         members[f"resources/{attachment}"] = built
     starts: dict[str, dict[str, Value]] = {name: {} for name in system.members}
@@ -138,10 +138,7 @@ def build_effect_fmu(folder: Path) -> Path:
     script.write_text(f"{OWNED}\nfrom {package.name}.adapters.attachment import AttachedEffect\n", encoding="utf-8")
     target = folder / "built"
     target.mkdir()
-    run = subprocess.run(
-        [sys.executable, "-c", BUILD, str(script), str(target), str(package)],
-        capture_output=True, text=True, check=False, cwd=folder,
-    )  # fmt: skip
+    run = run_tool([sys.executable, "-c", BUILD, str(script), str(target), str(package)], folder)
     built = sorted(target.glob("*.fmu"))
     if run.returncode != 0 or not built:
         lines = run.stderr.strip().splitlines() or ["no message"]

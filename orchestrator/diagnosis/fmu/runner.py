@@ -22,7 +22,7 @@ from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
-from orchestrator.shared.isolation.scratch import Scratch
+from orchestrator.shared.scratch import Scratch
 
 Array = NDArray[np.float64]
 

@@ -37,7 +37,7 @@ from orchestrator.scenarios.ssp.common import (
 from orchestrator.scenarios.ssp.flow import Flow, Node, Structure, instance_names
 from orchestrator.scenarios.ssp.parameters import Given, Place, own_value, parameter_values, read_units
 from orchestrator.shared.isolation.archives import unpack
-from orchestrator.shared.isolation.scratch import Scratch
+from orchestrator.shared.scratch import Scratch
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 DEFAULT_STOP = 1.0

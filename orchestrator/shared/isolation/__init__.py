@@ -2,6 +2,5 @@
 
 ``jail`` is what other rooms use: it calls a Python entry point in a child process and kills the child at a deadline.
 ``walls`` is what the child puts up around itself before anything foreign is loaded, ``wire`` how the two talk,
-``scratch`` where the child may write, ``archives`` what may be unpacked. What is enforced by what is written down in
-``docs/security.md``.
+``archives`` what may be unpacked. What is enforced by what is written down in ``docs/security.md``.
 """

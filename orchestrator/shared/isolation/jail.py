@@ -45,12 +45,12 @@ from orchestrator.errors import ChildError, OrchestratorError, OutputError, Simu
 from orchestrator.shared.isolation import wire
 from orchestrator.shared.isolation.inmate import ANSWER, NONCE, REFUSAL
 from orchestrator.shared.isolation.limits import PATIENCE, Limits, Setup
-from orchestrator.shared.isolation.scratch import Scratch, usage
 from orchestrator.shared.isolation.strays import Strays
 from orchestrator.shared.isolation.surroundings import code_folders, environment, launch, system_folders
 from orchestrator.shared.isolation.walls import Walls, support
 from orchestrator.shared.machine_code import machine_code_folder
 from orchestrator.shared.operating_system import collect, kill_group, processor_time, processor_wait, resident_memory
+from orchestrator.shared.scratch import Scratch, usage
 
 START_LIMIT = 120.0
 MOST_BYTES = 256 << 20

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from orchestrator.errors import ChildError, ScenarioError, SimulationError, SlaveError
 from orchestrator.shared.isolation import jail as jail_module
 from orchestrator.shared.isolation.jail import Jail, Limits
-from orchestrator.shared.isolation.scratch import PREFIX, Scratch
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.operating_system import alive, processor_wait
+from orchestrator.shared.scratch import PREFIX, Scratch
 from tests.support.engine_process import wait_until_gone
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the limits are those of Linux")

@@ -18,10 +18,15 @@ _swept: set[str] = set()
 
 
 class Scratch:
-    """A private folder of this process; use as a context manager, or call ``close``."""
+    """A private folder of this process; use as a context manager, or call ``close``.
 
-    def __init__(self, purpose: str = "run") -> None:
-        place = tempfile.gettempdir()
+    Args:
+        purpose: a word of its name.
+        where: in which folder (default: the temporary directory).
+    """
+
+    def __init__(self, purpose: str = "run", where: Path | None = None) -> None:
+        place = tempfile.gettempdir() if where is None else str(where)
         if place not in _swept:
             _swept.add(place)
             _remove_abandoned(Path(place))
