@@ -48,6 +48,7 @@ _PUBLIC = {
     "design_regulator": "orchestrator.api.regulator",
     "diagnose": "orchestrator.api.diagnose",
     "draft_map": "orchestrator.api.any_fmu",
+    "draft_model": "orchestrator.api.inspect",
     "estimate": "orchestrator.api.estimate",
     "inspect": "orchestrator.api.inspect",
     "export_ssp": "orchestrator.api.ssp",

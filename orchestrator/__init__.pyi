@@ -18,6 +18,7 @@ from orchestrator.api.diagnosed import DiagnosisResult as DiagnosisResult
 from orchestrator.api.estimate import EstimateResult as EstimateResult
 from orchestrator.api.estimate import estimate as estimate
 from orchestrator.api.inspect import InspectResult as InspectResult
+from orchestrator.api.inspect import draft_model as draft_model
 from orchestrator.api.inspect import inspect as inspect
 from orchestrator.api.locate_gap import LocationResult as LocationResult
 from orchestrator.api.locate_gap import locate_gap as locate_gap

@@ -21,7 +21,7 @@ from orchestrator.estimation.inspection.channels import (
     reversals_of,
 )
 from orchestrator.estimation.inspection.machine import RoughMachine, as_model, is_of, rough_machine, visible_effects
-from orchestrator.estimation.inspection.starter import OF_DEFAULT, assume_columns, starter
+from orchestrator.estimation.inspection.starter import OF_DEFAULT, assume_columns, blank_starter, starter
 from orchestrator.estimation.inspection.sufficiency import SEEN, Sufficiency, sufficiency
 from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.estimation.methods import two_encoders
@@ -42,6 +42,8 @@ from orchestrator.shared.results.inspect import (
 )
 
 STARTER = "model.toml"
+ALL_FILES = ("inspect.json", "report.html", "inspect_record.npz", "inspect_record.png")
+"""What an inspection leaves beside the model file; a later one that refuses its log takes them away."""
 OF_GIVEN = "of the model that was given"
 OF_FMU = "ASSUMED: what the FMU has when nothing is said; put in the machine's"
 ROUGHLY = "inertias, stiffness, friction and lag roughly, from the record; see the model file"
@@ -240,6 +242,30 @@ def inspect(
             "header": header,
         },
     )  # fmt: skip
+
+
+def draft_model(record: Path | str, model: Model | None = None, *, header: int | None = None, problem: str = "") -> str:
+    """Draft a model file for a log that cannot be read yet, with blanks for what is missing.
+
+    Args:
+        record: path of the log.
+        model: what is stated of its columns already (default: nothing).
+        header: as ``read_record`` has it.
+        problem: why the log is refused, in one line; the file says it.
+
+    Returns:
+        The text of the file: columns as far as they are recognised, and what each blank is and where a data sheet has
+        it.
+
+    Raises:
+        RecordError: the file is no log at all.
+
+    Examples:
+        >>> "torque_constant" in oc.draft_model("machine.csv")
+        True
+    """
+    base = read_model(None) if model is None else model
+    return blank_starter(Path(record), base.columns, base.header if header is None else header, problem)
 
 
 def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Model, Mapping[str, str], tuple[str, ...]]:

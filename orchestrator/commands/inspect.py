@@ -12,6 +12,7 @@ from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of
 from orchestrator.commands._stages import Stages
+from orchestrator.errors import RecordError
 from orchestrator.fmi.preview import preview_fmu
 from orchestrator.records.preview import preview_log
 from orchestrator.shared.output import stage_output
@@ -39,11 +40,19 @@ def run(args: argparse.Namespace) -> int:
         seen = preview_log(args.record, {} if model is None else model.columns, header)
         sys.stdout.write(msgspec.json.encode(seen).decode() + "\n")
         return 0
-    from orchestrator.api.inspect import STARTER, inspect  # the libraries of the judgement: a second to import
+    from orchestrator.api import inspect as api  # the libraries of the judgement: a second to import
 
-    with Stages() as stages:
-        stages.begin("looking at the record", USUAL)
-        found = inspect(args.record, model, **reading_of(args))
+    try:
+        with Stages() as stages:
+            stages.begin("looking at the record", USUAL)
+            found = api.inspect(args.record, model, **reading_of(args))
+    except RecordError as error:
+        if model is not None and model.stated:
+            raise
+        text = api.draft_model(args.record, model, header=args.header, problem=str(error))
+        with stage_output(args.out, api.ALL_FILES) as folder:
+            (folder / api.STARTER).write_text(text, encoding="utf-8")
+        raise RecordError(f"{error}; a model file with blanks to fill in is in {args.out / api.STARTER}") from error
     given = {"record": str(args.record), "model": args.model and str(args.model)}
     with stage_output(args.out, found.replaces) as folder:
         found.write(
@@ -54,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         )
     print_blocks(found.blocks())
     sys.stdout.write(
-        f"Model file to start from: {args.out / STARTER}\nWritten to {args.out}: report.html, inspect.json\n"
+        f"Model file to start from: {args.out / api.STARTER}\nWritten to {args.out}: report.html, inspect.json\n"
     )
     return 0
 

@@ -5,30 +5,44 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.estimation.inspection.machine import ROUGH
+from orchestrator.plain_text import plain_text
 from orchestrator.records.columns import COLUMNS, KINDS, Column
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
 from orchestrator.records.loading import choose_channels
-from orchestrator.records.model_file import Model
+from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.model_text import entry_texts
+from orchestrator.records.preview import NEEDED, preview_log
 from orchestrator.records.units import parse_unit
 
 ASSUMED_COUNTS = 4096.0
-MACHINE_KEYS = (
-    "counts_per_rev", "rated_value", "resistance", "torque_constant", "back_emf_constant", "inductance", "modulo",
-    "sign_bit", "rate",
-)  # fmt: skip
 OF_DEFAULT = "of the thesis's drivetrain, whose gear ratio and inertia the record shows"
-MEANING = {
-    "J_m": "inertia of the motor",
-    "J_l": "inertia of the load",
-    "k": "stiffness of the shaft, at the load",
-    "c": "damping of the shaft, at the load",
-    "b_m": "viscous friction of the motor",
-    "b_l": "viscous friction of the load",
-    "i": "gear ratio: motor angle over load angle",
-    "tau": "time constant of the drive's torque",
+# What a number of a column is, and where a data sheet has it.
+SHEET = {
+    "counts_per_rev": "counts of a turn; encoder: its resolution, 4 times the lines of a quadrature encoder",
+    "rated_value": "what 100 % is, N.m; drive: rated or reference torque",
+    "torque_constant": "N.m/A at the motor; motor: torque constant kT, for rms amperes where the log has those",
+    "resistance": "ohm; motor: winding resistance, phase to phase",
+    "back_emf_constant": "V.s/rad; motor: back-EMF constant, volts per 1000 rpm divided by 104.7",
+    "inductance": "H; motor: winding inductance, phase to phase",
+    "modulo": "counts after which the counter starts again from zero",
+    "sign_bit": "what negative numbers have in addition",
+    "rate": "samples per second; drive: sample time of the trace",
 }
+# What a parameter of a drivetrain is, and where a data sheet has it.
+MEANING = {
+    "J_m": "inertia of the motor; motor: rotor inertia, and that of gearbox and coupling at the motor's shaft",
+    "J_l": "inertia of the load; mass times radius squared, or the machine's CAD",
+    "k": "stiffness of the shaft, at the load; gearbox: torsional rigidity, N.m/arcmin times 3438",
+    "c": "damping of the shaft, at the load; in no data sheet: 1 % of critical damping is usual",
+    "b_m": "viscous friction of the motor; motor: no-load torque over speed",
+    "b_l": "viscous friction of the load; in no data sheet",
+    "i": "gear ratio: motor angle over load angle; gearbox: ratio",
+    "tau": "time constant of the drive's torque; drive: 1/(2 pi bandwidth of the current loop), 0.5 to 5 ms of a servo",
+}
+DRAFT_LAG = 0.002  # s, of the current loop of a servo drive
+EXAMPLES = {"u": "A", "theta_m": "counts", "theta_l": "counts"}
+UNIT_KINDS = {"u": "current", "theta_m": "counts", "theta_l": "counts", "time": "time"}
 
 
 def assume_columns(
@@ -91,26 +105,68 @@ def starter(
         entry = model.parameters[name]
         share = entry.uncertainty / abs(entry.value) if entry.value else 0.0
         meaning = MEANING.get(name) or model.plant.table[list(model.parameters).index(name)].description
-        lines += [f"[parameters.{name}]", f"value = {entry.value:.6g}   # {entry.unit or '1'}: {meaning}; {said}"]
+        if name == "i" and any("counts per revolution" in text for text in assumed):
+            meant = f"ASSUMED: follows from the counts_per_rev above, {said}; put in the gearbox's"
+        else:
+            meant = said
+        lines += [f"# {meaning}", f"[parameters.{name}]", f"value = {entry.value:.6g}   # {entry.unit or '1'}; {meant}"]
         says = "off by at most this share; the fit finds the value" if share else "exact: the fit holds the value"
         lines += [f"relative_uncertainty = {share:.3g}   # {says}", ""]
-    lines += _further(model, origin)
+    lines += ["# Effects such as friction, gravity or a torque limit: `diagnose` finds which of them the machine has."]
     return "\n".join(lines).rstrip() + "\n"
 
 
 def _column_lines(column: Column, assumed: Sequence[str], name: str) -> list[str]:
     unit = "samples per second" if name == "time" else f" of {name}"
-    mark = "   # ASSUMED: put in the drive's" if any(unit in text for text in assumed) else ""
-    return [f"{key} = {text}{mark if key in MACHINE_KEYS else ''}" for key, text in entry_texts(column).items()]
+    mark = "ASSUMED: put in the drive's; " if any(unit in text for text in assumed) else ""
+    return [
+        f"{key} = {text}{f'   # {mark}{SHEET[key]}' if key in SHEET else ''}"
+        for key, text in entry_texts(column).items()
+    ]
 
 
-def _further(model: Model, written: Mapping[str, str]) -> list[str]:
-    """Return the parameters that are not ``written`` as comments: what the FMU has when nothing is said."""
-    lines = ["# What the machine may have besides, as it stands in the model; `diagnose` finds which of them it has."]
-    for name, entry in model.parameters.items():
-        if name not in written:
-            lines.append(f'# [parameters."{name}"]   value = {entry.value:g}   # {entry.unit or "1"}')
-    return lines
+def blank_starter(path: Path, columns: Mapping[str, Column], header: int | None, problem: str) -> str:
+    """Return the text of a model file for a log that is refused: what is known of its columns, and blanks.
+
+    Args:
+        path: of the log.
+        columns: what is stated of its columns.
+        header: line of the names of a text; see ``preview_log``.
+        problem: why it is refused, in one line.
+
+    Raises:
+        RecordError: the file is no log at all.
+    """
+    seen = preview_log(path, columns, header)
+    labels = [channel.label for channel in seen.channels]
+    lines = [f"# A model of the machine that made {plain_text(path.name)}, with blanks. Delete the `#` before a line,",
+             "# and fill it in. The log was refused:", f"# {plain_text(problem)}", "", 'fmu = "Drivetrain"', "",
+             f"# Columns of the log: {plain_text(', '.join(labels)) or 'none were found'}", ""]  # fmt: skip
+    for taken in seen.columns:
+        stated = columns.get(taken.column, Column())
+        name = labels[taken.place] if taken.place is not None else stated.name
+        unknown = taken.unit if taken.unit and not taken.kind else ""
+        column = replace(stated, name=name, unit="" if unknown or taken.column == "time" else taken.unit)
+        lines += [f"[columns.{taken.column}]   # {taken.meaning}", *_column_lines(column, (), taken.column)]
+        if not name:
+            lines.append('# name = ""   # FILL IN: the column of the log')
+        if not column.unit and taken.column != "time":
+            lines.append(
+                f'# unit = "{EXAMPLES[taken.column]}"   # FILL IN{f"; {unknown!r} is not known" * bool(unknown)}'
+            )
+        needs = taken.needs or (() if column.unit else NEEDED.get(UNIT_KINDS[taken.column], ()))
+        lines += [*(f"# {key} =    # FILL IN: {SHEET[key]}" for key in needs if getattr(column, key) is None), ""]
+    model = read_model(None)
+    for name, meaning in MEANING.items():
+        value = f" {DRAFT_LAG:g}" if name == "tau" else ""
+        lines += [
+            f"# {meaning}",
+            f"# [parameters.{name}]",
+            f"# value ={value}   # {model.parameters[name].unit or '1'}; FILL IN",
+            "# relative_uncertainty = 0.05   # off by at most this share; the fit finds the value",
+            "",
+        ]
+    return "\n".join(lines).rstrip() + "\n"
 
 
-__all__ = ["ROUGH", "assume_columns", "starter"]
+__all__ = ["ROUGH", "assume_columns", "blank_starter", "starter"]

@@ -1,12 +1,17 @@
 """What ``inspect`` drafts for a machine of which the model file states the columns alone, or little more."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from orchestrator.api.inspect import OF_GIVEN, inspect
+from orchestrator.api.records import read_record
+from orchestrator.cli import main
 from orchestrator.records.model_file import read_model
+from tests.support.drive_record import COUNTS, write_log
 from tests.support.sized_drive import Drive, draw_drive, write_drive_log
 
 NAMES = "Time [ms];Current setpoint [A];Motor position [deg];Axis position [deg]"
@@ -62,3 +67,46 @@ def test_what_a_model_file_leaves_open_is_of_the_record(
     shares = [text for text in found.starter.splitlines() if text.startswith("relative_uncertainty")]
     assert all(("holds the value" in text) == text.startswith("relative_uncertainty = 0 ") for text in shares)
     assert {"holds the value" in text for text in shares} == {True, False}
+
+
+SHEET = {"J_m": 0.004, "J_l": 1.9, "k": 9000.0, "c": 4.0, "b_m": 0.006, "b_l": 2.0, "i": 20.0}
+
+
+def _fill(text: str) -> str:
+    """Fill in the blanks of a drafted file, as its first lines say."""
+    for name, value in SHEET.items():
+        text = re.sub(rf"# (\[parameters\.{name}\])\n# value =(.*)\n# (.*)", rf"\1\nvalue = {value}\2\n\3", text)
+    text = re.sub(r"# (\[parameters\.tau\])\n# (value = .*)\n# (.*)", r"\1\n\2\n\3", text)
+    for name, counts in (("theta_m", COUNTS[0]), ("theta_l", COUNTS[1])):
+        blanks = rf"(\[columns\.{name}\].*\nname = .*\n)# (unit = .*)\n# (counts_per_rev =)"
+        text = re.sub(blanks, rf"\1\2\n\3 {counts}", text)
+    return re.sub(r"# (unit = \"A\".*)\n# (torque_constant =)", r"\1\n\2 0.127", text)
+
+
+def test_a_refused_log_leaves_a_model_file_whose_blanks_can_be_filled(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Amperes without a unit: refused, with a file that says what is missing; filled in, the log is read."""
+    log, out = tmp_path / "trace.csv", tmp_path / "out"
+    write_log(log)
+    rows = log.read_text().splitlines()[1:]
+    stamped = [f"{2 * n},{row.split(',', 1)[1]}" for n, row in enumerate(rows)]
+    log.write_text("\n".join(["Time [ms],Iq_ref,Motor encoder,Load encoder", *stamped]) + "\n")
+    assert main(["inspect", str(log), "--out", str(out)]) == 2
+    assert f"a model file with blanks to fill in is in {out / 'model.toml'}" in capsys.readouterr().err
+    assert [path.name for path in out.iterdir()] == ["model.toml"]
+    text = (out / "model.toml").read_text()
+    assert "current" in text.split("refused:")[1].splitlines()[1]
+    read_model(out / "model.toml")  # a file whose blanks are left alone says nothing wrong
+    filled = tmp_path / "machine.toml"
+    filled.write_text(_fill(text))
+    model = read_model(filled)
+    assert {name: model.parameters[name].value for name in SHEET} == SHEET
+    assert model.parameters["tau"].value == 0.002
+    blank = re.compile(r"^# .*FILL IN", re.MULTILINE)
+    assert blank.search(text)
+    assert not blank.search(filled.read_text())
+    record = read_record(log, model.columns)
+    assert record.theta_l is not None
+    percent = np.array([float(row.split(",")[1]) for row in rows])
+    assert np.allclose(record.u, 0.127 * percent)
