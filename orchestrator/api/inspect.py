@@ -254,8 +254,8 @@ def draft_model(record: Path | str, model: Model | None = None, *, header: int |
         problem: why the log is refused, in one line; the file says it.
 
     Returns:
-        The text of the file: columns as far as they are recognised, and what each blank is and where a data sheet has
-        it.
+        The text of the file: the columns that were recognised, and for each blank its meaning and its usual place in a
+        data sheet.
 
     Raises:
         RecordError: the file is no log at all.

@@ -129,7 +129,7 @@ def blank_starter(path: Path, columns: Mapping[str, Column], header: int | None,
     """Return the text of a model file for a log that is refused: what is known of its columns, and blanks.
 
     Args:
-        path: of the log.
+        path: of a log, of any format.
         columns: what is stated of its columns.
         header: line of the names of a text; see ``preview_log``.
         problem: why it is refused, in one line.
