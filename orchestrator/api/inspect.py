@@ -254,8 +254,7 @@ def draft_model(record: Path | str, model: Model | None = None, *, header: int |
         problem: why the log is refused, in one line; the file says it.
 
     Returns:
-        The text of the file: the columns that were recognised, and for each blank its meaning and its usual place in a
-        data sheet.
+        The text: the columns that were recognised, and what each blank means, with its place in data sheets.
 
     Raises:
         RecordError: the file is no log at all.
