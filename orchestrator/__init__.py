@@ -39,7 +39,6 @@ _PUBLIC = {
     "SimulationResult": "orchestrator.api.simulate",
     "ScenarioSweepResult": "orchestrator.api.scenario_sweep",
     "SweepResult": "orchestrator.api.sweep",
-    "benchmark": "orchestrator.api.benchmark",
     "build": "orchestrator.api.build",
     "calibrate": "orchestrator.api.calibrate",
     "check": "orchestrator.api.check",

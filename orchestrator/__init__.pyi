@@ -1,7 +1,6 @@
 # What a type checker and an editor see of the package; the names are loaded lazily.
 from orchestrator.api.any_fmu import FmuDiagnosisResult as FmuDiagnosisResult
 from orchestrator.api.any_fmu import draft_map as draft_map
-from orchestrator.api.benchmark import benchmark as benchmark
 from orchestrator.api.build import BuildResult as BuildResult
 from orchestrator.api.build import build as build
 from orchestrator.api.calibrate import CalibrationResult as CalibrationResult

@@ -27,7 +27,6 @@ COMMANDS = {
     "compensate": "control laws across the gap on the same plants, beside the bound",
     "thesis": "every published number beside the recomputed one",
     "ssp": "write the paired loops as an SSP file, or run any SSP file",
-    "bench": "speed and accuracy as ratios measured in one run",
     "workbench": "all of it in the browser, on this machine alone",
     "report": "rebuild the HTML report of a result directory",
 }

@@ -15,7 +15,6 @@ from hypothesis import HealthCheck, settings
 
 from orchestrator.building.build import ensure_built
 from orchestrator.building.native_build import ensure_native
-from orchestrator.building.python_fmi3 import ensure_python_fmi3
 
 # What a busy computer takes longer for is no failure.
 settings.register_profile("any computer", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -90,13 +89,6 @@ def build_native(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict
         return _build_each(names, place, partial(ensure_native, directory=place, here=True, fmi=fmi))
 
     return build
-
-
-@pytest.fixture(scope="session")
-def build_python_fmi3(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Path]]:
-    """Names to paths of FMUs of FMI 3.0 that run Python; each is built once in a run."""
-    place = _folder_of_all_workers(tmp_path_factory) / "python3"
-    return lambda names: _build_each(names, place, partial(ensure_python_fmi3, directory=place))
 
 
 def _folder_of_all_workers(factory: pytest.TempPathFactory) -> Path:

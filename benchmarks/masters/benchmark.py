@@ -2,21 +2,18 @@
 
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
 
 from benchmarks.masters.alone import CASE_STEPS, RECORD_STEPS, RecordCost, SweepCost, growth
 from benchmarks.masters.job import BenchJob
 from benchmarks.masters.measure import ToolRow, compare
 from benchmarks.masters.of_scenario import job_of
-from benchmarks.masters.results import BenchFound
 from benchmarks.masters.scaling import Cost, scaling
 from benchmarks.masters.tools import TOOLS
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.shown import Block, table
 from orchestrator.building.build import ensure_built
 from orchestrator.building.native_build import ensure_native
-from orchestrator.building.python_fmi3 import ensure_python_fmi3
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
@@ -26,41 +23,39 @@ from orchestrator.shared.cache import cache_directory
 WATCHED = ("plant.theta_l", "twin_plant.theta_l")
 NUMBERS = ("wall [ms]", "cpu [ms]", "us per step", "wall ratio", "cpu ratio", "deviation [rad]")
 MOST_ROUNDS = 1000
-VERSIONS = (2, 3)
 
 
-@dataclass(frozen=True, repr=False)
-class BenchmarkResult(Result):
+@dataclass(frozen=True)
+class BenchmarkResult:
     """Tools on the same FMUs and the same scenario.
 
     Attributes:
         rows: one for each tool; the first that ran is the base of the ratios.
         job: FMUs, connections, steps and recorded signals that every tool ran.
         rounds: turns that every tool got.
+        native: the FMUs were native builds.
         costs: cost of this master against FMUs and steps; empty unless asked for.
         sweeps: cost of sweeps against cases, likewise.
         records: memory against recorded signals, likewise.
-        arguments: what was asked for.
     """
 
-    command: ClassVar[str] = "bench"
     rows: tuple[ToolRow, ...]
     job: BenchJob
     rounds: int
+    native: bool
     costs: tuple[Cost, ...] = ()
     sweeps: tuple[SweepCost, ...] = ()
     records: tuple[RecordCost, ...] = ()
-    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def base(self) -> ToolRow | None:
         """The tool to which the ratios refer, or None when none ran."""
         return next((row for row in self.rows if row.wall is not None), None)
 
-    def blocks(self) -> Sequence[Block]:
+    def tables(self) -> list[Block]:
         """Return the tables."""
         job = self.job
-        kind = "native FMUs" if self.arguments.get("native") else "FMUs"
+        kind = "native FMUs" if self.native else "FMUs"
         kind += " of FMI 3.0" if job.fmi == 3 else ""
         title = f"{len(job.fmus)} {kind}, {job.steps} steps of {job.step:g} s, medians of {3 * self.rounds} runs"
         head = ("tool", "version", "scheme", *NUMBERS, "note")
@@ -77,22 +72,31 @@ class BenchmarkResult(Result):
         blocks.append(table(title, ("recorded signals", "added [MiB]", "8 bytes each [MiB]"), cells))
         return blocks
 
-    def results(self, place: Path | None = None) -> BenchFound:
-        """Return what ``bench.json`` says."""
-        return BenchFound(rows=self.rows, scaling=self.costs, sweeps=self.sweeps, records=self.records)
-
 
 def benchmark(
     tools: Sequence[str] | None = None,
     *,
-    rounds: int,
-    pythons: Mapping[str, str] | None,
-    scaling_too: bool,
-    native: bool,
-    fmi: int,
-    progress: Callable[[str], None],
+    rounds: int = 3,
+    pythons: Mapping[str, str] | None = None,
+    scaling_too: bool = False,
+    native: bool = False,
+    fmi: int = 2,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> BenchmarkResult:
-    """See ``orchestrator.benchmark``."""
+    """Run the paired loops under this master and under others, turn by turn.
+
+    Args:
+        tools: which (default: all; those that are not installed say so).
+        rounds: turns that every tool gets.
+        pythons: interpreter by tool, for tools that cannot share an environment.
+        scaling_too: measure also cost against FMUs, steps and cases, and memory.
+        native: the FMUs are native builds for this platform instead of Python FMUs.
+        fmi: version of FMI of the FMUs, 2 or 3 (native); tools that do not take those of FMI 3.0 say so.
+        progress: called with a line on what is measured.
+
+    Returns:
+        Medians of wall and CPU time [s], ratios, and deviations [rad] from the reference.
+    """
     chosen = list(TOOLS) if tools is None else list(tools)
     unknown = [name for name in chosen if name not in TOOLS]
     if unknown:
@@ -106,23 +110,21 @@ def benchmark(
         if shutil.which(path) is None:
             text = f"`python` must name an interpreter for {tool}, but there is no program {path!r}"
             raise ScenarioError(text, "python")
-    if fmi not in VERSIONS:
-        raise ScenarioError(f"`fmi` must be one of {', '.join(map(str, VERSIONS))}, but is {fmi!r}", "fmi")
+    native = native or fmi == 3
     fmus = _fmus(native, fmi)
     job = job_of(scenario_of_pair(Experiment(), fmus, 0.02, 0.5), WATCHED)
     rows = tuple(compare(job, chosen, rounds, dict(pythons or {}), progress))
-    given = {"rounds": rounds, "tools": chosen, "native": native, "fmi": fmi}
     if not scaling_too:
-        return BenchmarkResult(rows, job, rounds, arguments=given)
+        return BenchmarkResult(rows, job, rounds, native)
     costs = tuple(scaling(fmus["Drivetrain"], progress=progress))
     sweeps, records = growth(progress)
-    return BenchmarkResult(rows, job, rounds, costs, tuple(sweeps), tuple(records), given)
+    return BenchmarkResult(rows, job, rounds, native, costs, tuple(sweeps), tuple(records))
 
 
 def _fmus(native: bool, fmi: int) -> dict[str, Path]:
     if native:
         return ensure_native(FMUS, cache_directory(f"native{fmi}" if fmi != 2 else "native"), here=True, fmi=fmi)
-    return ensure_built(FMUS) if fmi == 2 else ensure_python_fmi3(FMUS)
+    return ensure_built(FMUS)
 
 
 def _cells(row: ToolRow, base: ToolRow | None, steps: int) -> list[str]:

@@ -9,7 +9,6 @@ from orchestrator.api.shown import Block, Result
 from orchestrator.building.build import ROOT, default_directory, ensure_built
 from orchestrator.building.launcher import find_toolchain
 from orchestrator.building.native_build import ensure_native, native_directory, native_remark
-from orchestrator.building.python_fmi3 import ensure_python_fmi3
 from orchestrator.building.sources import catalogue
 from orchestrator.errors import FmuError, OutputError
 from orchestrator.shared.results import BuildFound
@@ -69,11 +68,11 @@ def build(
     Args:
         names: which FMUs (default: all).
         directory: where they go (default: ``fmus/`` of the repository, or of the current folder; native ones
-            ``fmus/native/``, those of FMI 3.0 ``fmus/fmi3/`` and ``fmus/fmi3/native/``).
+            ``fmus/native/``, those of FMI 3.0 ``fmus/fmi3/``).
         force: build also what is up to date.
         native: translate the sources to C and compile them, so that the FMUs need no Python at run time.
         platforms: of native FMUs: "all" that the compiler can make, or this one alone ("here"), which is quicker.
-        fmi: version of FMI, 2 or 3.
+        fmi: version of FMI, 2 or 3; FMUs of FMI 3.0 are native.
         real_outputs: of native FMUs: make outputs that are no real numbers local variables, for hosts that read every
             output as a real number; they go to ``real/`` within the folder.
 
@@ -91,9 +90,10 @@ def build(
     """
     if fmi not in VERSIONS:
         raise FmuError(f"`fmi` must be one of {', '.join(map(str, VERSIONS))}, but is {fmi!r}", "fmi")
+    native = native or fmi == 3
     if real_outputs and not native:
         raise FmuError("`real_outputs` must be asked of native FMUs, but is asked of others", "real_outputs")
-    usual = native_directory(fmi, real_outputs) if native else default_directory(fmi)
+    usual = native_directory(fmi, real_outputs) if native else default_directory()
     folder = usual if directory is None else Path(directory)
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"`directory` must be a folder, but {folder} is a file", "directory")
@@ -104,9 +104,8 @@ def build(
         raise FmuError(f"`platforms` must be one of {', '.join(PLATFORMS)}, but is {platforms!r}", "platforms")
     if native:
         return _native(list(names) if names else None, folder, force, platforms, fmi, real_outputs)
-    ensure = ensure_built if fmi == 2 else ensure_python_fmi3
-    paths = ensure(list(names) if names else None, folder, force=force)
-    given = {"names": list(paths), "directory": str(folder), "force": force} | ({"fmi": fmi} if fmi != 2 else {})
+    paths = ensure_built(list(names) if names else None, folder, force=force)
+    given = {"names": list(paths), "directory": str(folder), "force": force}
     return BuildResult(paths, find_toolchain().remark, given)
 
 

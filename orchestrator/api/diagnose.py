@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, overload
 
 from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnosed import DiagnosisResult
-from orchestrator.api.law import request_law
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.records import as_record
 from orchestrator.diagnosis import diagnose as diagnosing
@@ -35,7 +34,6 @@ def diagnose(
     settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
     effects: Sequence[str] | None = None,
-    with_law: bool = False,
     time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
 ) -> DiagnosisResult:
@@ -69,7 +67,6 @@ def diagnose(
     settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
     effects: Sequence[str] | None = None,
-    with_law: bool = False,
     time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
 ) -> "DiagnosisResult | FmuDiagnosisResult":
@@ -87,8 +84,6 @@ def diagnose(
         search: False: the model is re-fitted and judged as it stands, no effect is looked for.
         effects: labels (``name@site``) of exactly the effects that the fitted model has, whatever they gain; none is
             looked for. Those of the model file that are not among them are left out. None: they are looked for.
-        with_law: where the verdict is "unknown" and a law is learned, the corrected FMU has it: off until its parameter
-            ``effects.learned_law.on`` is 1. Where there is none, a warning says why.
         time_limit: seconds after which the search ends with what it has; None: none.
         progress: called with (fits done, 0, what was fitted).
 
@@ -116,10 +111,6 @@ def diagnose(
     if map is None and isinstance(model, (Path, str)) and Path(model).suffix == ".toml":
         model = read_model(Path(model))
     if map is not None or isinstance(model, (Path, str)):
-        if with_law:
-            raise ScenarioError(
-                "`with_law` must be left out with an FMU of others, of which no law is learned", "with_law"
-            )
         options = {"validate": validate, "test": test, "settings": settings, "search": search, "effects": effects,
                    "time_limit": time_limit}  # fmt: skip
         return _of_an_fmu(record, model, map, options, progress)
@@ -143,8 +134,7 @@ def diagnose(
         "test": None if tested is None else tested.source,
     }  # fmt: skip
     seconds = time.monotonic() - begun
-    found, has_law = request_law(found) if with_law else (found, False)
-    return DiagnosisResult(found, measured, validated, seconds, given, tuple(more), has_law)
+    return DiagnosisResult(found, measured, validated, seconds, given, tuple(more))
 
 
 def _of_an_fmu(

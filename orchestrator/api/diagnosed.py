@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import msgspec
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
-from orchestrator.api.law import law_result, law_words
 from orchestrator.api.live import live_corrected_model
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.shown import Block, table
@@ -21,7 +20,6 @@ from orchestrator.diagnosis.report.corrected import (
     format_corrected_model,
 )
 from orchestrator.diagnosis.report.json_results import diagnosis_found, misfit_found
-from orchestrator.diagnosis.report.law_export import LawRun, build_with_law, run_with_law
 from orchestrator.diagnosis.report.summary import summarise
 from orchestrator.diagnosis.result import Diagnosis, TestMisfit
 from orchestrator.errors import OutputError
@@ -42,7 +40,6 @@ class DiagnosisResult(AnyDiagnosisResult):
         seconds: wall time of the diagnosis [s].
         arguments: what was asked for.
         more: further records of the same machine, fitted together with the first.
-        with_law: the corrected FMU has the learned law, off until ``effects.learned_law.on`` is 1.
     """
 
     replaces: ClassVar[tuple[str, ...]] = tuple(
@@ -54,10 +51,9 @@ class DiagnosisResult(AnyDiagnosisResult):
     seconds: float
     arguments: Mapping[str, Any] = field(default_factory=dict)
     more: tuple[Record, ...] = ()
-    with_law: bool = False
 
     def build(self, out: Path | str) -> Path:
-        """Build the corrected plant as an FMU, with the learned law where that was asked for, and check it.
+        """Build the corrected plant as an FMU, and check it.
 
         Args:
             out: the folder; made when it does not exist.
@@ -76,30 +72,17 @@ class DiagnosisResult(AnyDiagnosisResult):
         except OSError as error:
             raise OutputError(f"`out` must be a folder, but {folder} is not: {error.strerror}", "out") from None
         with numeric_errors(f"{self.record.source}: the corrected model cannot be built"):
-            if self.with_law and self.diagnosis.law is not None:
-                return build_with_law(self.diagnosis, self.diagnosis.law, self.record.source, folder)
             return build_corrected(self.diagnosis, self.record.source, folder)
 
-    @property
-    def runs(self) -> BeforeAfter:
-        """The test part, measured and co-simulated with the nominal and the corrected FMU, a law being off."""
-        return self._simulation[0]
-
-    @property
-    def law_run(self) -> LawRun | None:
-        """The test part, simulated by the corrected FMU with its learned law on; None: it has none."""
-        return self._simulation[1]
-
     @cached_property
-    def _simulation(self) -> tuple[BeforeAfter, LawRun | None]:
+    def runs(self) -> BeforeAfter:
+        """The test part, measured and co-simulated with the nominal and the corrected FMU."""
         with Scratch("diagnose") as scratch:
             return self._co_simulated(self.build(scratch.path))
 
-    def _co_simulated(self, fmu: Path) -> tuple[BeforeAfter, LawRun | None]:
-        law = self.diagnosis.law if self.with_law else None
+    def _co_simulated(self, fmu: Path) -> BeforeAfter:
         with numeric_errors(f"{self.record.source}: the corrected FMU cannot be run"):
-            with_law = None if law is None else run_with_law(self.diagnosis, law, fmu)
-            return before_and_after(self.diagnosis, fmu), with_law
+            return before_and_after(self.diagnosis, fmu)
 
     def draw(self, path: Path) -> None:
         """Draw the test part: measured, of the nominal model and of the corrected one."""
@@ -119,8 +102,6 @@ class DiagnosisResult(AnyDiagnosisResult):
         runs = self.runs
         names: Sequence[str] = ("theta_m", "theta_l")[: runs.measured.shape[1]]
         shown = {"": runs.measured, "_before": runs.before, "_after": runs.after}
-        if self.law_run is not None:
-            shown["_with_law"] = self.law_run.outputs
         columns = {"time": runs.time, "u": runs.u}
         columns |= {f"{name}{k}": values[:, n] for n, name in enumerate(names) for k, values in shown.items()}
         write_columns(Path(path), columns, "{:.9g}".format)
@@ -135,8 +116,6 @@ class DiagnosisResult(AnyDiagnosisResult):
         yield from summarise(d)
         if d.law is not None:
             yield f"Learned law: of what is left at the {d.law.site}, {d.law.words}"
-        if self.with_law:
-            yield law_words(d, self.law_run if "_simulation" in self.__dict__ else None)
         yield from self._closing_lines()
 
     def blocks(self) -> Sequence[Block]:
@@ -145,10 +124,8 @@ class DiagnosisResult(AnyDiagnosisResult):
 
     def results(self, place: Path) -> DiagnoseFound:
         """Return what ``diagnose.json`` says; the corrected FMU is in ``place``."""
-        found = diagnosis_found(self.diagnosis)
         return msgspec.structs.replace(
-            found,
-            learned_law=law_result(found.learned_law, self.law_run, self.test[0].signals[0].unit),
+            diagnosis_found(self.diagnosis),
             model=str(place / self.fmu_name),
             cosimulation=DifferenceFound(self.runs.difference, "rad"),
             validation=None
@@ -167,8 +144,8 @@ class DiagnosisResult(AnyDiagnosisResult):
     def write_files(self, folder: Path, pictures: bool = False) -> None:
         """Write the corrected FMU, its model file ``corrected.toml``, ``diagnose.csv`` and the pictures asked for."""
         fmu = self.build(folder)
-        if "_simulation" not in self.__dict__:  # else it would be built again
-            self.__dict__["_simulation"] = self._co_simulated(fmu)
+        if "runs" not in self.__dict__:  # else it would be built again
+            self.__dict__["runs"] = self._co_simulated(fmu)
         super().write_files(folder, pictures)
 
     def write_data(self, folder: Path) -> None:

@@ -16,12 +16,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import orchestrator
 from orchestrator.building.archive import DAMAGE
 from orchestrator.building.launcher import Toolchain, find_toolchain
-from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of, recipes_of, with_law
+from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of, recipes_of
 from orchestrator.errors import FmuError
 from orchestrator.fmi.ours import is_ours, record
 from orchestrator.shared.cache import tell_damage
@@ -33,15 +32,13 @@ IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 _STAMP = re.compile(rb'<Build fingerprint="([0-9a-f]{64})"')
 
 
-def default_directory(fmi: int = 2) -> Path:
+def default_directory() -> Path:
     """Return where FMUs live: ``fmus/`` of the repository; of an installed package, ``fmus/`` in the current folder.
 
-    A repository that the user cannot write is an installed package, too. FMUs of FMI 3.0 have a folder of their own
-    in it, because they have the same names. ``fmi``: version of FMI, 2 or 3.
+    A repository that the user cannot write is an installed package, too.
     """
     beside = ROOT / "fmus"
-    folder = beside if (ROOT / "pyproject.toml").exists() and os.access(beside, os.W_OK) else Path("fmus")
-    return folder if fmi == 2 else folder / "fmi3"
+    return beside if (ROOT / "pyproject.toml").exists() and os.access(beside, os.W_OK) else Path("fmus")
 
 
 def ensure_built(
@@ -57,7 +54,6 @@ def build_variant(
     base: str = "Drivetrain",
     start_values: Mapping[str, float | str] | None = None,
     directory: Path | None = None,
-    law: Mapping[str, Any] | None = None,
 ) -> Path:
     """Build (unless it is there already) an FMU called ``name`` that is ``base`` with other start values."""
     if not IDENTIFIER.fullmatch(name) or name in catalogue():
@@ -69,7 +65,6 @@ def build_variant(
         with_starts(slave.table, starts)
     except ValueError as error:
         raise FmuError(str(error)) from None
-    recipe = recipe if law is None else with_law(recipe, law)
     return _ensure(recipe, default_directory() if directory is None else directory)
 
 
@@ -116,7 +111,7 @@ def is_trusted(path: Path) -> bool:
     """Tell whether the file is what we built; a stamp alone can be forged, save beside sources as open."""
     if is_ours(path):
         return True
-    own = (ROOT / "fmus" / folder for folder in ("", "native", "fmi3", "fmi3/native"))
+    own = (ROOT / "fmus" / folder for folder in ("", "native", "fmi3"))
     if path.parent.resolve() in own and (ROOT / "pyproject.toml").exists() and not _is_damaged(path):
         record(path)
         return True
@@ -149,7 +144,6 @@ def _build(recipe: Recipe, path: Path, current: str) -> None:
         "module": recipe.module,
         "class_name": recipe.class_name,
         "starts": dict(recipe.starts),
-        "law": recipe.law,
         "target": str(path.absolute()),
         "fingerprint": current,
     }

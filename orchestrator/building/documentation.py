@@ -58,9 +58,7 @@ def documentation(
         description: its model description in FMI 2.0.
         fmi: version of FMI that the FMU has, 2 or 3.
     """
-    fragments = [f"{recipe.plain}.html"]
-    if recipe.law is not None:
-        fragments.append("learned_law.html")
+    fragments = [f"{recipe.class_name}.html"]
     if any(v.attrib["name"] == "sample_time" for v in description.iter("ScalarVariable")):
         fragments.append("sampled.html")
     paths = [DATA / name for name in fragments]
@@ -73,7 +71,7 @@ def documentation(
         equations="\n".join(path.read_text(encoding="utf-8").strip() for path in paths if path.exists()),
         plot=_plot(recipe.class_name),
         running=RUNNING_NATIVE.format(platforms=", ".join(platforms)) if platforms else RUNNING_PYTHON,
-        license="" if platforms or fmi == 3 else PYTHONFMU_LICENSE,
+        license="" if platforms else PYTHONFMU_LICENSE,
         tables="\n".join(_table(description, *section) for section in _SECTIONS),
     )
     icon = "model.png" if fmi == 2 else "terminalsAndIcons/icon.png"

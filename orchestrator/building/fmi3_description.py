@@ -16,7 +16,7 @@ TYPES = {"Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration"}
 INDICATOR, CLOCK = "indicator", "sample"
 
 
-def fmi3_description(cls: Any, name: str, native: bool) -> Element:
+def fmi3_description(cls: Any, name: str) -> Element:
     """Return the root element without fingerprint and token."""
     root = Element(
         "fmiModelDescription",
@@ -37,7 +37,7 @@ def fmi3_description(cls: Any, name: str, native: bool) -> Element:
     shared = {"modelIdentifier": name} | _flags(
         canGetAndSetFMUState=True,
         canSerializeFMUState=True,
-        providesDirectionalDerivatives=native and hasattr(cls, "response"),
+        providesDirectionalDerivatives=hasattr(cls, "response"),
     )
     if has_states(cls):
         SubElement(root, "ModelExchange", shared)

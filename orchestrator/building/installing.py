@@ -32,7 +32,6 @@ LIBRARIES = (
     ("orchestrator.paired.loop_kernel", True),
     *((f"{_PLANTS}.{plant}", True) for plant in ("drivetrain", "servo_axis")),
     *((f"{_PLANTS}.motion[{_PLANTS}.{plant}]", False) for plant in ("drivetrain", "servo_axis")),
-    *((f"{_PLANTS}.motion[{_PLANTS}.learned[{_PLANTS}.{plant}]]", False) for plant in ("drivetrain", "servo_axis")),
     ("orchestrator.diagnosis.fmu.loop_kernel", False),
     ("orchestrator.estimation.kernel", False),
     ("orchestrator.estimation.stages.kernel", False),

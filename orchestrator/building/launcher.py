@@ -5,7 +5,6 @@ import platform
 import shutil
 import sys
 import sysconfig
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -62,25 +61,18 @@ def find_toolchain() -> Toolchain:
 
 def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
     """Return the shared library, the same bytes wherever it is compiled."""
-    return compile_host(toolchain, SOURCE, {}, f'-DWRAPPER="{wrapper}"')
-
-
-def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], *options: str) -> bytes:
-    """Return a shared library that finds a Python, the same bytes wherever it is compiled."""
     assert toolchain.compiler is not None
     with Scratch("compile") as scratch:
         folder = scratch.path
         shutil.copytree(NATIVE, folder, dirs_exist_ok=True)
-        for name, content in files.items():
-            (folder / name).write_bytes(content)
         library = str(toolchain.libpython) if toolchain.libpython else ""
         command = [
             toolchain.compiler,
             *("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden", "-Wl,--build-id=none"),
-            *options,
+            f'-DWRAPPER="{wrapper}"',
             f"-DPYTHON_LIBRARY={_quote(library)}",
             f"-DPYTHON_PROGRAM=L{_quote(toolchain.program if library else '')}",
-            *("-o", "launcher.so", source, "-ldl", "-lpthread", "-lm"),
+            *("-o", "launcher.so", SOURCE, "-ldl", "-lpthread", "-lm"),
         ]
         try:
             run = run_tool(command, folder, os.environ | {"TMPDIR": str(folder)})
@@ -88,7 +80,7 @@ def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], 
             raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
         if run.returncode != 0:
             reason = next((line for line in run.stderr.splitlines() if "error" in line), "no message")
-            raise FmuError(f"the C compiler {toolchain.compiler} failed on {source}: {reason}")
+            raise FmuError(f"the C compiler {toolchain.compiler} failed on {SOURCE}: {reason}")
         return (folder / "launcher.so").read_bytes()
 
 

@@ -27,8 +27,8 @@ NO_COMPILER = "native FMUs need a C compiler: install one (cc), or `pip install 
 
 
 def native_directory(fmi: int = 2, real_outputs: bool = False) -> Path:
-    """Return where native FMUs live: ``native/`` beside the others, because they have the same names."""
-    folder = default_directory(fmi) / "native"
+    """Return where native FMUs live, in folders of their own beside the others, because they have the same names."""
+    folder = default_directory() / ("native" if fmi == 2 else "fmi3")
     return folder / "real" if real_outputs else folder
 
 
@@ -79,7 +79,7 @@ def _build(recipe: Recipe, compiler: Compiler, fmi: int, real_outputs: bool, pat
     members = documentation(recipe, description, [name for names in folders.values() for name in names], fmi)
     members |= reference_files(recipe, description)
     if fmi == 3:
-        description = fmi3_description(cls, recipe.name, native=True)
+        description = fmi3_description(cls, recipe.name)
         sources["buildDescription.xml"] = build_description(recipe.name)
         members["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(cls)
     stamp(description, current)

@@ -34,7 +34,6 @@ _OF_VERSION = {
         "fmi3_absent.h",
     ),
 }
-OF_FMI3 = (*HEADERS, *_OF_VERSION[3])
 _FILE = """/* {name}: {title}
  *
  * Made by backlash-cosim from {files}:
@@ -132,7 +131,7 @@ def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, by
         constants=translated.constants,
         prototypes=translated.prototypes,
         definitions=translated.definitions,
-        tables=translated.tables + (f"\n\n{count_tables(cls)}" if fmi == 3 else ""),
+        tables=translated.tables + (f"\n\n{_count_tables(cls)}" if fmi == 3 else ""),
     )
     needed = [name for name in (*HEADERS, *_OF_VERSION[fmi]) if _is_needed(name, cls, translated.types)]
     headers = {name: (RUNTIME / name).read_bytes() for name in needed}
@@ -145,7 +144,7 @@ def _is_needed(header: str, cls: Any, types: str) -> bool:
     return header != "pairs.h" or '"pairs.h"' in types
 
 
-def count_tables(cls: Any) -> str:
+def _count_tables(cls: Any) -> str:
     """Return the C tables that ``fmi3_slave.h`` asks for, and where event indicators stand."""
     counts, scalars = [0] * len(cls.table), [0] * len(cls.table)
     indicators = ""

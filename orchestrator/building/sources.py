@@ -4,10 +4,9 @@ import ast
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from orchestrator.errors import FmuError
 from orchestrator.shared.equation_files import SOURCES, closure, module_name
@@ -16,28 +15,20 @@ from orchestrator.shared.version import __version__
 
 HERE = Path(__file__).parent
 SUFFIX = "_slave"
-LAW_SUFFIX, LAW_CLASS = "_law", "WithLaw"  # of the adapter of a plant with a learned law: module and class
 # Not themselves slaves, although their names end so.
 BASES = ("plant_slave", "sampled_slave")
-BRIDGE = "adapters.fmi3_bridge"
 PLACEHOLDER = "{00000000-0000-0000-0000-000000000000}"
 """Stands for a GUID in C until the content that it follows from is known."""
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What one FMU is made from: model name, adapter module and class, start values that differ, a learned law."""
+    """What one FMU is made from: model name, adapter module and class, start values that differ."""
 
     name: str
     module: str
     class_name: str
     starts: Mapping[str, float] = field(default_factory=dict)
-    law: Mapping[str, Any] | None = None
-
-    @property
-    def plain(self) -> str:
-        """Return the class's name without what says that it has a law."""
-        return self.class_name.removesuffix(LAW_CLASS)
 
 
 @cache
@@ -65,23 +56,6 @@ def recipes_of(names: Sequence[str] | None) -> list[Recipe]:
     return [recipe_of(name) for name in (catalogue() if names is None else names)]
 
 
-def with_law(recipe: Recipe, law: Mapping[str, Any]) -> Recipe:
-    """Return the recipe of a plant with a learned law."""
-    if not takes_law(recipe):
-        place = f"pyfmu_sources/{_law_module(recipe).replace('.', '/')}.py"
-        raise FmuError(f"a learned law must act in a plant that has `{place}`, but there is none")
-    return replace(recipe, module=_law_module(recipe), class_name=recipe.class_name + LAW_CLASS, law=law)
-
-
-def takes_law(recipe: Recipe) -> bool:
-    """Tell whether a plant has an adapter in which a learned law acts."""
-    return SOURCES.joinpath(*_law_module(recipe).split(".")).with_suffix(".py").exists()
-
-
-def _law_module(recipe: Recipe) -> str:
-    return recipe.module.removesuffix(SUFFIX) + LAW_SUFFIX
-
-
 def digest(parts: Iterable[bytes]) -> str:
     """Return a SHA-256 of ``parts``, 64 hexadecimal digits, in which their borders count."""
     total = hashlib.sha256()
@@ -96,12 +70,10 @@ def fingerprint(recipe: Recipe, *made_with: str) -> str:
         "name": recipe.name,
         "class": recipe.class_name,
         "starts": {name: float(value).hex() for name, value in sorted(recipe.starts.items())},
-        "law": recipe.law,
         "version": __version__,
         "made with": made_with,
     }
-    files = [*closure(recipe.module), *closure(BRIDGE)]
-    named = [part for path in files for part in (path.name.encode(), path.read_bytes())]
+    named = [part for path in closure(recipe.module) for part in (path.name.encode(), path.read_bytes())]
     return digest([json.dumps(options, sort_keys=True).encode(), _builder_digest().encode(), *named])
 
 

@@ -26,7 +26,7 @@ ENTRY = '''"""The class that PythonFMU instantiates, with the name and the start
 
 from .{module} import {class_name} as Model
 
-{learn}Model.customise({name!r}, {build!r}, {starts!r})
+Model.customise({name!r}, {build!r}, {starts!r})
 '''
 OWNED = """import ctypes
 
@@ -43,17 +43,15 @@ from {package}.entry import Model as {name}
 
 def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
     """Build ``recipe`` into ``target``."""
-    starts = default_starts(recipe.plain) | dict(recipe.starts)
+    starts = default_starts(recipe.class_name) | dict(recipe.starts)
     runtime = runtime_files()
     sources = source_members(recipe.module)
     content = [part for name in sorted(sources) for part in (name.encode(), sources[name])]
-    options = json.dumps([recipe.name, sorted(starts.items()), recipe.law]).encode()
+    options = json.dumps([recipe.name, sorted(starts.items())]).encode()
     identity = digest([options, ENTRY.encode(), *runtime.values(), *content])
     package = f"pyfmu_{identity[:16]}"
-    learn = "" if recipe.law is None else f"Model.learn({recipe.law!r})\n"
     entry = ENTRY.format(
         module=recipe.module, class_name=recipe.class_name, name=recipe.name, build=identity[:16], starts=starts,
-        learn=learn,
     )  # fmt: skip
     sources |= {"entry.py": entry.encode(), "__init__.py": b'"""The sources of one FMU."""\n'}
     loaded = LOADED.format(owned=OWNED, package=package, name=recipe.class_name)
@@ -120,7 +118,7 @@ def main() -> int:
     """Read the recipe from standard input; return 0, or 2 with one line on standard error."""
     stop_on_signals()
     request = json.load(sys.stdin)
-    recipe = Recipe(request["name"], request["module"], request["class_name"], request["starts"], request["law"])
+    recipe = Recipe(request["name"], request["module"], request["class_name"], request["starts"])
     try:
         build(recipe, Path(request["target"]), request["fingerprint"])
     except (OrchestratorError, ValueError, OSError) as error:

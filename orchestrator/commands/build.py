@@ -29,7 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="all",
         help="of native FMUs: all that the compiler can make (default), or this one alone, which is quicker",
     )
-    parser.add_argument("--fmi", type=int, choices=VERSIONS, default=2, help="version of FMI (default: 2)")
+    parser.add_argument(
+        "--fmi",
+        type=int,
+        choices=VERSIONS,
+        default=2,
+        help="version of FMI (default: 2); FMUs of 3 are native, into fmi3/",
+    )
     parser.add_argument(
         "--real-outputs",
         action="store_true",

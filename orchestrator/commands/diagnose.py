@@ -55,11 +55,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="fit exactly these effects, whatever they gain, and look for no others; none: fit no effect",
     )
     parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="end the search then, with what it has")
-    parser.add_argument(
-        "--with-law",
-        action="store_true",
-        help="with the verdict unknown: put the learned law into the FMU, off until effects.learned_law.on is 1",
-    )
     add_reading_arguments(parser)
 
 
@@ -84,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
         with _show_stages(sum(record.size for record in records)) as progress:
             found = diagnose(
                 records, model, validate=other, test=tested, settings=settings, search=not args.no_search,
-                effects=args.effects, with_law=args.with_law, time_limit=args.time_limit, progress=progress,
+                effects=args.effects, time_limit=args.time_limit, progress=progress,
             )  # fmt: skip
         found.write(folder, args.out, given, args.pictures)
         fmu = args.out / found.fmu_name
@@ -113,8 +108,6 @@ def _any_fmu(args: argparse.Namespace) -> int:
     for name in ("model", "part", "resample", "rate", "header"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
-    if args.with_law:
-        raise ScenarioError("`with_law` must be left out with an FMU of others, of which no law is learned", "with_law")
     note_missing_walls()
     if args.draft_map:
         text = draft_map(args.records[0], fmu)

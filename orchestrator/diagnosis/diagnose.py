@@ -208,7 +208,7 @@ def _law(verdict: str, remaining: Sequence[Dependence], settings: DiagnosisSetti
         return None
     best = remaining[0]
     strong = best.comparison.t >= settings.grades.likely_t and best.comparison.gain >= settings.grades.likely_gain
-    return best if strong and best.code else None
+    return best if strong else None
 
 
 def _notes(

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange
 from orchestrator.master.protocol import EXPONENTS, ModelInterface, Unit, Value
 from orchestrator.shared.isolation.archives import open_archive
 
+PYTHON_SLAVE = "resources/slavemodule.txt"  # in what PythonFMU builds
 MAXIMUM_XML = 64 * 2**20
 """Bytes of XML beyond which a model description is refused: ten times the largest seen in the wild."""
 
@@ -96,12 +97,7 @@ def _read_archive(path: Path) -> tuple[bytes, bool]:
             raise FmuError(f"`fmu` must hold a modelDescription.xml at its top, but {path} does not{inner}")
         if info.file_size > MAXIMUM_XML:
             raise FmuError(f"{path}: modelDescription.xml must be at most {MAXIMUM_XML >> 20} MB, but is larger")
-        return archive.read(info), _runs_python(members)
-
-
-def _runs_python(names: Iterable[str]) -> bool:
-    """Tell by the names of an FMU's files whether it runs Python: PythonFMU's, and ours of FMI 3.0."""
-    return any(re.fullmatch(r"resources/(slavemodule\.txt|[^/]*/fmi3_bridge\.py)", name) for name in names)
+        return archive.read(info), PYTHON_SLAVE in members
 
 
 def _read_unpacked(folder: Path) -> tuple[bytes, bool]:
@@ -112,9 +108,7 @@ def _read_unpacked(folder: Path) -> tuple[bytes, bool]:
         content = file.read_bytes()
     except OSError as error:
         raise FmuError(f"`fmu` must hold a modelDescription.xml, but {folder} does not: {error.strerror}") from None
-    resources = folder / "resources"
-    files = [*resources.glob("slavemodule.txt"), *resources.glob("*/fmi3_bridge.py")]
-    return content, _runs_python(file.relative_to(folder).as_posix() for file in files)
+    return content, (folder / PYTHON_SLAVE).exists()
 
 
 def parse_description(

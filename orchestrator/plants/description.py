@@ -20,8 +20,6 @@ Array = NDArray[np.float64]
 STATES = 8  # places of the state, as in ``pyfmu_sources.drivetrain.equations``
 STEP = 0.35  # of the fastest oscillation: a Runge-Kutta step, whose error then lies far below an encoder's count
 MOTION = "orchestrator.plants.kernels.motion"
-LEARNED_STEPS = (4, 16)
-"""Runge-Kutta steps of a sample with a learned law, and of one in which friction may turn round."""
 REQUESTS = Kernels("orchestrator.plants.kernels.requests")
 FADING = 1.0  # of the fastest time constant of what only fades, where an error of a step fades too
 
@@ -108,7 +106,6 @@ class Plant:
         spread: relative uncertainty of each linear parameter where a model file states none.
         refused: values by name -> why records cannot be diagnosed against such a plant; "": they can.
         realised: parameters of the analysis -> those of the FMU (n,), with what it alone has fitted put in.
-        learned: a law that was learned is part of its equations.
         presliding: of each body with dry friction, name of the logarithm of the distance over which it builds up.
     """
 
@@ -130,7 +127,6 @@ class Plant:
     spread: float = 0.0
     refused: Callable[[Mapping[str, float]], str] = _accept_all
     realised: Callable[[Array], Array] | None = None
-    learned: bool = False
     presliding: tuple[str, ...] = ()
     _index: dict[str, int] = field(default_factory=dict, repr=False)
 
@@ -214,11 +210,7 @@ class Plant:
             late: (n,) that acts then.
             h: sample time [s].
         """
-        if self.learned:
-            state = np.append(start[:7], 0.0)
-            self.motion.run_coarsely(state, parameters, early, late, first, h, *LEARNED_STEPS, out)
-        else:
-            self._exact.run(start, parameters, early, late, first, h, out)
+        self._exact.run(start, parameters, early, late, first, h, out)
 
     @cached_property
     def _exact(self) -> Kernels:

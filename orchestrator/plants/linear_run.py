@@ -17,10 +17,8 @@ Run = Callable[[Array, Array, Array, Array], None]
 def is_linear(plant: Plant, p: Array) -> bool:
     """Tell whether a model moves as the linear plant does: what acts on it changes the request or the encoders alone.
 
-    It does where no gap is open, no law was learned, and all effects but a limit, a delay and offsets are off.
+    It does where no gap is open, and all effects but a limit, a delay and offsets are off.
     """
-    if plant.learned:
-        return False
     drive = plant.drive
     apart = {*plant.linear, *plant.offsets, drive.delay, drive.limit}
     return all(p[n] == entry.default for n, entry in enumerate(plant.table) if entry.name not in apart)

@@ -11,22 +11,16 @@ from orchestrator.reporting.page import render
 from orchestrator.reporting.pages import generic
 from orchestrator.reporting.source import load
 from orchestrator.shared.output import write_whole
-from orchestrator.shared.source_tree import import_masters
 
 PAGE = "report.html"
 COMMANDS = (
     "build", "check", "simulate", "sweep", "inspect", "estimate", "diagnose", "calibrate", "regulator", "compensate",
-    "thesis", "ssp", "bench",
+    "thesis", "ssp",
 )  # fmt: skip
 
 
 def _page_of(command: str) -> Any:
-    """Return the module of a command's page, or the generic one; that of ``bench`` lies in a clone alone."""
-    if command == "bench":
-        try:
-            return import_masters("page")
-        except ScenarioError:
-            return generic
+    """Return the module of a command's page, or the generic one."""
     name = f"orchestrator.reporting.pages.{'simulate' if command == 'ssp' else command}"
     return generic if find_spec(name) is None else importlib.import_module(name)
 

@@ -88,7 +88,7 @@ FORMS: dict[str, CommandForm] = {
         (1, MOST_INPUTS),
         {
             "model": _file, "settings": _file, "fmu": _file, "map": _file, "draft_map": _flag, "validate": _file,
-            "test": _file, "no_search": _flag, "effects": _effects, "time_limit": _number, "with_law": _flag,
+            "test": _file, "no_search": _flag, "effects": _effects, "time_limit": _number,
             **_READING,
         },
     ),

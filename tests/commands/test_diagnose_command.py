@@ -33,7 +33,7 @@ def test_json_keeps_the_contract(result) -> None:
     results = document["results"]
     assert json.loads(json.dumps(as_plain(read(results, DiagnoseFound)))) == results
     assert results["verdict"] == "effects"
-    assert results["schema_version"] == 3
+    assert results["schema_version"] == 4
     (effect,) = (one for one in results["effects"] if one["grade"] != "possible")
     assert {"name", "site", "grade", "parameters", "gain", "t", "explains", "family", "block_values"} <= set(effect)
     assert (effect["name"], effect["site"], effect["grade"]) == ("backlash", "shaft", "certain")

@@ -189,7 +189,7 @@ def test_the_result_shows_saves_and_builds_itself(tmp_path) -> None:
     found.save(tmp_path)
     for name in ("diagnose.json", "diagnose.csv", "corrected.toml", "report.html", found.fmu_name):
         assert (tmp_path / name).stat().st_size > 0
-    assert json.loads((tmp_path / "diagnose.json").read_text())["results"]["schema_version"] == 3
+    assert json.loads((tmp_path / "diagnose.json").read_text())["results"]["schema_version"] == 4
     assert found.results(tmp_path).cosimulation.largest_difference_from_compiled < 2e-3
     again = oc.diagnose(record, oc.read_model(tmp_path / "corrected.toml"), search=False)
     assert again.verdict in ("none", "parameters")

@@ -1,4 +1,4 @@
-"""The benchmark command: its rows, its floor, and what it says of tools that are not there."""
+"""The benchmark of masters: its rows, its floor, and what it says of tools that are not there."""
 
 import importlib.util
 import json
@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from benchmarks.masters import alone
+from benchmarks.masters.__main__ import main
 from benchmarks.masters.job import BenchJob, read_job
 from benchmarks.masters.measure import compare
 from benchmarks.masters.of_scenario import job_of
 from benchmarks.masters.reference import SCHEMES, reference_ends
 from orchestrator.building.build import ensure_built
 from orchestrator.building.compilers import find_compiler
-from orchestrator.cli import main
 from orchestrator.master import session
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.scenario import scenario_of_pair
@@ -33,9 +33,9 @@ def test_job_is_plain_data(job, tmp_path: Path) -> None:
 
 
 def test_command(tmp_path: Path, capsys) -> None:
-    words = ["bench", "--rounds", "1", "--tools", "ours,floor,fmpy,pyfmi", "--out", str(tmp_path)]
+    words = ["--rounds", "1", "--tools", "ours,floor,fmpy,pyfmi", "--json", str(tmp_path / "rows.json")]
     assert main(words) == 0
-    rows = {row["tool"]: row for row in json.loads((tmp_path / "bench.json").read_text())["results"]["rows"]}
+    rows = {row["tool"]: row for row in json.loads((tmp_path / "rows.json").read_text())["rows"]}
     assert all(rows[name]["runs"] == 3 and rows[name]["cpu"] > 0.0 for name in ("ours", "floor", "fmpy"))
     assert all(rows[name]["deviation"] <= 1e-12 for name in ("ours", "floor", "fmpy"))  # the same work
     if importlib.util.find_spec("pyfmi") is None:
@@ -46,21 +46,18 @@ def test_command(tmp_path: Path, capsys) -> None:
 
 @pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
 def test_fmus_of_fmi_3_where_tools_take_them(tmp_path: Path, capsys) -> None:
-    words = ["bench", "--rounds", "1", "--native", "--fmi", "3", "--tools", "ours,fmpy_batched,fmpy,floor"]
-    assert main([*words, "--out", str(tmp_path)]) == 0
-    rows = {row["tool"]: row for row in json.loads((tmp_path / "bench.json").read_text())["results"]["rows"]}
+    words = ["--rounds", "1", "--fmi", "3", "--tools", "ours,fmpy_batched,fmpy,floor"]
+    assert main([*words, "--json", str(tmp_path / "rows.json")]) == 0
+    rows = {row["tool"]: row for row in json.loads((tmp_path / "rows.json").read_text())["rows"]}
     assert all(rows[name]["deviation"] == 0.0 for name in ("ours", "fmpy_batched", "fmpy"))
     assert rows["floor"]["note"] == "takes no FMUs of FMI 3.0 with arrays"
     assert "native FMUs of FMI 3.0" in capsys.readouterr().out
 
 
-def test_bad_arguments(tmp_path: Path, capsys) -> None:
-    assert main(["bench", "--tools", "ours,magic", "--out", str(tmp_path / "x")]) == 2
-    assert main(["bench", "--rounds", "0", "--out", str(tmp_path / "x")]) == 2
-    assert main(["bench", "--python", "pyfmi", "--out", str(tmp_path / "x")]) == 2
-    assert main(["bench", "--python", "pyfmi=/no/such/python", "--out", str(tmp_path / "x")]) == 2
+def test_bad_arguments(capsys) -> None:
+    for words in ("--tools ours,magic", "--rounds 0", "--python pyfmi", "--python pyfmi=/no/such/python"):
+        assert main(words.split()) == 2
     assert capsys.readouterr().err.count("\n") == 4
-    assert not (tmp_path / "x").exists()
 
 
 @pytest.mark.parametrize(("name", "package"), [("ecos", "ecospy"), ("libcosim", "libcosimpy")])
@@ -91,9 +88,3 @@ def test_growth_is_measured(tmp_path: Path, monkeypatch) -> None:
         found.append(json.loads((tmp_path / "point.json").read_text()))
     assert alone.SweepCost(**found[0]).per_case > 0.0
     assert alone.RecordCost(**found[1]).expected == pytest.approx(4 * 8 * 2001 / 2**20)
-
-
-def test_an_installed_package_says_that_the_benchmark_needs_a_clone(tmp_path: Path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr("orchestrator.shared.source_tree.ROOT", tmp_path)
-    assert main(["bench", "--tools", "ours", "--rounds", "1", "--out", str(tmp_path / "x")]) == 2
-    assert "must run in a clone" in capsys.readouterr().err

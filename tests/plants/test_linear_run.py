@@ -6,7 +6,6 @@ import pytest
 from orchestrator.diagnosis.report.simulation import RunSignals, Simulation
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.plants.known.servo_axis import PLANT as AXIS
-from orchestrator.plants.learned import with_law
 from orchestrator.plants.linear_run import is_linear
 
 H = 0.005
@@ -61,8 +60,3 @@ def test_it_is_the_exact_plant(plant, values):
 )
 def test_a_model_with_an_effect_is_not_linear(values):
     assert not is_linear(DRIVETRAIN, model_of(DRIVETRAIN, values))
-
-
-def test_a_plant_with_a_learned_law_is_not_linear():
-    plant = with_law(AXIS)
-    assert not is_linear(plant, model_of(plant, {}))

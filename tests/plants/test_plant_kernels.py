@@ -10,11 +10,9 @@ from orchestrator.building.translation.kernels import Kernels
 from orchestrator.plants.description import Plant
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.plants.known.servo_axis import PLANT as AXIS
-from orchestrator.plants.learned import with_law
-from pyfmu_sources.laws.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
 
 N, H = 60, 2e-3
-PLANTS = (DRIVETRAIN, AXIS, with_law(DRIVETRAIN), with_law(AXIS))
+PLANTS = (DRIVETRAIN, AXIS)
 SMOOTH = {"effects.torque_ripple.amplitude": 0.4, "effects.quadratic_drag.coefficient": 0.1, "tau": 0.01}
 DRY = {"effects.coulomb_friction.motor.torque": 0.8, "effects.stribeck_friction.motor.breakaway": 0.5, "tau": 0.02}
 GAP = {"alpha": 0.004, "effects.load_dependent_friction.motor.coefficient": 0.05, "c": 20.0}
@@ -34,40 +32,33 @@ def bits(kernels: Kernels, name: str, *arguments: Any) -> list[float]:
     return found
 
 
-def values(plant: Plant, changed: dict[str, float], code: int = 0) -> np.ndarray:
+def values(plant: Plant, changed: dict[str, float]) -> np.ndarray:
     p = plant.extend_values([entry.default for entry in plant.table])
     for name, value in changed.items():
         if name in plant.names:
             p[plant.index(name)] = value
-    if plant.learned:
-        first = len(p) - 1 - 2 * KNOTS
-        p[first] = code
-        p[first + 1 : first + 1 + KNOTS] = np.linspace(-1.0, 1.0, KNOTS)
-        p[first + 1 + KNOTS :] = 3.0 * np.cos(np.arange(KNOTS))
     return p
 
 
-@pytest.mark.parametrize("plant", PLANTS, ids=["drivetrain", "axis", "drivetrain with a law", "axis with a law"])
+@pytest.mark.parametrize("plant", PLANTS, ids=["drivetrain", "axis"])
 @pytest.mark.parametrize("changed", [SMOOTH, DRY, GAP, STOPS], ids=["smooth", "dry", "gap", "stops"])
 def test_runs_and_balances_are_those_of_plain_python(plant: Plant, changed: dict[str, float]) -> None:
-    codes = (MOTOR_SPEED, LOAD_SPEED, LOAD_ANGLE, TWIST, DRIVE) if plant.learned else (0,)
     time = H * np.arange(N)
     motion = np.column_stack([3 * np.sin(time), 3 * np.cos(time), 0.7 * np.sin(time), 0.7 * np.cos(time)])
     signs = np.sign(motion[:, [1, 3]])
-    for code in codes:
-        p, early = values(plant, changed, code), np.roll(U, 1)
-        found = bits(plant.motion, "run_coarsely", np.zeros(8), p, early, U, 7e-4, H, 1, 8, np.empty((N, 2)))
-        assert len(set(found)) > N
-        for moves in (False, True):
-            bits(plant.motion, "accelerate", motion, signs, p, H, moves, np.empty((N, 2)))
-        if plant.shaft:
-            bits(
-                plant.motion, "accelerate_with_hidden_load", motion[:, :2].copy(), 1e-3, p, H, 2, signs[:, 0].copy(),
-                np.empty((N, 2)), np.empty(N), np.empty(N),
-            )  # fmt: skip
+    p, early = values(plant, changed), np.roll(U, 1)
+    found = bits(plant.motion, "run_coarsely", np.zeros(8), p, early, U, 7e-4, H, 1, 8, np.empty((N, 2)))
+    assert len(set(found)) > N
+    for moves in (False, True):
+        bits(plant.motion, "accelerate", motion, signs, p, H, moves, np.empty((N, 2)))
+    if plant.shaft:
+        bits(
+            plant.motion, "accelerate_with_hidden_load", motion[:, :2].copy(), 1e-3, p, H, 2, signs[:, 0].copy(),
+            np.empty((N, 2)), np.empty(N), np.empty(N),
+        )  # fmt: skip
 
 
-@pytest.mark.parametrize("plant", PLANTS[:2], ids=["drivetrain", "axis"])
+@pytest.mark.parametrize("plant", PLANTS, ids=["drivetrain", "axis"])
 @pytest.mark.parametrize("changed", [SMOOTH, DRY, GAP, STOPS], ids=["smooth", "dry", "gap", "stops"])
 def test_exact_runs_are_those_of_plain_python(plant: Plant, changed: dict[str, float]) -> None:
     own = np.array(plant.fmu_values(values(plant, changed)))

@@ -251,31 +251,6 @@ def test_the_page_of_a_large_sweep_shows_part_of_it_and_says_so(tmp_path):
     assert "The first 500 of 10000 rows" in write_report(tmp_path).read_text()
 
 
-def test_the_page_of_a_benchmark_shows_ratios_and_scaling(tmp_path):
-    tool = {
-        "tool": "t",
-        "scheme": "gauss_seidel",
-        "version": "1",
-        "runs": 3,
-        "peak": 9.0,
-        "deviation": None,
-        "note": "",
-    }
-    rows = [
-        {"title": "ours", "wall": 0.01, "cpu": 0.01} | tool,
-        {"title": "theirs", "wall": 0.04, "cpu": 0.05} | tool,
-        {"title": "absent", "wall": None, "cpu": None} | tool,
-    ]
-    scaling = [{"fmus": n, "steps": s, "microseconds": 2.0} for n in (2, 64) for s in (1000, 1000000)]
-    write_result(tmp_path, "bench", {}, None, {"rows": rows, "scaling": scaling})
-    report = report_from_directory(tmp_path)
-    tables = {t.title: t for t in sections(report, ReportTable)}
-    assert [row[5] for row in tables["Tools"].rows] == [1.0, 0.25, None]
-    bars, growth = sections(report, Plot)
-    assert bars.categories == ("ours", "theirs")
-    assert [s.name for s in growth.series] == ["2 FMUs", "64 FMUs"]
-
-
 @dataclass(frozen=True)
 class Choice:
     """An argument as commands hand it on."""

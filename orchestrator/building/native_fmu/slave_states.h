@@ -28,17 +28,11 @@ static size_t saved_size(const Instance *s)
 static Status save_state(Instance *s, void **x)
 {
     Fault fault;
-    const char *text = NULL;
-    size_t length = 0;
     fault.kind = NO_FAULT;
     recompute(s, &fault);
-#ifdef HIDDEN_TEXT
-    if (!fault.kind)
-        text = slave_hidden(&s->slave, &length, &fault);
-#endif
     if (fault.kind)
         return concluded(s, &fault);
-    const size_t size = saved_size(s) + length;
+    const size_t size = saved_size(s);
     Saved header = {GUID, size, s->course};
     char *bytes = malloc(sizeof size + size), *end = bytes;
     if (!bytes) {
@@ -55,8 +49,6 @@ static Status save_state(Instance *s, void **x)
         memcpy(end += sizeof n, (const char *)&s->slave + list->items, (size_t)n * list->item_size);
         end += (size_t)n * list->item_size;
     }
-    if (length)
-        memcpy(end, text, length);
     free(*x);
     *x = bytes;
     return s->worst;
@@ -89,11 +81,7 @@ static bool is_ours(const char *bytes)
         bytes += sizeof n + (size_t)n * list->item_size;
         left -= (size_t)n * list->item_size;
     }
-#ifdef HIDDEN_TEXT
-    return true;
-#else
     return left == 0;
-#endif
 }
 
 static Status restore_state(Instance *s, const void *x)
@@ -106,14 +94,6 @@ static Status restore_state(Instance *s, const void *x)
     Saved header;
     bytes += sizeof(size_t);
     memcpy(&header, bytes, sizeof header);
-#ifdef HIDDEN_TEXT
-    Fault fault;
-    const size_t before = sizeof header + FIXED_BYTES;
-    fault.kind = NO_FAULT;
-    slave_take_hidden(&s->slave, bytes + before, header.size - before, &fault);
-    if (fault.kind)
-        return concluded(s, &fault);
-#endif
     s->course = header.course;
     memcpy(&s->slave, bytes += sizeof header, FIXED_BYTES);
     bytes += FIXED_BYTES;

@@ -260,7 +260,6 @@ class LawArgument:
         unit, torque_unit: of the signal and of the torque.
         values: (n,) of each record.
         respond: of each record: torque (n,) against the motion -> change (channels, n) of the residuals.
-        code: number of the argument in a learned law of an FMU; 0: none has it.
         drives: it is the torque that drives. Beside a curve of that, free parameters go with it to nothing, where
             nothing is left either.
     """
@@ -271,7 +270,6 @@ class LawArgument:
     torque_unit: str
     values: tuple[Array, ...]
     respond: tuple[Callable[[Array], Array], ...]
-    code: int = 0
     drives: bool = False
 
 

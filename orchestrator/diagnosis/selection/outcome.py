@@ -170,8 +170,6 @@ class Dependence:
         comparison: gain on blocks left out, and its paired error.
         share: of what is left at the body that it explains.
         formula: of at most two simple terms that run within the band; empty: none does.
-        changes: shares by which the model's own parameters move with it, by name.
-        code: number of the argument in a learned law.
     """
 
     argument: str
@@ -184,8 +182,6 @@ class Dependence:
     comparison: ScoreComparison
     share: float
     formula: str = ""
-    changes: Mapping[str, float] = field(default_factory=dict)
-    code: int = 0
 
     @property
     def words(self) -> str:

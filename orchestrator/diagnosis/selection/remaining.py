@@ -90,13 +90,12 @@ def _fit_curve(result: SearchResult, argument: LawArgument) -> Dependence | None
     )
     values = step[count:]
     deviations = np.sqrt(np.maximum(np.diag(inverse), np.diag(jackknife_covariance(shifts)))[count:])
-    changes = {problem.parameters[n].name: float(step[place]) for place, n in enumerate(own)}
     left = final.residual + whole @ step
     share = 1.0 - float(left @ left) / float(final.residual @ final.residual)
     return Dependence(
         argument.name, argument.site, argument.unit, argument.torque_unit, tuple(knots.tolist()),
         tuple(values.tolist()), tuple(deviations.tolist()), compare_residuals(before, after, problem.blocks),
-        max(share, 0.0), formula_of(knots, values, deviations), changes, argument.code,
+        max(share, 0.0), formula_of(knots, values, deviations),
     )  # fmt: skip
 
 

@@ -230,18 +230,10 @@ def _law_sections(law: LearnedFound | None) -> list[Section]:
     curve = Series("torque that is left, with its 95 % band", law.knots, law.values, "line", *law.band)
     x_label = f"{law.argument} at the {law.site} [{law.argument_unit}]"
     return [
-        Text("A law learned from what is left", (_sentence(law.words), *_in_the_fmu(law))),
+        Text("A law learned from what is left", (_sentence(law.words),)),
         Plot("The strongest curve of what is left", x_label, f"torque [{law.unit}]", (curve,)),
         ReportTable("Knots of the learned law", columns, rows),
     ]
-
-
-def _in_the_fmu(law: LearnedFound) -> tuple[str, ...]:
-    """Return in a sentence how the corrected FMU has the law; none where it has not."""
-    if (fmu := law.exported) is None:
-        return ()
-    missed = ", ".join(f"{name} by {rms:.4g} {fmu.unit}" for name, rms in fmu.misfit.items() if rms is not None)
-    return (f"The corrected FMU has it, off until its parameter {fmu.parameter} is 1; then it misses {missed}.",)
 
 
 def _analysis(results: DiagnoseFound) -> list[Section]:

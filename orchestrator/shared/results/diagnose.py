@@ -124,28 +124,10 @@ class RemainingFound(msgspec.Struct, frozen=True):
     follows: tuple[DependenceFound, ...] = ()
 
 
-class LawRunFound(msgspec.Struct, frozen=True):
-    """A free run of the corrected FMU with its law on: first row in the test part, and start values."""
-
-    row: int
-    starts: dict[str, float]
-
-
-class LawExportFound(msgspec.Struct, frozen=True):
-    """A learned law in the corrected FMU: the parameter that switches it, and what the FMU misses with it on."""
-
-    parameter: str
-    misfit: dict[str, float | None]
-    unit: str
-    largest_difference_from_compiled: float | None
-    runs: tuple[LawRunFound, ...] = ()
-
-
 class LearnedFound(msgspec.Struct, frozen=True):
     """A learned law: knots and values with the 95 % band (its low and its high ends), and what it is worth.
 
-    ``gain`` is the share of the squared error of blocks left out that it takes, ``exported`` what the corrected FMU
-    makes of it, where that was asked for.
+    ``gain`` is the share of the squared error of blocks left out that it takes.
     """
 
     site: str
@@ -159,7 +141,6 @@ class LearnedFound(msgspec.Struct, frozen=True):
     formula: str
     gain: float | None
     t: float | None
-    exported: LawExportFound | None = None
 
 
 class AnalysisFound(msgspec.Struct, frozen=True):
@@ -208,7 +189,7 @@ class DiagnoseFound(ResultData, frozen=True, kw_only=True):
     ``library``: by label (``name@site``) each effect that the record can show.
     """
 
-    schema_version: int = 3
+    schema_version: int = 4
     verdict: str
     effects: tuple[EffectFound, ...] = ()
     play: Sizes | None = None
