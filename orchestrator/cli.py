@@ -52,7 +52,7 @@ def build_parser(command: str | None, every: bool = False) -> argparse.ArgumentP
         module.add_arguments(sub)
         add_progress_argument(sub)
         if name in PICTURED:
-            text = "draw the plots of the page as PNG files too"
+            text = f"draw the plots of the page into {name}.png too"
             sub.add_argument("--pictures", action="store_true", help=text)
         if name != "report":  # it writes into the directory that it is given
             sub.add_argument(

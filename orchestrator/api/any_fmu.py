@@ -50,7 +50,7 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         delivered: the corrected system, once it has been written.
     """
 
-    replaces: ClassVar[tuple[str, ...]] = ("corrected.ssp", "diagnose_signals.png")
+    replaces: ClassVar[tuple[str, ...]] = ("corrected.ssp", "diagnose.png")
     signal_word: ClassVar[str] = "output"
     diagnosis: FmuDiagnosis
     validation: TestMisfit | None
@@ -105,9 +105,9 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         problem, row = first_test(self.diagnosis.workings)
         return float(problem.data.time[row]) if row < len(problem.data.time) else None
 
-    def write_files(self, folder: Path, pictures: bool = False) -> None:
-        """Write measured and simulated outputs, a picture where it is asked for, and the corrected system."""
-        super().write_files(folder, pictures)
+    def write_files(self, folder: Path) -> None:
+        """Write measured and simulated outputs, and the corrected system."""
+        super().write_files(folder)
         if self.verdict != "unknown" or self.diagnosis.workings.search.asked:
             workings = self.diagnosis.workings
             self.delivered[:] = [write_corrected(folder / "corrected.ssp", workings.problem, workings.final)]
@@ -120,16 +120,6 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
             columns[name] = problem.data.outputs[:, k]
             columns |= {f"{name}_{stage}": values[:, k] for stage, values in stages.items()}
         write_columns(folder / "diagnose.csv", columns, "{:.9g}".format)
-
-    def draw(self, path: Path) -> None:
-        """Draw measured and simulated outputs, and what each simulation misses."""
-        from orchestrator.diagnosis.fmu.report import draw_signals
-
-        draw_signals(path, *self._stage_runs)
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw ``diagnose_signals.png``."""
-        self.draw(folder / "diagnose_signals.png")
 
     @cached_property
     def _stage_runs(self) -> tuple[FmuProblem, dict[str, Array], int]:

@@ -46,7 +46,7 @@ class DesignResult(PlottedResult):
     """
 
     command: ClassVar[str] = "estimate"
-    replaces: ClassVar[tuple[str, ...]] = ("design.png",)
+    replaces: ClassVar[tuple[str, ...]] = ("estimate.png",)
     size: float
     time: NDArray[np.float64]
     candidates: tuple[Excitation, ...]
@@ -80,12 +80,6 @@ class DesignResult(PlottedResult):
         except OSError as error:
             raise OutputError(f"cannot write {path}: {error.strerror}") from None
 
-    def draw(self, path: Path) -> None:
-        """Draw the torque of the best excitation against time."""
-        from orchestrator.estimation.figures import draw_design
-
-        draw_design(path, self.time, self.best)
-
     def blocks(self) -> Sequence[Block]:
         """Return the table of the candidates."""
         rows = [
@@ -111,10 +105,6 @@ class DesignResult(PlottedResult):
     def write_data(self, folder: Path) -> None:
         """Write ``design.csv``."""
         self.write_csv(folder / "design.csv")
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw ``design.png``."""
-        self.draw(folder / "design.png")
 
 
 def check_design(

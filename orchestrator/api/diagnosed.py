@@ -42,9 +42,7 @@ class DiagnosisResult(AnyDiagnosisResult):
         more: further records of the same machine, fitted together with the first.
     """
 
-    replaces: ClassVar[tuple[str, ...]] = tuple(
-        f"diagnose_{name}.png" for name in ("signals", "candidates", "missing_torque", "blocks", "learned_law")
-    )
+    replaces: ClassVar[tuple[str, ...]] = ("diagnose.png",)
     diagnosis: Diagnosis
     record: Record
     validation: TestMisfit | None
@@ -83,12 +81,6 @@ class DiagnosisResult(AnyDiagnosisResult):
     def _co_simulated(self, fmu: Path) -> BeforeAfter:
         with numeric_errors(f"{self.record.source}: the corrected FMU cannot be run"):
             return before_and_after(self.diagnosis, fmu)
-
-    def draw(self, path: Path) -> None:
-        """Draw the test part: measured, of the nominal model and of the corrected one."""
-        from orchestrator.diagnosis.report.figures import draw_signals
-
-        draw_signals(path, self.runs, self.diagnosis)
 
     def write_csv(self, path: Path | str) -> None:
         """Write what ``plot`` draws as CSV.
@@ -141,12 +133,12 @@ class DiagnosisResult(AnyDiagnosisResult):
         """File name of the corrected FMU."""
         return f"{fmu_name(self.diagnosis.model.plant.name, self.record.source)}.fmu"
 
-    def write_files(self, folder: Path, pictures: bool = False) -> None:
-        """Write the corrected FMU, its model file ``corrected.toml``, ``diagnose.csv`` and the pictures asked for."""
+    def write_files(self, folder: Path) -> None:
+        """Write the corrected FMU, its model file ``corrected.toml`` and ``diagnose.csv``."""
         fmu = self.build(folder)
         if "runs" not in self.__dict__:  # else it would be built again
             self.__dict__["runs"] = self._co_simulated(fmu)
-        super().write_files(folder, pictures)
+        super().write_files(folder)
 
     def write_data(self, folder: Path) -> None:
         """Write ``diagnose.csv`` and ``corrected.toml``."""
@@ -154,13 +146,6 @@ class DiagnosisResult(AnyDiagnosisResult):
         (folder / "corrected.toml").write_text(
             format_corrected_model(self.diagnosis.model, self.diagnosis), encoding="utf-8"
         )
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw ``diagnose_*.png``."""
-        from orchestrator.diagnosis.report.figures import draw_workings
-
-        draw_workings(folder, self.diagnosis)
-        self.draw(folder / "diagnose_signals.png")
 
 
 def _torque_table(diagnosis: DiagnosisResult) -> Iterator[Block]:

@@ -58,7 +58,7 @@ class EstimateResult(PlottedResult):
 
     command: ClassVar[str] = "estimate"
     replaces: ClassVar[tuple[str, ...]] = (
-        *(f"estimate_{name}.png" for name in ("fit", "profile", "online", "flanks", "stages")),
+        "estimate.png",
         *(f"{DIAGNOSIS}/{name}" for name in DiagnosisResult.replaces),
     )
     record: Record
@@ -117,22 +117,6 @@ class EstimateResult(PlottedResult):
         """How far the answer can be trusted, with the reasons; red where no method applies."""
         found = next((m.trust for m in self.methods if m.trust is not None), None)
         return found or Trust(Level.RED, ("no method can be applied to this record",))
-
-    def draw(self, path: Path) -> None:
-        """Draw record against fitted model, time in the gap shaded.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-
-        Raises:
-            ScenarioError: only ``maximum_likelihood`` fits all of the record, and it is not among the methods.
-        """
-        from orchestrator.estimation.figures import draw_fit
-
-        fits = [e for e in self.estimates if e.method == "maximum_likelihood"]
-        if not fits:
-            raise ScenarioError("`method` must be maximum_likelihood for a plot of the fit, but is another", "method")
-        draw_fit(path, self.record, fits[0], self._ratio(fits[0]))
 
     def _ratio(self, estimate: Estimate) -> float:
         return float(
@@ -197,7 +181,7 @@ class EstimateResult(PlottedResult):
         Args:
             folder: the folder of the estimate.
             place: the folder that it will be moved to.
-            pictures: whether to draw the plots of the page as PNG files too.
+            pictures: whether to draw the plots of each page into a PNG file beside it.
         """
         if self.diagnosis is not None:
             (folder / DIAGNOSIS).mkdir()
@@ -212,7 +196,7 @@ class EstimateResult(PlottedResult):
             folder: that gets the files, made when missing.
             place: the folder that they will be moved to.
             arguments: what was asked for (default: the arguments of the call).
-            pictures: whether to draw the plots of the page as PNG files too.
+            pictures: whether to draw the plots of each page into a PNG file beside it.
         """
         self.write_diagnosis(folder, place, pictures)
         super().write(folder, place, arguments, pictures)
@@ -224,21 +208,6 @@ class EstimateResult(PlottedResult):
                 write_tables(folder, self.record, [estimate], self.model.parameters["i"].value)
             elif estimate.method in ("maximum_likelihood", WITHOUT_TORQUE):
                 write_tables(folder, self.record, [estimate], self._ratio(estimate))
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw the fit, its profile, the online estimate and the flanks, as far as methods have them."""
-        from orchestrator.estimation.figures import draw_flanks, draw_online, draw_profile
-
-        for estimate in self.estimates:
-            if estimate.method == "maximum_likelihood":
-                self.draw(folder / "estimate_fit.png")
-                limit = estimate.diagnostics["profile_limit"]
-                if math.isfinite(estimate.alpha):
-                    draw_profile(folder / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
-            elif estimate.method == "ekf":
-                draw_online(folder / "estimate_online.png", self.record, estimate)
-            elif estimate.method == WITHOUT_TORQUE:
-                draw_flanks(folder / "estimate_flanks.png", estimate)
 
 
 def estimate(

@@ -70,7 +70,7 @@ class InspectResult(PlottedResult):
     """
 
     command: ClassVar[str] = "inspect"
-    replaces: ClassVar[tuple[str, ...]] = ("inspect_record.png",)
+    replaces: ClassVar[tuple[str, ...]] = ("inspect.png",)
     record: Record
     model: Model
     channels: tuple[Channel, ...]
@@ -88,12 +88,6 @@ class InspectResult(PlottedResult):
     def smallest_gap(self) -> float:
         """Smallest half-gap that the record would show [rad], or infinity."""
         return self.sufficiency.smallest
-
-    def draw(self, path: Path) -> None:
-        """Draw the channels over time and the excitation by frequency."""
-        from orchestrator.estimation.figures import draw_record
-
-        draw_record(path, self.record, [(band.low, band.high, band.share) for band in self.excitation])
 
     def verdict(self) -> list[str]:
         """Say whether the record suffices, what it lacks, and what would do better.
@@ -181,10 +175,6 @@ class InspectResult(PlottedResult):
         r = self.record
         columns = {"time": r.time, "u": r.u if r.has_torque else None, "theta_m": r.theta_m, "theta_l": r.theta_l}
         write_arrays(folder / "inspect_record.npz", {n: values for n, values in columns.items() if values is not None})
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw ``inspect_record.png``."""
-        self.draw(folder / "inspect_record.png")
 
 
 def inspect(

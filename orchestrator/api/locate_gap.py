@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.api.arguments import choose_settings
-from orchestrator.api.design import DesignResult
 from orchestrator.api.estimate import EstimateResult
 from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
@@ -51,7 +50,7 @@ class LocationResult(PlottedResult):
     """
 
     command: ClassVar[str] = "estimate"
-    replaces: ClassVar[tuple[str, ...]] = (*EstimateResult.replaces, *DesignResult.replaces)
+    replaces: ClassVar[tuple[str, ...]] = EstimateResult.replaces
     record: Record
     model: Model
     location: Location
@@ -138,16 +137,6 @@ class LocationResult(PlottedResult):
     def write_data(self, folder: Path) -> None:
         """Write ``stages.csv``: record, fit, twist and flank of each stage, one-step errors."""
         write_columns(folder / "stages.csv", self.location.curves, lambda v: "" if math.isnan(v) else f"{v:.10g}")
-
-    def draw(self, path: Path) -> None:
-        """Draw the twist of each stage against its flanks."""
-        from orchestrator.estimation.figures import draw_stages
-
-        draw_stages(path, self.record, self.location.curves, [gap.alpha for gap in self.stages])
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw the twist of each stage against its flanks."""
-        self.draw(folder / "estimate_stages.png")
 
 
 def locate_gap(

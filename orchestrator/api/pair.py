@@ -95,13 +95,6 @@ class PairResult(PlottedResult):
         """
         write_columns(Path(path), self.signals())
 
-    def draw(self, path: Path) -> None:
-        """Draw both load angles, their difference and the torques against time."""
-        from orchestrator.paired.figures import draw_pair
-
-        title = f"Paired loops, {self.experiment.backlash_model}, half-gap {self.alpha:g} rad"
-        draw_pair(path, self.machine, self.twin, self.experiment.reference()[0], title)
-
     def blocks(self) -> Sequence[Block]:
         """Return the table of the run."""
         machine, twin = self.machine, self.twin
@@ -147,10 +140,6 @@ class PairResult(PlottedResult):
     def write_data(self, folder: Path) -> None:
         """Write ``simulate.csv``."""
         self.write_csv(folder / "simulate.csv")
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw ``simulate.png``."""
-        self.draw(folder / "simulate.png")
 
 
 def run_pair(

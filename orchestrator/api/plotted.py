@@ -14,7 +14,7 @@ from orchestrator.shared.output import write_result
 from orchestrator.shared.scratch import Scratch
 
 if TYPE_CHECKING:
-    from orchestrator.reporting import Plot, Report
+    from orchestrator.reporting import Report
 
 ROWS = 50_000
 """Rows of a curve that a notebook keeps: half a megabyte of its file. The page of ``save`` has all."""
@@ -54,36 +54,10 @@ class Figures:
 
 
 class PlottedResult(Result):
-    """Base of results whose page has plots.
-
-    A subclass gives ``write_data``, and ``draw`` and ``draw_files`` where it has pictures.
-    """
-
-    def write_data(self, folder: Path) -> None:
-        """Write the data that the page shows into ``folder``, which exists."""
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw the pictures that lie beside the page into ``folder``, which exists."""
-
-    def draw(self, path: Path) -> None:
-        """Draw the main picture.
-
-        Args:
-            path: a PNG, SVG or PDF file.
-
-        Raises:
-            ScenarioError: there is none.
-        """
-        raise ScenarioError(f"`path` must be absent, but is {path}: this result has plots and no picture", "path")
-
-    def write_files(self, folder: Path, pictures: bool = False) -> None:
-        """Write data, and with ``pictures`` the plots of the page as PNG files, into ``folder``, which exists."""
-        self.write_data(folder)
-        if pictures:
-            self.draw_files(folder)
+    """Base of results whose page has plots."""
 
     def plot(self, path: Path | str | None = None) -> Figures:
-        """Return the plots, and draw the main picture where a path is given.
+        """Return the plots, and draw them where a path is given.
 
         Args:
             path: a PNG, SVG or PDF file; None: no file.
@@ -92,24 +66,28 @@ class PlottedResult(Result):
             The plots of the page, which a notebook shows.
 
         Raises:
-            ScenarioError: a path is given, and the result has no picture.
+            ScenarioError: a path is given, and the result has no plots.
         """
+        plots = self.figures.report.plots()
         if path is not None:
-            self.draw(Path(path))
+            if not plots:
+                raise ScenarioError(f"`path` must be absent, but is {path}: this result has no plots", "path")
+            from orchestrator.reporting.pictures import draw_plots  # matplotlib, which takes its time to import
+
+            draw_plots(Path(path), plots)
         return self.figures
 
     @cached_property
     def figures(self) -> Figures:
         """The plots of the page."""
-        from orchestrator.reporting import Plot, Report, report_from_directory
+        from orchestrator.reporting import Report, report_from_directory
 
         with Scratch("figures") as scratch:
             folder = scratch.path
             self.write_data(folder)
             write_result(folder, self.command, self.arguments, self.seed, self.results(folder))
             page = report_from_directory(folder, self.command)
-        plots: tuple[Plot, ...] = tuple(section for section in page.all_sections() if isinstance(section, Plot))
-        return Figures(Report(page.title, page.summary, plots, page.badge, angle_unit=page.angle_unit))
+        return Figures(Report(page.title, page.summary, page.plots(), page.badge, angle_unit=page.angle_unit))
 
     def _repr_html_(self) -> str:
         return f"{super()._repr_html_()}\n{self.figures._repr_html_()}"

@@ -25,7 +25,7 @@ Block = TextTable | str
 class Result:
     """Base of what the workflows return: it prints itself, and saves itself as the command of its name does.
 
-    A subclass gives ``blocks``, ``results`` and ``write_files``.
+    A subclass gives ``blocks``, ``results`` and ``write_data``.
     """
 
     command: ClassVar[str]
@@ -63,13 +63,20 @@ class Result:
         """
         raise NotImplementedError
 
-    def write_files(self, folder: Path, pictures: bool = False) -> None:
-        """Write data, and pictures where they are asked for.
+    def write_data(self, folder: Path) -> None:
+        """Write the data that the page shows.
 
         Args:
             folder: where to; it exists.
-            pictures: whether to draw the plots of the page as PNG files too.
         """
+
+    def write_files(self, folder: Path) -> None:
+        """Write data, and what there is to hand on.
+
+        Args:
+            folder: where to; it exists.
+        """
+        self.write_data(folder)
 
     def write(
         self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None, pictures: bool = False
@@ -80,21 +87,19 @@ class Result:
             folder: that gets the files, made when missing.
             place: the folder that they will be moved to, which the JSON file names.
             arguments: what was asked for, as the JSON file says it (default: the arguments of the call).
-            pictures: whether to draw the plots of the page as PNG files too.
+            pictures: whether to draw the plots of the page into ``COMMAND.png``.
         """
-        self.write_files(folder, pictures)
-        from orchestrator.reporting import write_report  # 0.3 s that a command without result need not take
-
+        self.write_files(folder)
         given = self.arguments if arguments is None else arguments
         write_result(folder, self.command, given, self.seed, self.results(place))
-        write_report(folder, self.command)
+        write_page(folder, self.command, pictures)
 
     def save(self, out: Path | str, pictures: bool = False) -> Path:
         """Write data, JSON and ``report.html`` into a folder, all of them or none.
 
         Args:
             out: the folder; made when it does not exist.
-            pictures: whether to draw the plots of the page as PNG files too.
+            pictures: whether to draw the plots of the page into ``COMMAND.png``.
 
         Returns:
             The path of ``report.html``.
@@ -115,6 +120,18 @@ class Result:
 
     def _repr_html_(self) -> str:
         return "\n".join(_html(plain_block(block)) for block in self.blocks())
+
+
+def write_page(folder: Path, command: str, pictures: bool = False) -> None:
+    """Write ``report.html`` beside a result, and with ``pictures`` its plots as ``COMMAND.png``."""
+    from orchestrator.reporting import report_from_directory, write_report  # 0.3 s for a command that has a result
+
+    write_report(folder, command)
+    plots = report_from_directory(folder, command).plots() if pictures else ()
+    if plots:
+        from orchestrator.reporting.pictures import draw_plots
+
+        draw_plots(folder / f"{command}.png", plots)
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:

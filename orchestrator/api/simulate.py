@@ -85,13 +85,6 @@ class SimulationResult(PlottedResult):
         """
         write_columns(Path(path), {"time": self.time} | {name: self[name] for name in self.names})
 
-    def draw(self, path: Path) -> None:
-        """Draw the signals against time, those of one unit in one panel."""
-        from orchestrator.paired.figures import draw_signals
-
-        units = {name: self.units.get(name) or "" for name in self.names}
-        draw_signals(path, self.time, {name: self[name] for name in self.names}, units)
-
     def blocks(self) -> Sequence[Block]:
         """Return the table of the signals, and what is to be known of the run."""
         return [
@@ -124,11 +117,6 @@ class SimulationResult(PlottedResult):
     def write_data(self, folder: Path) -> None:
         """Write the signals as CSV."""
         self.write_csv(folder / f"{self.command}.csv")
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw the figure of ``simulate``."""
-        if self.command == "simulate":
-            self.draw(folder / "simulate.png")
 
 
 def simulate(

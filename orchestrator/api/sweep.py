@@ -7,8 +7,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from orchestrator.api.arguments import choose_experiment, choose_settings
 from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
@@ -20,7 +18,6 @@ from orchestrator.paired.calibration import Calibration
 from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system, loop_values
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, trust_of_sweep
-from orchestrator.paired.pair import run_pair, with_settings
 from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sweep import OWN_PARAMETERS, SweepArrays, SweepPlan, gather, sweep_work
 from orchestrator.scenarios.sweep import check_parameters
@@ -75,14 +72,6 @@ class SweepResult(AnySweepResult):
         """Whether the intervals hold the sizes that were run."""
         level = min(c.level for c in self.calibrations.values())
         return trust_of_sweep(self.statistics.values(), level, self.failed)
-
-    def draw(self, path: Path) -> None:
-        """Draw estimated against actual half-gaps, with their intervals."""
-        from orchestrator.paired.figures import draw_estimates
-
-        a = self.arrays
-        title = f"Estimated half-gap with 95 % intervals ({self.plan.experiment.name} experiment)"
-        draw_estimates(path, a.actual, a.estimate, a.lower, a.upper, a.noise, title)
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the first cases and that of the errors."""
@@ -147,24 +136,11 @@ class SweepResult(AnySweepResult):
             fmu_kind=self.fmu_kind,
         )
 
-    def write_files(self, folder: Path, pictures: bool = True) -> None:
-        """Write the table, and the pictures: of all results a sweep's have them always."""
-        super().write_files(folder, True)
-
-    def draw_files(self, folder: Path) -> None:
-        """Draw estimates and errors against size, and a pair of loops."""
-        a, plan = self.arrays, self.plan
-        if not len(a.actual):
-            return
-        name = plan.experiment.name
-        from orchestrator.paired.figures import draw_errors, draw_pair
-
-        self.draw(folder / "estimates.png")
-        draw_errors(folder / "errors.png", a.actual, a.estimate, a.noise, f"Error against size ({name} experiment)")
-        middle = float(np.sort(a.actual)[len(a.actual) // 2])
-        pair = run_pair(with_settings(plan.experiment, noise=plan.noise[-1]), self.fmus, middle, plan.seed)
-        title = f"Paired loops, half-gap {middle:.4g} rad"
-        draw_pair(folder / "loops.png", pair.machine, pair.twin, plan.experiment.reference()[0], title)
+    def write(
+        self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None, pictures: bool = True
+    ) -> None:
+        """Write as any result; of all results a sweep's have the picture always."""
+        super().write(folder, place, arguments, pictures=True)
 
 
 def sweep(

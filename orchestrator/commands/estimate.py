@@ -14,12 +14,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orchestrator.api.arguments import choose_settings
-from orchestrator.api.design import DEFAULT_SIZE, RANGES, DesignResult, check_design, design
+from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
 from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.estimate import DIAGNOSIS, EstimateResult, estimate
 from orchestrator.api.locate_gap import TRAIN, complete_record, locate_gap, require_train
 from orchestrator.api.records import read_model
-from orchestrator.api.shown import Block
+from orchestrator.api.shown import Block, write_page
 from orchestrator.commands._budget import Budget
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
@@ -33,7 +33,6 @@ from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.estimation.trust import FITTED
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-from orchestrator.reporting import write_report
 from orchestrator.shared.output import stage_output, write_result
 from orchestrator.shared.results.estimate import EstimateFound
 
@@ -121,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     if args.design:
         check_design(model, args.size, **options)
-    with stage_output(args.out, (*EstimateResult.replaces, *DesignResult.replaces)) as folder:
+    with stage_output(args.out, EstimateResult.replaces) as folder:
         results = EstimateFound()
         blocks: list[Block] = []
         found: EstimateResult | None = None
@@ -143,7 +142,7 @@ def run(args: argparse.Namespace) -> int:
                 )
             interrupted = budget.interrupted
             blocks += found.blocks()
-            found.write_files(folder, args.pictures)
+            found.write_files(folder)
             found.write_diagnosis(folder, args.out, args.pictures)
             results = found.results(args.out)
         if args.design and not interrupted:
@@ -156,12 +155,12 @@ def run(args: argparse.Namespace) -> int:
                     f"No excitation within these limits shows a half-gap of {size:g} rad: raise `--torque-limit`, "
                     "`--speed-limit` or `--duration`"
                 )
-            plan.write_files(folder, args.pictures)
+            plan.write_files(folder)
             results = msgspec.structs.replace(results, design=plan.entries())
         given = {"record": str(args.records[0]) if args.records else None}
         given |= {k: _plain(v) for k, v in vars(args).items() if k not in ("run", "command", "pictures")}
         write_result(folder, "estimate", given, None, results)
-        write_report(folder, "estimate")
+        write_page(folder, "estimate", args.pictures)
     print_blocks([*blocks, f"Written to {args.out}"])
     return INTERRUPTED if interrupted else 0
 

@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
             blocks, failed = result.blocks(), result.failed
     print_blocks(blocks)
     result.sweep.discard_journal()
-    figures = ", estimates.png, errors.png, loops.png" if arguments.scenario is None else ""
+    figures = ", sweep.png" if arguments.scenario is None else ""
     print_blocks([f"Written to {arguments.out}: report.html, sweep.csv, sweep.json{figures}"])
     return 1 if failed else 0
 

@@ -183,3 +183,7 @@ class Report:
         """Yield the sections in the order of the page, those of folds in their place."""
         for section in self.sections:
             yield from section.sections if isinstance(section, Fold) else (section,)
+
+    def plots(self) -> tuple[Plot, ...]:
+        """Return the plots in the order of the page."""
+        return tuple(section for section in self.all_sections() if isinstance(section, Plot))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import orchestrator as oc
-from orchestrator.api.plotted import ROWS, Figures
+from orchestrator.api.plotted import ROWS, Figures, PlottedResult
 from orchestrator.reporting import Plot, Report, Series
 from tests.support import browser as browsers
 
@@ -35,10 +35,14 @@ def test_plot_returns_the_plots_and_draws_only_into_a_given_file(pair, tmp_path,
     assert (tmp_path / "loops.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_result_without_a_picture_says_so(tmp_path):
+def test_a_result_without_plots_says_so(tmp_path):
+    class Plain(PlottedResult):
+        figures = Figures(Report("t", "s", ()))
+
     with pytest.raises(oc.InputError, match="`path` must be absent"):
-        oc.thesis().plot(tmp_path / "a.png")
-    assert oc.thesis().plot().titles == ("Errors of Table 4.1",)
+        Plain().plot(tmp_path / "a.png")
+    assert oc.thesis().plot(tmp_path / "b.png").titles == ("Errors of Table 4.1",)
+    assert (tmp_path / "b.png").stat().st_size > 10_000
 
 
 def test_a_long_record_does_not_fill_the_notebook():

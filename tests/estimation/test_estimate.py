@@ -277,10 +277,7 @@ def test_the_command_writes_everything(csv_file: Path, tmp_path: Path, capsys: p
         "estimate.json",
         "profile.csv",
         "online.csv",
-        "estimate_fit.png",
-        "estimate_profile.png",
-        "estimate_online.png",
-        "estimate_flanks.png",
+        "estimate.png",
         "flanks.csv",
         "report.html",
     }

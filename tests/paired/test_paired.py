@@ -134,7 +134,7 @@ def test_sweep_command_is_reproducible_and_complete(tmp_path, capsys):
     assert "MSE" in text
     assert (tmp_path / "a" / "sweep.csv").read_bytes() == (tmp_path / "b" / "sweep.csv").read_bytes()
     names = {p.name for p in (tmp_path / "a").iterdir()}
-    assert {"sweep.csv", "sweep.json", "estimates.png", "errors.png", "loops.png"} <= names
+    assert {"sweep.csv", "sweep.json", "sweep.png"} <= names
     results = json.loads((tmp_path / "a" / "sweep.json").read_text())["results"]
     assert results["cases"] == 8
     assert results["failed"] == 0

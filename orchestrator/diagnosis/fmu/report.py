@@ -1,8 +1,7 @@
 """What is reported of a diagnosis of any FMU: the misfit of its models on test data, and a figure."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,9 @@ from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.report.open_test_data import open_test_data
 from orchestrator.diagnosis.result import DiagnosisOutcome, SignalMisfit, TestMisfit
 from orchestrator.diagnosis.selection.outcome import SearchResult
-from orchestrator.shared.drawing import label_text
 
 Array = NDArray[np.float64]
 STAGES = ("nominal", "refitted", "corrected")
-COLOURS = ("#c8553d", "#e0a030", "#1b6ca8")
 
 
 @dataclass(frozen=True)
@@ -152,32 +149,3 @@ def stage_runs(workings: FmuWorkings) -> tuple[FmuProblem, dict[str, Array], int
     runs = problem.simulate(workings.models)
     empty = np.full(problem.data.outputs.shape, np.nan)
     return problem, {name: empty if y is None else y for name, y in zip(STAGES, runs, strict=True)}, row
-
-
-def draw_signals(path: Path, problem: FmuProblem, stages: Mapping[str, Array], test: int) -> None:
-    """Draw outputs, and the residuals of each model in units of the noise at a scale of its own; shaded: test data.
-
-    Args:
-        stages: name -> outputs (n, outputs) of a model, the best one last.
-    """
-    from matplotlib.figure import Figure
-
-    data, count, last = problem.data, len(problem.outputs), list(stages)[-1]
-    figure = Figure(figsize=(10.0, 2.2 * 3 * count), layout="constrained")
-    axes = np.atleast_1d(figure.subplots(3 * count, 1, sharex=True))
-    for k, name in enumerate(problem.outputs):
-        above, before, after = axes[3 * k : 3 * k + 3]
-        above.plot(data.time, data.outputs[:, k], color="0.6", linewidth=2.0, label="measured")
-        for (label, y), colour in zip(stages.items(), COLOURS, strict=False):
-            above.plot(data.time, y[:, k], color=colour, linewidth=0.8, label=label)
-            below = after if label == last else before
-            residual = (data.outputs[:, k] - y[:, k]) / problem.noise[k]
-            below.plot(data.time, residual, color=colour, linewidth=0.7, label=label)
-        above.set_ylabel(label_text(f"{name} [{problem.units.get(name, '1')}]"))
-        before.set_ylabel("residual / noise")
-        after.set_ylabel("residual / noise")
-        for axis in (above, before, after):
-            axis.axvspan(data.time[min(test, len(data.time) - 1)], data.time[-1], color="0.93", zorder=-1)
-            axis.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), borderaxespad=0.0, fontsize=8)
-    axes[-1].set_xlabel("time [s]")
-    figure.savefig(path, dpi=110)

@@ -112,7 +112,7 @@ def test_the_command_delivers_a_system_that_reproduces_the_fit(made, tmp_path):
     assert results["delivery"][0]["difference_over_noise"] == 0.0
     with open_ssp(out / "corrected.ssp") as corrected:
         assert corrected.system.execution_order() == ("quadratic_drag_1", "plant")  # as in the fit
-    assert {p.name for p in out.iterdir()} >= {"corrected.ssp", "report.html", "diagnose.csv", "diagnose_signals.png"}
+    assert {p.name for p in out.iterdir()} >= {"corrected.ssp", "report.html", "diagnose.csv", "diagnose.png"}
 
 
 def test_calibration_finds_the_parameters_within_their_intervals(made):

@@ -96,7 +96,7 @@ def test_the_page_and_the_picture_are_written(columns, tmp_path: Path, capsys: p
     write_csv(path, columns)
     assert main(["inspect", str(path), "--pictures", "--out", str(out)]) == 0
     assert "Model file to start from" in capsys.readouterr().out
-    assert (out / "inspect_record.png").stat().st_size > 10_000
+    assert (out / "inspect.png").stat().st_size > 10_000
     assert "Inspection of a record" in (out / "report.html").read_text()
     seen = json.loads((out / "inspect.json").read_text())["results"]
     assert seen["smallest_gap"] <= 0.001
