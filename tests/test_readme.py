@@ -12,7 +12,17 @@ import numpy as np
 import pytest
 
 from orchestrator.records.record import read_record
-from tests.support.example_record import FILE, FRICTION, HALF_GAP, copy_examples, example_record
+from tests.support.example_record import (
+    FILE,
+    FRICTION,
+    HALF_GAP,
+    SERVO,
+    SERVO_FRICTION,
+    SERVO_GAP,
+    copy_examples,
+    example_record,
+    servo_log,
+)
 from tests.support.waiting import HANGS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -37,15 +47,18 @@ LINES = {
     page: re.findall(r"(?:^ *|/)(python -m orchestrator .*)$", (ROOT / page).read_text(encoding="utf-8"), re.MULTILINE)
     for page in ("README.md", "docs/tour.md", "docs/your-machine.md")
 }
-COMMANDS = list(dict.fromkeys(line for lines in LINES.values() for line in lines))  # what stands twice is run once
+TUTORIAL = LINES.pop("docs/your-machine.md")
+OWN_CHECK = "python -m orchestrator check"  # of all our FMUs: the last step of CI
+# What stands twice is run once.
+COMMANDS = list(dict.fromkeys(line for lines in LINES.values() for line in lines if line != OWN_CHECK))
 (DIAGNOSE,) = (line for line in COMMANDS if " diagnose " in line)
-CHECK = "python -m orchestrator check results/diagnose/Drivetrain_machine.fmu"
 
 
 def test_there_are_commands_to_test():
     assert len(COMMANDS) >= 6
-    assert len(LINES["docs/your-machine.md"]) == 5
-    assert LINES["docs/your-machine.md"][3:] == [DIAGNOSE, CHECK]
+    words = ["inspect", "estimate", "estimate", "diagnose", "check"]
+    assert [line.split()[3] for line in TUTORIAL] == words
+    assert "-m orchestrator check --out" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
 def test_the_first_command_installs_what_it_needs():
@@ -75,7 +88,7 @@ def diagnosed(tmp_path_factory, fmus):
     return folder, done_in(folder, DIAGNOSE, whole=True)
 
 
-@pytest.mark.parametrize("line", [line for line in COMMANDS if line not in (DIAGNOSE, CHECK)])
+@pytest.mark.parametrize("line", [line for line in COMMANDS if line != DIAGNOSE])
 def test_command_of_the_readme(line, tmp_path, fmus):
     assert done_in(tmp_path, line, whole=False)
 
@@ -97,13 +110,18 @@ def test_the_diagnosis_finds_what_the_readme_says(diagnosed):
     assert [row for row in rows if row not in said] == []
 
 
-@pytest.mark.slow(shares="diagnosed")
-def test_the_fmu_of_the_diagnosis_passes_the_check(diagnosed):
-    folder, _ = diagnosed
-    assert done_there(folder, CHECK)
+@pytest.mark.slow
+def test_the_tutorial_goes_from_a_log_in_amperes_to_an_fmu_of_the_machine(tmp_path):
+    copy_examples(tmp_path / "docs" / "examples")
+    _, estimated, _, diagnosed, _ = (done_there(tmp_path, line) for line in TUTORIAL)
+    assert estimated["alpha"] == pytest.approx(SERVO_GAP, rel=5e-3)
+    found = {effect["name"]: effect["parameters"] for effect in diagnosed["effects"]}
+    assert found["backlash"]["alpha"]["value"] == pytest.approx(SERVO_GAP, rel=5e-3)
+    assert found["coulomb_friction"]["torque"]["value"] == pytest.approx(SERVO_FRICTION, rel=0.1)
 
 
-def test_the_example_record_is_what_its_simulator_makes():
+def test_the_example_records_are_what_their_simulator_makes():
+    assert SERVO.read_text(encoding="utf-8") == servo_log()
     columns, truth = example_record()
     record = read_record(FILE)
     for name, counts in zip(("theta_m", "theta_l"), truth["counts"], strict=True):
