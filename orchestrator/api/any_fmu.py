@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
 from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.fmu.corrected_ssp import write_corrected
@@ -33,7 +32,7 @@ from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import ParameterFound
-from orchestrator.shared.settings import as_tables
+from orchestrator.shared.settings import as_tables, choose_settings
 
 Progress = Callable[[str], None]
 

@@ -1,16 +1,11 @@
 """Arguments that several workflows take, checked."""
 
 import math
-from pathlib import Path
-from typing import TypeVar
 
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.experiment import BACKLASH_MODELS, EXPERIMENTS, Experiment, experiment_of
 from orchestrator.paired.pair import with_settings
 from orchestrator.shared.numbers import exact_text
-from orchestrator.shared.settings import Settings, read_settings
-
-S = TypeVar("S", bound=Settings)
 
 
 def choose_experiment(experiment: str | Experiment, backlash_model: str | None = None) -> Experiment:
@@ -40,10 +35,3 @@ def within(name: str, value: float, least: float, most: float) -> float:
             f"`{name}` must be between {exact_text(least)} and {exact_text(most)}, but is {value:g}", name
         )
     return value
-
-
-def choose_settings(given: S | Path | str | None, kind: type[S]) -> S:
-    """Return the settings that are meant."""
-    if given is None:
-        return kind()
-    return read_settings(Path(given), kind) if isinstance(given, (str, Path)) else given

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.api.any_fmu import Progress, parameter_results, read_records
-from orchestrator.api.arguments import choose_settings
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.fmu.diagnose import FmuCalibration, calibrate_fmu
 from orchestrator.diagnosis.fmu.mapping import read_map
@@ -17,7 +16,7 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.results.any_fmu import FmuCalibrationFound, LearnedParameterFound
-from orchestrator.shared.settings import as_tables
+from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 MISSING = "no values of these parameters within their limits explain the record: the estimates are biased"

@@ -18,12 +18,12 @@ from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.estimation import design as designing
 from orchestrator.estimation.apply import UNSEEN
 from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, MachineLimits
+from orchestrator.estimation.protocol import DEFAULT_SIZE
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import LONGEST_STEP, natural_frequency
 from orchestrator.records.record import MINIMUM_ROWS
 from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound
 
-DEFAULT_SIZE = 0.005  # rad
 # Least and largest value of each argument: rad, N.m, rad/s, s, Hz.
 RANGES = {
     "size": (1e-5, 0.5),

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.records import as_record
@@ -19,6 +18,7 @@ from orchestrator.estimation.zeros import set_zeros
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
+from orchestrator.shared.settings import choose_settings
 
 if TYPE_CHECKING:
     from orchestrator.api.any_fmu import FmuDiagnosisResult

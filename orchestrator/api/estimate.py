@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnose import diagnose as find_missing
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.estimable import plausible_record, require_linear
@@ -22,19 +21,19 @@ from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.report.summary import play_of
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
-from orchestrator.estimation.apply import WITHOUT_TORQUE, apply_method, default_method, error_bound
+from orchestrator.estimation.apply import apply_method, default_method, error_bound
 from orchestrator.estimation.effort import Stop, StoppedError, never
-from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError
+from orchestrator.estimation.protocol import FITTED, METHODS, WITHOUT_TORQUE, Estimate, NotApplicableError
 from orchestrator.estimation.repeats import in_words, repeats_of
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.estimation.tables import write_tables
-from orchestrator.estimation.trust import FITTED, trust_of_estimates
+from orchestrator.estimation.trust import trust_of_estimates
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
 from orchestrator.shared.results.estimate import EstimateFound, MethodFound, RepeatsFound
-from orchestrator.shared.settings import as_tables
+from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Level, Trust
 
 DIAGNOSIS = "diagnosis"  # the row of a corrected model's half-gap, and the folder of its diagnosis

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestrator.api.arguments import choose_settings
 from orchestrator.api.estimate import EstimateResult
 from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
@@ -29,7 +28,7 @@ from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results import GapFound
 from orchestrator.shared.results.estimate import EstimateFound, LocationFound
-from orchestrator.shared.settings import as_tables
+from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Trust
 
 METHOD = "two_stages"

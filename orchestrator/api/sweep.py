@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.arguments import choose_experiment, choose_settings
+from orchestrator.api.arguments import choose_experiment
 from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
@@ -24,7 +24,7 @@ from orchestrator.scenarios.sweep import check_parameters
 from orchestrator.shared.numbers import exact_text
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import CalibrationFound, ErrorsFound, SweepFound
-from orchestrator.shared.settings import as_tables
+from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Trust
 
 

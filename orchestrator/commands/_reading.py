@@ -2,11 +2,13 @@
 
 import argparse
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from orchestrator.api.records import Record
 from orchestrator.errors import ScenarioError
-from orchestrator.records.timing import RESAMPLING
+from orchestrator.records.words import RESAMPLING
+
+if TYPE_CHECKING:
+    from orchestrator.records.record import Record
 
 FORMATS = "CSV of any dialect, Parquet, MDF, MAT or NumPy"
 RATES = (1.0, 1e6)  # Hz
@@ -37,7 +39,7 @@ def reading_of(args: argparse.Namespace) -> dict[str, Any]:
     return {"part": _part(args.part), "resample": args.resample, "rate": args.rate, "header": args.header}
 
 
-def what_was_read(records: Iterable[Record]) -> list[str]:
+def what_was_read(records: "Iterable[Record]") -> list[str]:
     """Return one line for each record that says what was detected and assumed."""
     return [f"{record.source}: {'; '.join(record.notes)}" for record in records if record.notes]
 

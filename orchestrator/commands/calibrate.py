@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.api.calibrate import calibrate
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._trust import note_missing_walls
 from orchestrator.shared.output import stage_output
@@ -19,6 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit, print the parameters, write JSON and report."""
+    from orchestrator.api.calibrate import calibrate  # seconds of libraries
+
     note_missing_walls()
     with stage_output(args.out) as folder:
         found = calibrate(args.record, args.fmu, args.map, settings=args.settings, progress=say)

@@ -6,10 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from orchestrator.api.arguments import choose_settings
-from orchestrator.api.diagnose import comparable_record, diagnose
-from orchestrator.api.diagnosed import DiagnosisResult
-from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
@@ -17,6 +13,7 @@ from orchestrator.commands._trust import note_missing_walls
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.output import stage_output
+from orchestrator.shared.settings import choose_settings
 from orchestrator.shared.trust import Level
 
 
@@ -64,11 +61,17 @@ def run(args: argparse.Namespace) -> int:
         return _any_fmu(args)
     if args.map is not None or args.draft_map:
         raise ScenarioError("`map` and `draft_map` must come with an FMU, but none is given", "map", "draft_map")
-    model = read_model(args.model)
     settings = choose_settings(args.settings, DiagnosisSettings)
     if args.time_limit is not None and not 0.0 < args.time_limit < 1e9:
         raise ScenarioError(f"`time_limit` must be positive and below 1e9 s, but is {args.time_limit:g}", "time_limit")
     reading = reading_of(args)
+    from orchestrator.records.model_file import read_model
+
+    model = read_model(args.model)
+    # Seconds of libraries, for which mistakes in flags and model file need not wait.
+    from orchestrator.api.diagnose import comparable_record, diagnose
+    from orchestrator.api.diagnosed import DiagnosisResult
+
     records = [comparable_record(path, model, **reading) for path in args.records]
     other = None if args.validate is None else comparable_record(args.validate, model, **reading)
     tested = None if args.test is None else comparable_record(args.test, model, **reading)
@@ -100,14 +103,15 @@ def run(args: argparse.Namespace) -> int:
 
 def _any_fmu(args: argparse.Namespace) -> int:
     """Diagnose an FMU that is not ours, or several, or draft the map."""
-    from orchestrator.api.any_fmu import FmuDiagnosisResult, draft_map
-
     if args.scenario is not None and (args.fmu is not None or args.scenario.suffix.lower() != ".toml"):
         raise ScenarioError("`scenario` must be a TOML file, without `fmu`, but is not", "scenario", "fmu")
     fmu = args.fmu if args.scenario is None else args.scenario
     for name in ("model", "part", "resample", "rate", "header"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
+    from orchestrator.api.any_fmu import FmuDiagnosisResult, draft_map
+    from orchestrator.api.diagnose import diagnose
+
     note_missing_walls()
     if args.draft_map:
         text = draft_map(args.records[0], fmu)

@@ -8,13 +8,10 @@ from typing import Any
 
 import msgspec
 
-from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of
 from orchestrator.commands._stages import Stages
 from orchestrator.errors import RecordError
-from orchestrator.fmi.preview import preview_fmu
-from orchestrator.records.preview import preview_log
 from orchestrator.shared.output import stage_output
 
 USUAL = 10.0  # s
@@ -34,9 +31,13 @@ def run(args: argparse.Namespace) -> int:
     if args.columns and (preview := _preview_of(args.record.suffix.lower())):
         sys.stdout.write(msgspec.json.encode(preview(args.record)).decode() + "\n")
         return 0
+    from orchestrator.records.model_file import read_model
+
     model = None if args.model is None else read_model(args.model)
     if args.columns:
         header = args.header if args.header is not None or model is None else model.header
+        from orchestrator.records.preview import preview_log
+
         seen = preview_log(args.record, {} if model is None else model.columns, header)
         sys.stdout.write(msgspec.json.encode(seen).decode() + "\n")
         return 0
@@ -71,6 +72,8 @@ def run(args: argparse.Namespace) -> int:
 def _preview_of(ending: str) -> Callable[[Path], Any] | None:
     """Return what shows the interface of FMUs and SSP files; None: it is a log."""
     if ending == ".fmu":
+        from orchestrator.fmi.preview import preview_fmu
+
         return preview_fmu
     if ending == ".ssp":
         from orchestrator.scenarios.ssp.preview import preview_ssp  # the master: half a second to import

@@ -5,12 +5,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.estimation import cramer_rao
-from orchestrator.estimation.protocol import Estimate, NotApplicableError, estimator
-from orchestrator.estimation.trust import FITTED
+from orchestrator.estimation.protocol import FITTED, WITHOUT_TORQUE, Estimate, NotApplicableError, estimator
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
-WITHOUT_TORQUE = "two_encoders"  # the method of records that have none
 SKIPS_MISSING = (FITTED, "ekf", WITHOUT_TORQUE)
 OPTIONS = {FITTED: ("more", "time_limit", "report", "settings", "stop"), WITHOUT_TORQUE: ("settings",)}
 """Arguments of a method's function beside record and model; ``more``: further records, fitted with the first."""

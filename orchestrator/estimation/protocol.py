@@ -5,14 +5,18 @@ Call order: :func:`orchestrator.records.record.read_record`,
 :data:`METHODS` by :func:`estimator`.
 """
 
+from __future__ import annotations
+
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from orchestrator.errors import ConvergenceError, OrchestratorError
-from orchestrator.records.model_file import Model
-from orchestrator.records.record import Record
+
+if TYPE_CHECKING:  # the command line reads METHODS before anything large is loaded
+    from orchestrator.records.model_file import Model
+    from orchestrator.records.record import Record
 
 METHODS = {
     "maximum_likelihood": "joint fit of gap, parameters, initial state and noise; profile-likelihood interval",
@@ -22,7 +26,10 @@ METHODS = {
     "operating_data": "width of the twist's hysteresis in normal closed-loop data",
     "two_encoders": "two flanks in the load's angle against the motor's; needs no torque",
 }
+FITTED = "maximum_likelihood"
+WITHOUT_TORQUE = "two_encoders"  # the method of records that have none
 LEVEL = 0.95
+DEFAULT_SIZE = 0.005  # rad, the half-gap that an experiment is designed for where no estimate says one
 
 
 class TimeLimitError(ConvergenceError):

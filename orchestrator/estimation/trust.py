@@ -7,14 +7,12 @@ user allows, whether the gap was traversed. The other methods have no such check
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from orchestrator.estimation.protocol import Estimate
+from orchestrator.estimation.protocol import FITTED, Estimate
 from orchestrator.estimation.settings import EstimationSettings, TrustSettings
 from orchestrator.estimation.stages.location import Location
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
-
-FITTED = "maximum_likelihood"
 
 
 def trust_of_estimates(

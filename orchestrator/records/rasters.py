@@ -12,7 +12,8 @@ import numpy as np
 from orchestrator.errors import RecordError
 from orchestrator.records.columns import COLUMNS, Array
 from orchestrator.records.requests import SAMPLED, hold_request
-from orchestrator.records.timing import INTERPOLATION, has_gap, interpolate, interpolation_cost, resample_grid
+from orchestrator.records.timing import has_gap, interpolate, interpolation_cost, resample_grid
+from orchestrator.records.words import INTERPOLATION
 
 Table = dict[str, Array]
 

@@ -26,7 +26,8 @@ from orchestrator.records.filters import decimate
 from orchestrator.records.formats import open_source
 from orchestrator.records.loading import Reading, load
 from orchestrator.records.requests import SAMPLED
-from orchestrator.records.timing import RESAMPLING, Grid, grid_of
+from orchestrator.records.timing import Grid, grid_of
+from orchestrator.records.words import RESAMPLING
 from orchestrator.shared.numbers import exact_text
 
 __all__ = ["COLUMNS", "MINIMUM_ROWS", "RESAMPLING", "Column", "Reading", "Record", "quantisation_step", "read_record"]

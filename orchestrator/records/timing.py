@@ -22,8 +22,6 @@ LARGEST_JITTER = 0.1  # of a step: stamps this close to the grid are on it
 LARGEST_MISSING = 0.2  # of the rows: with more, what is assumed in between decides
 GAP = 5.0  # median steps: a longer one is a gap, whose samples are missing
 LEAST_FALLS, LEAST_FALL = 2, 0.2  # s: of 0.9 to 0.1, 0.95 to 0.1 and 0.5 to 0.1, which fractions without zeros make
-INTERPOLATION = ("linear", "cubic")
-RESAMPLING = ("uniform", *INTERPOLATION)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The words that names of channels are made of."""
+"""The words that names of channels are made of, and those that options have for ways to resample."""
 
 import re
 
@@ -10,6 +10,8 @@ def _set(words: str) -> frozenset[str]:
     return frozenset(words.split())
 
 
+INTERPOLATION = ("linear", "cubic")
+RESAMPLING = ("uniform", *INTERPOLATION)
 ANGLE = _set("theta th phi angle ang pos position winkel lage encoder enc q stellung istposition")
 MOTOR = _set("m mot motor drive antrieb input motorside primary")
 LOAD = _set("l load last output out abtrieb arm link joint gelenk table tisch loadside secondary")

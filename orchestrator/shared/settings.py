@@ -43,6 +43,13 @@ def read_settings(path: Path, kind: type[S]) -> S:
     return settings_of(read_toml(path, MAXIMUM_BYTES), kind, str(path))
 
 
+def choose_settings(given: S | Path | str | None, kind: type[S]) -> S:
+    """Return the settings that are meant: these, those of a file, or the defaults."""
+    if given is None:
+        return kind()
+    return read_settings(Path(given), kind) if isinstance(given, (str, Path)) else given
+
+
 def settings_of(content: dict[str, Any], kind: type[S], where: str = "settings") -> S:
     """Return settings with the values of nested tables; what they do not name keeps its default.
 

@@ -70,3 +70,37 @@ def test_names_of_any_script_are_printed_whatever_the_encoding(tmp_path):
     done = subprocess.run(words, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stderr) == (0, "")
     assert r"\xf6ut: report.html" in done.stdout
+
+
+BEFORE_LIBRARIES = """
+import sys
+from orchestrator.cli import main
+
+open("model.toml", "w").write("[parameters.J_x]\\nvalue = 1\\n")
+open("settings.toml", "w").write("nothing = 1\\n")
+for words in (
+    "{0} --help", "{0} --nothing", "{0} a.csv --rate 0", "{0} a.csv --part 3:1",
+    "{0} a.csv --model model.toml", "{0} a.csv --model missing.toml", "{0} a.csv --settings settings.toml",
+    "{0} a.csv --time-limit -1",
+):
+    for command in ("estimate", "diagnose", "inspect"):
+        if command == "inspect" and ("--settings" in words or "--time" in words):
+            continue
+        try:
+            code = main(words.format(command).split())
+        except SystemExit as ended:
+            code = ended.code
+        if code != (0 if "--help" in words else 2):
+            raise SystemExit(f"{words} {command}: {code}")
+    if "--help" in words:
+        print("numpy" in sys.modules)
+print([name for name in sys.modules if name.split(".")[0] in ("scipy", "fmpy", "matplotlib", "jinja2")])
+"""
+
+
+def test_help_and_mistakes_in_flags_and_model_files_wait_for_no_library(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", BEFORE_LIBRARIES], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert [line for line in done.stdout.splitlines() if line.startswith(("[", "False", "True"))] == ["False", "[]"]

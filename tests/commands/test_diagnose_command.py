@@ -111,7 +111,7 @@ def test_spoiled_records_are_refused_in_one_line(tmp_path, capsys, columns, name
 def test_place_that_cannot_be_written_is_refused_before_the_computation(tmp_path, capsys, columns, monkeypatch) -> None:
     write_csv(tmp_path / "good.csv", columns)
     (tmp_path / "file").write_text("here\n")
-    monkeypatch.setattr("orchestrator.commands.diagnose.diagnose", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr("orchestrator.api.diagnose.diagnose", lambda *_: pytest.fail("computed"))
     assert main(["diagnose", str(tmp_path / "good.csv"), "--out", str(tmp_path / "file")]) == 2
     assert "`--out` must be a writable directory" in capsys.readouterr().err
     assert (tmp_path / "file").read_text() == "here\n"

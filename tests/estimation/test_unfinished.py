@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.commands import _budget, _stages
-from orchestrator.commands import estimate as command
+from orchestrator.commands import _estimating as command
 from orchestrator.commands._budget import Budget
 from orchestrator.commands._stages import Stages
 from orchestrator.errors import ConvergenceError
