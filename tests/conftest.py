@@ -11,15 +11,42 @@ from pathlib import Path
 
 import pytest
 from filelock import FileLock
-from hypothesis import HealthCheck, settings
 
 from orchestrator.building.build import ensure_built
 from orchestrator.building.native_build import ensure_native
 
-# What a busy computer takes longer for is no failure.
-settings.register_profile("any computer", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("any computer")
+try:
+    from hypothesis import HealthCheck, settings
+except ModuleNotFoundError:
+    pass
+else:  # what a busy computer takes longer for is no failure
+    settings.register_profile("any computer", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    settings.load_profile("any computer")
 
+EXTRAS = frozenset(
+    [
+        "asammdf",
+        "control",
+        "daqp",
+        "dask",
+        "distributed",
+        "h5py",
+        "hypothesis",
+        "jsonschema",
+        "numba",
+        "pyarrow",
+        "schemastore",
+        "selenium",
+        "setuptools",
+        "shtab",
+        "starlette",
+        "uvicorn",
+        "yaml",
+    ]
+)
+"""Modules of the extra [test]: a file that needs one that is missing is skipped."""
+ASKED = ("night", "network")
+"""Markers of tests that run only where ``-m`` names them."""
 LONG = ("test_readme.py", "test_contributing.py", "test_notebooks.py", "test_public_api.py")  # minutes each
 
 
@@ -33,7 +60,50 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+class _File(pytest.Module):
+    """A file of tests."""
+
+    def _getobj(self) -> object:
+        try:
+            return super()._getobj()
+        except self.CollectError as error:
+            name = getattr(error.__cause__, "name", None) or ""
+            if isinstance(error.__cause__, ModuleNotFoundError) and name.partition(".")[0] in EXTRAS:
+                pytest.skip(f"{name} is of the extra [test]", allow_module_level=True)
+            raise
+
+
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> pytest.Module:
+    """Collect what can be without the extra [test], too."""
+    return _File.from_parent(parent, path=module_path)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Name failures as they happen: a run that is cut says what it has found."""
+    config.pluginmanager.register(_Failures(config))
+
+
+class _Failures:
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        terminal = self._config.pluginmanager.get_plugin("terminalreporter")
+        if report.failed and terminal is not None:
+            terminal.write_line(f"\nFAILED {report.nodeid} ({report.when})", red=True)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out what was not asked for, and order the rest."""
+    silent = [name for name in ASKED if name not in config.option.markexpr]
+    left_out = [item for item in items if any(map(item.get_closest_marker, silent))]
+    config.hook.pytest_deselected(items=left_out)
+    gone = set(left_out)
+    items[:] = [item for item in items if item not in gone]
+    _order(items)
+
+
+def _order(items: list[pytest.Item]) -> None:
     """Put the longest tests first in the part of each worker: the run does not wait for one of them at its end.
 
     Those that share a slow fixture go to one worker, which makes it once: ``@pytest.mark.slow(shares="fixture")``.
