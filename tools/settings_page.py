@@ -25,7 +25,7 @@ default (those of a calibration have no groups):
 
 ```toml
 [selection]
-least_t = 3.0
+least_gain = 0.02
 
 [grades]
 likely_share = 0.05

@@ -62,13 +62,12 @@ class FitSettings(Settings, frozen=True):
 
 
 class SelectionSettings(Settings, frozen=True):
-    """The search for effects by one score: the gain in squared error of blocks left out, paired over blocks."""
+    """The search for effects by one score: the log posterior of a subset, by the errors of blocks left out."""
 
-    least_t: Annotated[float, setting("paired standard errors by which a gain must differ from zero")] = 2.5
-    least_gain: Annotated[float, share("of the squared error that an effect must take")] = 0.01
-    refined: Annotated[int, setting("effects that are fitted in full after screening", ge=1)] = 6
-    look_ahead: Annotated[int, setting("first effects that are tried with a second: two may hide each other", ge=0)] = 3
-    certain_alone: Annotated[float, share("gain from which no second effect is looked for at once")] = 0.9
+    least_gain: Annotated[float, share("of the squared error that an effect must take: no model is known better")] = (
+        0.01
+    )
+    effect_probability: Annotated[float, share("of an effect before the record is seen: half a one of a bank")] = 0.02
     most_effects: Annotated[int, setting("of a model", ge=0)] = 6
     prior_deviations: Annotated[
         float, setting("of the model file that an effect may push a parameter to: beyond it is another machine")

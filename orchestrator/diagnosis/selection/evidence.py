@@ -50,11 +50,11 @@ def effect_evidence(result: SearchResult) -> list[EffectEvidence]:
 def _effect_evidence(result: SearchResult, label: str, base: float, remains: float) -> EffectEvidence:
     problem, final, review = result.problem, result.final, result.reviews[label]
     effect = problem.effects[label]
-    step = next((step for step in result.steps if step.taken == label), review)
-    leaving, entry = review.entry, step.entry
+    leaving = review.entry
     assert leaving is not None
-    assert entry is not None
-    without, before, after = (missing_torque(problem, one.point) for one in (review.before, step.before, entry.fitted))
+    alone = next((one for one in result.alone if one.label == label), None)
+    entry, start = (leaving, review.before) if alone is None else (alone, result.base)
+    without, before, after = (missing_torque(problem, one.point) for one in (review.before, start, entry.fitted))
     kinds = {effect.kind, *(problem.effects[other].kind for other in review.family)}
     family = review.family
     if kinds == {"friction"} and acts_one_way(problem, final.point, label):

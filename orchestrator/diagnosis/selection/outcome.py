@@ -21,11 +21,11 @@ class TriedEffect:
 
 @dataclass(frozen=True, eq=False)
 class SearchStep:
-    """One step: the model before, what was tried on top of it, and what was taken ("": nothing).
+    """A model, what was tried on top of it, and what the final model has of that ("": nothing).
 
     Attributes:
         tried: the effects, by gain.
-        taken: label of the effect that entered.
+        taken: label of the effect that the final model has.
         family: labels of those that are not told from it.
     """
 
@@ -47,8 +47,9 @@ class SearchResult:
     Attributes:
         problem: with the whitening and the prior's weight of the final model.
         base: the model with re-fitted parameters alone, as the problem of its own time had it.
+        alone: effects that were fitted alone on top of the base, by gain.
         reviews: label -> the step that it makes in the final model, with the family that it has there.
-        refused: labels that entered once and did not pay in the end.
+        searched: whether effects were looked for.
         complete: False when time ran out.
         asked: labels of effects that were asked for: they stay, whatever they gain.
     """
@@ -56,16 +57,18 @@ class SearchResult:
     problem: FitProblem
     base: FittedModel
     final: FittedModel
-    steps: tuple[SearchStep, ...] = ()
+    alone: tuple[TriedEffect, ...] = ()
     reviews: Mapping[str, SearchStep] = field(default_factory=dict)
-    refused: frozenset[str] = field(default_factory=frozenset)
+    searched: bool = False
     complete: bool = True
     asked: frozenset[str] = field(default_factory=frozenset)
 
     @property
-    def searched(self) -> bool:
-        """Return whether effects were looked for."""
-        return bool(self.steps) and not self.asked
+    def steps(self) -> tuple[SearchStep, ...]:
+        """Return what was tried on top of re-fitted parameters, then in the place of each effect."""
+        taken = next((one.label for one in self.alone if one.label in self.final.labels), "")
+        first = (SearchStep(self.base, self.alone, taken),) if self.alone else ()
+        return (*first, *self.reviews.values())
 
 
 class Grade(IntEnum):

@@ -23,6 +23,7 @@ from orchestrator.diagnosis.settings import SelectionSettings
 
 Array = NDArray[np.float64]
 KNOTS = 11
+SURE = 2.5  # paired errors by which a gain is no chance
 EDGE = 0.005  # share of the rows beyond the first and the last knot
 RIDGE = 1e-9  # of the trace: knots that no row reaches stay where their neighbours are
 
@@ -34,7 +35,7 @@ def find_dependences(
     tried = [_fit_curve(result, argument) for argument in arguments]
     kept = [
         one for one in tried
-        if one is not None and one.comparison.t >= settings.least_t and one.comparison.gain >= settings.least_gain
+        if one is not None and one.comparison.t >= SURE and one.comparison.gain >= settings.least_gain
     ]  # fmt: skip
     return tuple(sorted(kept, key=lambda curve: -curve.comparison.gain))
 

@@ -1,28 +1,35 @@
-"""The search: forward by the cross-validated score with one look-ahead, then backward.
+"""The search: subsets of effects near a model, the best ones fitted in full, the best of these whitens anew.
 
-In each step every effect is screened, the most promising are fitted in full, and the best is taken if it gains more
-than the settings ask for. Of the effects over which it gains nothing the one with the fewest values enters. Then each
-earlier effect that no longer pays is taken out. At the end each effect of the model is compared so once more: what
-does as well in its place is its family.
+Whatever subset has the highest log score (``subsets.py``) is the model; nothing enters or leaves for an order of steps.
+A further round begins beside it and under its whitening, until it stays. What does as well in an effect's place is its
+family.
 """
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, compare, fit_model, weigh_prior
+from orchestrator.diagnosis.inference.fitting import FittedModel, compare, fit_model, weigh_prior
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
-from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint
+from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
 from orchestrator.diagnosis.selection.screening import Screening, start_of_fit
+from orchestrator.diagnosis.selection.subsets import Neighbours, Score, Subset
 from orchestrator.diagnosis.settings import SelectionSettings
 from orchestrator.errors import ScenarioError
 
 Progress = Callable[[str], None]
-LOUDER = 2.0  # times that weights must rise by it: else the model leaves hardly any
 SETTLINGS = 5  # of fit and whitening at most
 SETTLED = 0.02  # share of the score by which one changes it that is the last
+ROUNDS = 3  # of the search at most
+KNOWN = 8  # subsets of the round before that are fitted anew
+ALONE = 8  # effects that are fitted alone on top of re-fitted parameters
+FITS = 24  # subsets that a round fits in full, at most
+TRIALS = 2  # in which an effect may be impossible
+RIVALS = 3  # fitted in an effect's place
+SURE = 3.0  # of the log score, by which an effect must be better than what stands in its place: odds of 20
 
 
 def search_effects(
@@ -31,10 +38,26 @@ def search_effects(
     progress: Progress = lambda what: None,
     out_of_time: Callable[[], bool] = lambda: False,
 ) -> SearchResult:
-    """Search for the effects that a model lacks. Return the final model and the way to it."""
+    """Search for the effects that a model lacks. Return the final model and what was tried."""
     base, problem = fit_base(problem)
-    search = _Search(settings, progress, out_of_time)
-    return search.run(SearchResult(problem, base, base))
+    result = SearchResult(problem, base, base)
+    if not settings.most_effects:
+        return result
+    fits: Mapping[Subset, FittedModel] = {}
+    for number in range(ROUNDS):
+        around = _Round(result.problem, result.final, base, settings, progress, out_of_time, fits)
+        fits = around.fit_best()
+        if not number:
+            result = replace(result, searched=True, alone=around.tried(frozenset()))
+        result = replace(result, complete=not around.out_of_time())
+        best = max(fits.values(), key=around.score.score_fit)
+        if set(best.labels) == set(result.final.labels) or not result.complete:
+            break
+        again, final = settle_anew(result.problem, best)
+        result = replace(result, problem=again, final=final)
+    else:
+        around = _Round(result.problem, result.final, base, settings, progress, out_of_time, fits)
+    return around.review(result)
 
 
 def fit_effects(
@@ -43,15 +66,25 @@ def fit_effects(
     labels: Collection[str],
     progress: Progress = lambda what: None,
 ) -> SearchResult:
-    """Return the model with the effects that were asked for, whatever they gain, and the way to it.
+    """Return the model with the effects that were asked for, whatever they gain, the one first that gains most.
 
     Raises:
         ScenarioError: the record cannot show one of them, or two of them exclude each other.
     """
     _check_asked(problem, labels)
     base, problem = fit_base(problem)
-    search = _Search(settings, progress, lambda: False)
-    return search.take(SearchResult(problem, base, base, asked=frozenset(labels)))
+    result = SearchResult(problem, base, base, asked=frozenset(labels))
+    while missing := result.asked - set(result.final.labels):
+        problem, model = result.problem, result.final
+        screened = Screening(problem, model).screen([problem.effects[label] for label in sorted(missing)])
+        points = [start_of_fit(model, one) for one in screened] or [_small_start(problem, model, min(missing))]
+        fits = [fit for point in points if (fit := _fit(problem, point)) is not None]
+        if not fits:
+            raise ScenarioError(f"`effects` must leave out {min(missing)}: no size of it fits this record")
+        again, final = settle_anew(problem, max(fits, key=lambda fit: compare(model, fit).gain))
+        result = replace(result, problem=again, final=final)
+    around = _Round(result.problem, result.final, base, settings, progress, lambda: False, {})
+    return around.review(result)
 
 
 def _check_asked(problem: FitProblem, labels: Collection[str]) -> None:
@@ -101,240 +134,125 @@ def leave_out(result: SearchResult, labels: Sequence[str]) -> SearchResult:
     return replace(result, problem=problem, final=final)
 
 
-@dataclass(frozen=True)
-class _Search:
-    settings: SelectionSettings
-    progress: Progress
-    out_of_time: Callable[[], bool]
+def _fit(problem: FitProblem, point: ModelPoint, iterations: int | None = None) -> FittedModel | None:
+    """Return a fitted model; None: the machine runs away with it."""
+    try:
+        fitted = fit_model(problem, point, iterations)
+    except np.linalg.LinAlgError:
+        return None
+    return fitted if np.isfinite(fitted.cost) else None
 
-    def run(self, result: SearchResult) -> SearchResult:
-        """Go forward and backward until nothing more pays."""
-        most = self.settings.most_effects
-        for number in range(most + 3 if most else 0):
-            if len(result.final.labels) >= most:
-                break
-            if self.out_of_time():
-                result = replace(result, complete=False)
-                break
-            problem, step = self._step(result, number == 0)
-            result = replace(result, steps=(*result.steps, step))
-            if step.entry is None:
-                break
-            pruned = self._prune(problem, step.entry.fitted)
-            gone = set(step.entry.fitted.labels) - set(pruned.labels)
-            problem, final = settle_anew(problem, pruned)
-            result = replace(result, problem=problem, final=final, refused=result.refused | gone)
-        return self._review(result)
 
-    def take(self, result: SearchResult) -> SearchResult:
-        """Take the effects that are asked for, the one first that gains most."""
-        while missing := result.asked - set(result.final.labels):
-            problem, model = result.problem, result.final
-            tried = self._try_effects(problem, model, frozenset(problem.effects) - missing, len(missing))
-            tried = tried or [self._try_small(problem, model, min(missing))]
-            step = SearchStep(model, tuple(tried), tried[0].label)
-            problem, final = settle_anew(problem, tried[0].fitted)
-            result = replace(result, problem=problem, final=final, steps=(*result.steps, step))
-        return self._review(result)
+def _small_start(problem: FitProblem, model: FittedModel, label: str) -> ModelPoint:
+    """Return the start of an effect that no start speaks for, from a small size: it may end at none."""
+    effect = problem.effects[label]
+    values = list(effect.starts[0])
+    for place in effect.amplitudes:
+        values[place] = effect.scales[place]
+    return model.point.with_effect(label, tuple(values))
 
-    def _review(self, result: SearchResult) -> SearchResult:
-        """Return the result with the family of each effect as the final model has it, and its simplest one in place.
 
-        While others were missing, an effect may have stood for part of them, or have looked different from its like.
+class _Round:
+    """Subsets of effects near a reference model, the best ones fitted in full under its whitening."""
+
+    def __init__(
+        self, problem: FitProblem, reference: FittedModel, base: FittedModel, settings: SelectionSettings,
+        progress: Progress, out_of_time: Callable[[], bool], earlier: Mapping[Subset, FittedModel],
+    ) -> None:  # fmt: skip
+        self.problem, self.reference, self.settings, self.progress = problem, reference, settings, progress
+        self.out_of_time, self.earlier = out_of_time, earlier
+        self.score = Score.of(problem, settings)
+        self.has = frozenset(reference.labels)
+        self.near = Neighbours(self.score, reference)
+        self.ranked = {} if out_of_time() else self.near.rank()
+        self.farthest = max(settings.prior_deviations, farthest_parameter(problem, base) + 1.0)
+        self.fits: dict[Subset, FittedModel | None] = {self.has: reference}
+
+    def fit_best(self) -> dict[Subset, FittedModel]:
+        """Return the most promising subsets that are allowed, fitted in full, the reference among them.
+
+        An effect that is impossible in its first fits is not tried again: every subset of it would be.
         """
+        alone = [subset for subset in self.ranked if len(subset) == 1 and not self.has]
+        known = sorted(self.earlier, key=lambda subset: -self.score.score_fit(self.earlier[subset]))
+        first = [*(self.has - {label} for label in self.has), *known[:KNOWN], *alone[:ALONE]]
+        found, possible, impossible = {self.has: self.reference}, set(self.has), Counter[str]()
+        for subset in dict.fromkeys([*first, *self.ranked]):
+            if len(self.fits) > FITS or self.out_of_time():
+                break
+            if any(impossible[label] >= TRIALS and label not in possible for label in subset):
+                continue
+            fitted = self.fit(subset)
+            if fitted is None:
+                continue
+            bad = {label for label in subset if not self.problem.is_possible(label, fitted.point)}
+            impossible.update(bad)
+            possible |= subset - bad
+            if not bad and farthest_parameter(self.problem, fitted) < self.farthest:
+                found[subset] = fitted
+        return found
+
+    def fit(self, subset: Subset) -> FittedModel | None:
+        """Return a subset fitted from its best start: the reference's, the linear fit's, or an earlier round's."""
+        if subset not in self.fits:
+            starts = [self.near.start(subset)] if subset <= self.near.effects.keys() else []
+            starts += [self.ranked[subset][1]] if subset in self.ranked else []
+            starts += [self.earlier[subset].point] if subset in self.earlier else []
+            costs = [float(left @ left) for left in self.problem.whiten_residuals(starts)]
+            self.progress(" + ".join(sorted(subset)))
+            best = int(np.argmin(np.nan_to_num(costs, nan=np.inf))) if starts else None
+            self.fits[subset] = None if best is None else _fit(self.problem, starts[best])
+        return self.fits[subset]
+
+    def is_allowed(self, fitted: FittedModel) -> bool:
+        """Tell whether a machine can have the effects of a model, and no parameter leaves the model file with them."""
+        possible = all(self.problem.is_possible(label, fitted.point) for label in fitted.labels)
+        return possible and farthest_parameter(self.problem, fitted) < self.farthest
+
+    def tried(self, others: Subset) -> tuple[TriedEffect, ...]:
+        """Return the effects that were fitted on top of some others, by gain."""
+        before = self.fits[others]
+        assert before is not None
+        tried = [
+            TriedEffect(label, compare(before, fitted), fitted)
+            for subset, fitted in self.fits.items()
+            if fitted is not None and len(subset) == len(others) + 1 and others < subset
+            for label in subset - others
+        ]
+        return tuple(sorted(tried, key=lambda one: -one.comparison.gain))
+
+    def review(self, result: SearchResult) -> SearchResult:
+        """Return the result with what each effect of the final model gains there, and its family."""
         for label in result.final.labels:
-            problem, model = result.problem, result.final
-            without = fit_model(problem, model.point.without_effects([label]), 3)
-            reviewed = TriedEffect(label, compare(without, model), model)
-            # What stands for it begins at the values of the model with it: without it, they may be led far astray.
-            start = fit_model(problem, model.point.without_effects([label]), 0)
-            tried = self._try_effects(problem, without, frozenset((label,)), self.settings.refined, start)
-            step = self._simplest(problem, without, reviewed, (reviewed, *tried))
-            if label in result.asked:  # it stays, with what would do as well
-                alike = (step.taken, *step.family)
-                step = replace(step, taken=label, family=tuple(one for one in alike if one != label))
-            result = replace(result, reviews={**result.reviews, step.taken: step})
-            if step.taken != label:
-                assert step.entry is not None
-                result = replace(result, final=step.entry.fitted, steps=(*result.steps, step))
+            others = self.has - {label}
+            if self.fit(others) is None:
+                self.fits[others] = fit_model(self.problem, result.final.point.without_effects([label]), 0)
+            rivals = [one for one in self.ranked if others < one and len(one) == len(self.has) and one != self.has]
+            for subset in rivals[:RIVALS]:
+                self.fit(subset)
+            step = SearchStep(self.fits[others], self.tried(others), label)
+            result = replace(result, reviews={**result.reviews, label: replace(step, family=self._family(step))})
         return result
 
-    def _step(self, result: SearchResult, first: bool) -> tuple[FitProblem, SearchStep]:
-        problem, model = result.problem, result.final
-        tried = self._try_effects(problem, model, result.refused, self.settings.refined)
-        step = self._choose_step(problem, model, tried, result.refused, first)
-        if step.taken:
-            return problem, step
-        second = self._under_own_noise(problem, model, tried, result.refused)
-        if second is None:
-            second = self._under_own_noise(
-                problem, model, self._try_quietly(problem, model, result.refused), result.refused
-            )
-        return second or (problem, step)
+    def _family(self, step: SearchStep) -> tuple[str, ...]:
+        """Return the effects that the records do not tell from the one that a step took.
 
-    def _under_own_noise(
-        self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect], refused: frozenset[str]
-    ) -> tuple[FitProblem, SearchStep] | None:
-        """Return the step that an effect makes under the noise that it leaves itself; None: none pays."""
-        quieter = self._quieter_problem(problem, model, tried)
-        if quieter is None:
-            return None
-        before, again = self._compare_again(quieter, model, tried)
-        step = self._choose_step(quieter, before, again, refused, first=False)
-        return (quieter, step) if step.taken else None
-
-    def _try_quietly(self, problem: FitProblem, model: FittedModel, refused: frozenset[str]) -> list[TriedEffect]:
-        """Return effects that were fitted where little of what is left counts as unknown torques or inputs."""
-        quiet = problem.reweight(model.point, quiet=True)
-        pairs = zip(quiet.whitenings, problem.whitenings, strict=True)
-        louder = max(float(np.max(np.abs(a.weights) / np.maximum(np.abs(b.weights), 1e-300))) for a, b in pairs)
-        if louder < LOUDER:
-            return []
-        return self._try_effects(quiet, fit_model(quiet, model.point), refused, self.settings.refined)
-
-    def _compare_again(
-        self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect]
-    ) -> tuple[FittedModel, list[TriedEffect]]:
-        """Return a model and the effects tried on top of it, fitted again in a problem of another whitening."""
-        model = fit_model(problem, model.point)
-        fits = [fit_model(problem, one.fitted.point) for one in tried]
-        again = [TriedEffect(one.label, compare(model, fit), fit) for one, fit in zip(tried, fits, strict=True)]
-        return model, sorted(again, key=lambda trial: -trial.comparison.gain)
-
-    def _quieter_problem(
-        self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect]
-    ) -> FitProblem | None:
-        """Return the problem whitened by what an effect leaves, where the effect pays in that.
-
-        The whitening of a model that lacks an effect takes what the effect does for unknown torques or inputs. A true
-        effect leaves less of these with each fit and its whitening; one that stands for nothing does not.
+        These are what it is not surely better than, and those of another kind over which it gains next to nothing of
+        the whole error: what is left of two laws that do the same differs by how exact either is, and no law is.
         """
-        rising: list[tuple[float, FitProblem, list[TriedEffect]]] = []
-        for one in tried[: self.settings.look_ahead]:
-            own, fitted = settle(problem, one.fitted)
-            _, again = self._compare_again(own, model, [replace(one, fitted=fitted)])
-            if again[0].comparison.gain > one.comparison.gain:
-                rising.append((again[0].comparison.gain, own, again))
-        if not rising:
-            return None
-        gain, own, leading = max(rising, key=lambda entry: entry[0])
-        others = [one for one in tried[: self.settings.look_ahead] if one.label != leading[0].label]
-        for _ in range(self.settings.most_effects):
-            quieter, fitted = settle(own, leading[0].fitted)
-            _, again = self._compare_again(quieter, model, [replace(leading[0], fitted=fitted), *leading[1:], *others])
-            if again[0].comparison.gain <= gain:
-                break
-            gain, own, leading, others = again[0].comparison.gain, quieter, again, []
-        return own
-
-    def _choose_step(
-        self,
-        problem: FitProblem,
-        model: FittedModel,
-        tried: Sequence[TriedEffect],
-        refused: frozenset[str],
-        first: bool,
-    ) -> SearchStep:
-        fair = [one for one in tried if self._pays(problem, model, one)]
-        if not fair:
-            return SearchStep(model, tuple(tried))
-        best = fair[0]
-        if first and len(fair) > 1 and best.comparison.gain < self.settings.certain_alone:
-            best = self._best_with_second(problem, fair[: self.settings.look_ahead], refused) or best
-        return self._simplest(problem, model, best, tried)
-
-    def _simplest(
-        self, problem: FitProblem, model: FittedModel, best: TriedEffect, tried: Sequence[TriedEffect]
-    ) -> SearchStep:
-        """Return the step with the simplest of the effects over which the best one gains nothing.
-
-        Its family are these, and those of another kind over which it gains next to nothing of the whole error: what is
-        left of two laws that do the same differs by how exact either is, and no law is. That their gain is no chance
-        is asked of the one that is chosen.
-        """
-        alike = [one for one in tried if one is best or self._is_alike(problem, model, best, one)]
-        chosen = min(alike, key=lambda trial: (problem.effects[trial.label].law_values, -trial.comparison.gain))
-        kind, most = problem.effects[chosen.label].kind, chosen.fitted.score + self.settings.least_gain * model.score
-        family = [
-            one.label for one in tried
-            if one is not chosen and (one in alike or (
-                problem.effects[one.label].kind != kind and one.fitted.score < most
-                and one.comparison.gain >= self.settings.least_gain and self._is_allowed(problem, model, one)
-            ))
-        ]  # fmt: skip
-        return SearchStep(model, tuple(tried), chosen.label, tuple(family))
-
-    def _try_effects(
-        self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int,
-        start: FittedModel | None = None,
-    ) -> list[TriedEffect]:  # fmt: skip
-        """Return the most promising effects, fitted on top of a model from its values or those of a ``start``."""
-        start, tried = start or model, []
-        for screened in Screening(problem, start).screen(self._candidates(problem, model, refused))[:count]:
-            try:
-                fitted = fit_model(problem, start_of_fit(start, screened))
-            except np.linalg.LinAlgError:  # the machine runs away with it
+        chosen, least = step.entry, self.settings.least_gain
+        assert chosen is not None
+        kind, best = self.problem.effects[chosen.label].kind, self.score.score_fit(chosen.fitted)
+        most, none = chosen.fitted.score + least * step.before.score, self.score.score_fit(step.before)
+        family = []
+        for one in step.tried:
+            if one is chosen or not self.is_allowed(one.fitted):
                 continue
-            tried.append(TriedEffect(screened.label, compare(model, fitted), fitted))
-            self.progress(" + ".join((*model.labels, screened.label)))
-        return sorted(tried, key=lambda trial: -trial.comparison.gain)
-
-    @staticmethod
-    def _try_small(problem: FitProblem, model: FittedModel, label: str) -> TriedEffect:
-        """Return an effect that no start speaks for, fitted from a small size: it may end at none."""
-        effect = problem.effects[label]
-        values = list(effect.starts[0])
-        for place in effect.amplitudes:
-            values[place] = effect.scales[place]
-        try:
-            fitted = fit_model(problem, model.point.with_effect(label, tuple(values)))
-        except np.linalg.LinAlgError:
-            raise ScenarioError(f"`effects` must leave out {label}: no size of it fits this record") from None
-        return TriedEffect(label, compare(model, fitted), fitted)
-
-    @staticmethod
-    def _candidates(problem: FitProblem, model: FittedModel, refused: frozenset[str]) -> Sequence[CandidateEffect]:
-        has = set(model.labels)
-        return [
-            effect for label, effect in problem.effects.items()
-            if label not in has and label not in refused and not has.intersection(effect.excludes)
-        ]  # fmt: skip
-
-    def _pays(self, problem: FitProblem, model: FittedModel, tried: TriedEffect) -> bool:
-        """Tell whether an effect gains enough, is possible, and pushes no parameter out of the model file."""
-        return self._gains(tried.comparison) and self._is_allowed(problem, model, tried)
-
-    def _is_allowed(self, problem: FitProblem, model: FittedModel, tried: TriedEffect) -> bool:
-        if not problem.is_possible(tried.label, tried.fitted.point):
-            return False
-        before, after = farthest_parameter(problem, model), farthest_parameter(problem, tried.fitted)
-        return after < max(self.settings.prior_deviations, before + 1.0)
-
-    def _gains(self, comparison: ScoreComparison) -> bool:
-        return comparison.t >= self.settings.least_t and comparison.gain >= self.settings.least_gain
-
-    def _best_with_second(
-        self, problem: FitProblem, fair: Sequence[TriedEffect], refused: frozenset[str]
-    ) -> TriedEffect | None:
-        """Return the effect whose model, with the best second one, has the least score."""
-        scores = []
-        for one in fair:
-            second = self._try_effects(problem, one.fitted, refused, self.settings.look_ahead)
-            pays = [two.fitted.score for two in second if self._pays(problem, one.fitted, two)]
-            scores.append(min([one.fitted.score, *pays]))
-        return fair[int(np.argmin(scores))]
-
-    def _is_alike(self, problem: FitProblem, model: FittedModel, best: TriedEffect, other: TriedEffect) -> bool:
-        return self._pays(problem, model, other) and not self._gains(compare(other.fitted, best.fitted))
-
-    def _prune(self, problem: FitProblem, model: FittedModel) -> FittedModel:
-        """Return the model without earlier effects that no longer pay, or that the last one stands for."""
-        for label in model.labels[:-1]:
-            simpler = any(label in problem.effects[other].contains for other in model.labels)
-            without = fit_model(problem, model.point.without_effects([label]), 3)
-            if simpler or not self._gains(compare(without, model)):
-                model = without
-        return model
+            score, foreign = self.score.score_fit(one.fitted), self.problem.effects[one.label].kind != kind
+            alike = foreign and one.fitted.score < most and one.comparison.gain >= least
+            if alike or score > max(best - SURE, none):
+                family.append(one.label)
+        return tuple(family)
 
 
 def farthest_parameter(problem: FitProblem, model: FittedModel) -> float:
