@@ -44,7 +44,7 @@ class Reading:
 
     Attributes:
         part: first and last time to keep [s], from the first row on; None: all.
-        resample: "uniform" (only the stamps jitter), "linear" or "cubic"; None: refuse times that are not uniform.
+        resample: "uniform" (only the stamps jitter), "linear" or "cubic"; None: the motion decides.
         rate: samples per second to come down to; None: as in the file.
         torque_needed: whether a file of two angles without a torque is refused.
         header: line of the names in a text, from 1; 0: it has none; None: found.

@@ -25,10 +25,13 @@ from orchestrator.records.columns import COLUMNS, Array, Column
 from orchestrator.records.filters import decimate
 from orchestrator.records.formats import open_source
 from orchestrator.records.loading import Reading, load
+from orchestrator.records.rasters import make_uniform
 from orchestrator.records.requests import SAMPLED
 from orchestrator.records.timing import Grid, grid_of
 from orchestrator.records.words import RESAMPLING
 from orchestrator.shared.numbers import exact_text
+
+UNEVEN = "linear"  # how samples at uneven times are resampled where nobody says
 
 __all__ = ["COLUMNS", "MINIMUM_ROWS", "RESAMPLING", "Column", "Reading", "Record", "quantisation_step", "read_record"]
 
@@ -74,6 +77,10 @@ def record_from_columns(
     for name, values in arrays.items():
         check_finite(values, label[name], source)
     grid = grid_of(arrays["time"], label["time"], source, trust_rows, arrays["theta_m"])
+    if not grid.uniform:
+        arrays, more = make_uniform(arrays, UNEVEN)
+        notes = [*notes, *(f"the stamps keep to no clock: {text}" for text in more)]
+        grid = grid_of(arrays["time"], label["time"], source)
     for name in ("u", "theta_m"):
         if name in arrays and np.isnan(arrays[name]).all():
             raise RecordError(f"{source}: column `{label[name]}` must hold numbers, but is empty")

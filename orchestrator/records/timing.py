@@ -4,13 +4,13 @@ In all functions: ``time``: (n,) stamps [s]; ``values``: (n,); NaN: missing.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.jitter import describe_jitter, fit_clock
+from orchestrator.records.jitter import describe_jitter, fit_clock, places_on_clock
 from orchestrator.shared.numbers import exact_text
 
 Array = NDArray[np.float64]
@@ -62,6 +62,7 @@ class Grid:
 
     Attributes:
         trusted: whether the rows are uniform, and not their stamps.
+        uniform: whether they lie on the grid at all; else the samples were taken at uneven times.
         note: words for what was found, where nobody said that they are.
     """
 
@@ -70,6 +71,7 @@ class Grid:
     place: NDArray[np.int64]
     size: int
     trusted: bool = False
+    uniform: bool = True
     note: str = ""
 
 
@@ -78,7 +80,8 @@ def grid_of(time: Array, label: str, source: str, trust_rows: bool = False, angl
 
     Args:
         trust_rows: whether the rows are uniform whatever their stamps say.
-        angle: (n,) what moved; with it, stamps that jitter about a uniform clock are found and their rows trusted.
+        angle: (n,) what moved; with it, stamps that jitter about a uniform clock are found and their rows trusted, and
+            samples at uneven times are no grid; without it they are refused.
     """
     where = f"{source}: column `{label}`"
     _check_increasing(time, label, source)
@@ -91,11 +94,15 @@ def grid_of(time: Array, label: str, source: str, trust_rows: bool = False, angl
     off = time - (start + step * place)
     off = off - 0.5 * (off.max() + off.min())
     largest, rounded = float(np.abs(off).max()), _rounding(time)
-    row = None if trust_rows else _row_off_grid(off, np.diff(place), step, rounded, time)
-    if row is not None:
-        note = "" if angle is None else describe_jitter(time, angle)
-        if note:
-            return replace(grid_of(time, label, source, True), note=note)
+    row, note = None if trust_rows else _row_off_grid(off, np.diff(place), step, rounded, time), ""
+    if row is not None and angle is not None:  # a look at the motion decides what nobody said
+        lost = places_on_clock(time)
+        note = describe_jitter(time, angle, lost)
+        if not note:
+            return Grid(start, Timing(step, 0.0, 0.0, 0), place, int(place[-1]) + 1, uniform=False)
+        place, (start, step, off) = lost, fit_clock(time, lost)
+        largest = float(np.abs(off).max())
+    elif row is not None:
         raise RecordError(
             f"{source}: row {row + 1}, column `{label}` must be uniform with a step of {step:.6g} s, but is off by "
             f"{1e3 * abs(off[row]):.3g} ms, jitter {1e3 * float(np.std(off)):.3g} ms: say how to resample: `resample` "
@@ -115,7 +122,7 @@ def grid_of(time: Array, label: str, source: str, trust_rows: bool = False, angl
             "`part` START:END"
         )
     timing = Timing(step, float(np.sqrt(np.mean(off**2))), largest, missing, gaps, rounded)
-    return Grid(start, timing, place, size, trust_rows)
+    return Grid(start, timing, place, size, trust_rows or bool(note), note=note)
 
 
 def _check_increasing(time: Array, label: str, source: str) -> None:

@@ -78,12 +78,6 @@ def _held(rows: slice) -> Callable[[Table], Table]:
     return change
 
 
-def _jitter(table: Table) -> Table:
-    """Return stamps that may be nearer to another row's time: below half a step they would be taken as jitter."""
-    rng = np.random.default_rng(0)
-    return table | {"time": np.sort(table["time"] + 0.004 * rng.uniform(-1.0, 1.0, table["time"].size))}
-
-
 def _scaled(**factors: float) -> Callable[[Table], Table]:
     return lambda table: {name: factors.get(name, 1.0) * values for name, values in table.items()}
 
@@ -243,13 +237,6 @@ ADVICE: dict[str, tuple[Input, str, Input]] = {
     "hours": (
         Input(_csv(None, _scaled(time=1e-7))), "say its `[columns.time] unit`",
         Input(_csv(None, _scaled(time=1e-7)), {"time": Column(unit="h")}),
-    ),
-    "jitter": (
-        Input(_csv(None, _jitter)), "say how to resample: `resample` uniform",
-            Input(_csv(None, _jitter), reading=Reading(resample="uniform")),
-    ),
-    "jitter, of the samples": (
-        Input(_csv(None, _jitter)), "linear or cubic", Input(_csv(None, _jitter), reading=Reading(resample="cubic")),
     ),
     "half lost": (
         Input(_edited(lambda ls: ls[:300] + ls[600:])), "keep a part without it by `part` START:END",

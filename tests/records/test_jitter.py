@@ -1,4 +1,4 @@
-"""Stamps that jitter about a uniform clock are found; clocks that do anything else are refused as they were."""
+"""Stamps that jitter about a uniform clock are found, lost rows among them; samples at uneven times are resampled."""
 
 import re
 from pathlib import Path
@@ -37,10 +37,6 @@ def _drift() -> np.ndarray:
     return _white(0.2) + 0.4 * STEP * np.sin(np.pi * ROWS / ROWS[-1])
 
 
-def _two_rates() -> np.ndarray:
-    return np.concatenate([ROWS[:400], ROWS[400] + 1.003 * ROWS[:400]]) + _white(0.15) - ROWS
-
-
 def _random_walk() -> np.ndarray:
     return ROWS + STEP * 0.02 * np.cumsum(np.random.default_rng(2).normal(size=SIZE))
 
@@ -50,28 +46,24 @@ def _packets() -> np.ndarray:
     return ROWS + 0.2 * STEP * np.resize([1.0, 1.0, -1.0, -1.0], SIZE)
 
 
-def _without(rows: slice) -> np.ndarray:
-    """Return jittering stamps of which rows are lost, for as many rows of values as there were."""
-    return np.delete(_white(0.2, 900), np.arange(900)[rows])[:SIZE]
-
-
 JITTER = {
     "a fifth": _white(0.2),
     "near a half": _white(0.45),
     "late": _late(),
     "normal": ROWS + 0.1 * STEP * np.random.default_rng(4).normal(size=SIZE),
 }
-OTHER = {
+UNEVEN = {
     "drift": _drift(),
-    "two rates": _two_rates(),
     "random walk": _random_walk(),
     "packets of four": _packets(),
-    "one row lost": _without(slice(500, 501)),
-    "one row lost near the end": _without(slice(797, 798)),
-    "a row lost here and there": _without(slice(20, 900, 90)),
-    "a gap": _without(slice(300, 340)),
     "too far": _white(0.6).clip(min=np.concatenate([[-1.0], _white(0.6)[:-1] + 1e-5])),
     "steps at random": np.cumsum(np.random.default_rng(3).uniform(3e-3, 7e-3, SIZE)),
+}
+LOST = {
+    "one": slice(500, 501),
+    "one near the end": slice(790, 791),
+    "some here and there": slice(20, 780, 90),
+    "a gap": slice(300, 340),
 }
 
 
@@ -92,13 +84,25 @@ def test_rows_are_uniform_where_stamps_jitter(table: Table, time: np.ndarray) ->
         assert not any("taken as uniform" in note for note in told.notes)
 
 
-@pytest.mark.parametrize("name", OTHER)
-def test_other_clocks_are_refused_with_the_advice(table: Table, name: str) -> None:
-    assert np.all(np.diff(OTHER[name]) > 0.0)
-    with pytest.raises(
-        RecordError, match=r"must be uniform with a step of .*: say how to resample: `resample` uniform"
-    ):
-        record_from_columns(table | {"time": OTHER[name]}, "log")
+@pytest.mark.parametrize("name", UNEVEN)
+def test_samples_at_uneven_times_are_resampled_and_told(name: str) -> None:
+    time = UNEVEN[name]
+    assert np.all(np.diff(time) > 0.0)
+    record = record_from_columns({"time": time, "u": np.sin(5.0 * time), "theta_m": np.sin(9.0 * time)}, "log")
+    assert any("angles resampled (linear)" in note and "error" in note for note in record.notes)
+    np.testing.assert_allclose(np.diff(record.time), record.step, rtol=1e-6)
+    np.testing.assert_allclose(record.theta_m, np.sin(9.0 * record.time), atol=3e-3)
+
+
+@pytest.mark.parametrize("name", LOST)
+@pytest.mark.parametrize("share", [0.2, 0.35])
+def test_rows_that_are_lost_among_stamps_that_jitter_are_missing_samples(name: str, share: float) -> None:
+    kept = np.delete(np.arange(SIZE), np.arange(SIZE)[LOST[name]])
+    table = {"time": _white(share)[kept], "u": np.sin(5.0 * ROWS)[kept], "theta_m": np.sin(9.0 * ROWS)[kept]}
+    record = record_from_columns(table, "log")
+    assert any("rows are taken as uniform" in note for note in record.notes)
+    assert (record.size, record.n_missing) == (SIZE, SIZE - kept.size)
+    np.testing.assert_array_equal(record.theta_m[kept], table["theta_m"])
 
 
 @pytest.mark.parametrize("share", [0.2, 0.35])
@@ -110,15 +114,6 @@ def test_samples_that_jitter_with_their_stamps_are_not_uniform(share: float, noi
     assert not describe_jitter(time, np.sin(9.0 * time) + heard)
     half_lost = np.where(rng.random(SIZE) < 0.1, np.nan, np.sin(9.0 * time) + heard)
     assert not describe_jitter(time, half_lost)
-
-
-def test_white_stamps_are_rarely_refused_and_wandering_ones_never_taken() -> None:
-    """With `WHITE` at 3 for ten lags, one record in forty would be refused."""
-    still = np.zeros(SIZE)
-    assert sum(bool(describe_jitter(_white(0.3, seed=seed), still)) for seed in range(300)) >= 298
-    for seed in range(300):
-        walk = np.cumsum(np.random.default_rng(seed).normal(size=SIZE))
-        assert not describe_jitter(ROWS + 0.3 * STEP * walk / np.abs(walk).max(), still)
 
 
 def test_the_option_goes_before(table: Table, tmp_path: Path) -> None:

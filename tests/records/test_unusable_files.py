@@ -167,7 +167,6 @@ UNUSABLE: dict[str, tuple[Make, str, str, str]] = {
     "short": (_text(lambda s: "\n".join(s.split("\n")[:150])), "", "200 rows, but has 149", "log a longer run"),
     "time goes back": (_cell(300, 0, "0.1"), "", "row 300, column `time` must increase", "part` START:END"),
     "milliseconds": (_columns(lambda t: t | {"time": 1e3 * t["time"]}), "", "looks like milliseconds", 'unit = "ms"'),
-    "jitter": (_columns(_jitter), "", "must be uniform", "resample`"),
     "half lost": (
         _text(lambda s: "\n".join(s.split("\n")[:300] + s.split("\n")[600:])), "", "of its rows missing", "part`"
     ),
