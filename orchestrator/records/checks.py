@@ -16,7 +16,8 @@ Array = NDArray[np.float64]
 
 LARGEST_VALUE = 1e12  # of any number in a record
 LARGEST_ANGLE = 1e7  # rad
-LEAVING = 0.4  # of the rms speed: a machine that is slower was coming to rest
+ABRUPT = 3.0  # times the changes of speed that a machine shows elsewhere: an encoder stopped, not the machine
+USUAL = 0.99  # of the rows: changes of speed that are no exception
 LARGEST_GAP = 0.3  # rad, load side: motion beyond it that one encoder misses is no gap
 BLOCKS = 50  # of a record, in each of which the motor moves or stands still
 STILL = 0.005  # of the whole travel, within a block
@@ -99,7 +100,7 @@ def check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str
     if length < max(20, size // 100):
         return
     if other is None or name not in ("theta_m", "theta_l"):
-        missed = start > 0 and _edge_speed(values, start, stop) * length > 30.0 * _resolution(values)
+        missed = start > 0 and _abrupt_stop(values, start, stop) * length > 30.0 * _resolution(values)
     else:
         # The load may rest while the motor crosses the gap, so only more than any gap counts.
         load, motor = arrays["theta_l"], arrays["theta_m"]
@@ -124,20 +125,17 @@ def _longest_constant(values: Array) -> tuple[int, int]:
     return int(bounds[longest]), int(bounds[longest + 1])
 
 
-def _edge_speed(values: Array, start: int, stop: int) -> float:
-    """Return the smaller of the mean speeds [units per row] over the rows just before and after a run.
+def _abrupt_stop(values: Array, start: int, stop: int) -> float:
+    """Return the smaller change of speed [units per row] at the ends of a run, where the machine shows none like it.
 
-    A machine that comes to rest, held by its friction, slows down first; an encoder that sticks does not. Speeds of a
-    few counts, or far below the record's own, tell nothing.
+    A machine that comes to rest, held by its friction, stops and starts as it does elsewhere; an encoder that sticks
+    stops dead, and catches up in one row. Changes of a few counts tell nothing.
     """
-    speeds = []
-    if start >= 5:
-        speeds.append(abs(values[start] - values[start - 4]) / 4.0)
-    if stop + 5 <= values.size:
-        speeds.append(abs(values[stop + 3] - values[stop - 1]) / 4.0)
-    slowest = float(min(speeds)) if speeds else 0.0
-    typical = float(np.sqrt(np.mean(np.diff(values) ** 2)))
-    return slowest if slowest > max(3.0 * _resolution(values), LEAVING * typical) else 0.0
+    ends = [abs(values[n] - values[n - 1]) for n in (start, stop) if 0 < n < values.size]
+    changes = np.abs(np.diff(values, 2))
+    changes[max(start - 2, 0) : stop + 1] = 0.0
+    usual = max(ABRUPT * float(np.quantile(changes, USUAL)), 3.0 * _resolution(values))
+    return float(min(ends)) if min(ends, default=0.0) > usual else 0.0
 
 
 def _resolution(values: Array) -> float:

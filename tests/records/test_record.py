@@ -1,5 +1,6 @@
 """Records: what is read, and what is refused with row and column named."""
 
+import itertools
 import math
 import re
 from pathlib import Path
@@ -138,6 +139,27 @@ def test_a_machine_that_stands_still_is_no_stuck_encoder() -> None:
     angle = np.round(np.where(time < 2.5, 0.0, 1.0 - np.exp(-((time - 2.5) ** 2))), 4)
     record = record_from_columns({"time": time, "u": np.sin(time), "theta_m": angle}, "rest")
     assert record.size == 1000
+
+
+@pytest.mark.parametrize("pull", [0.0, 0.3])
+def test_an_axis_that_friction_holds_under_load_is_no_stuck_encoder(pull: float) -> None:
+    step, angle, speed, rows, torques = 0.01, 0.0, 0.0, [], []
+    for n in range(1500):  # inertia 0.01, dry friction 0.5, a weight's pull, a torque that reverses slowly
+        torque = pull + 0.8 * np.sin(0.02 * n)
+        for _ in range(20):
+            push = torque - pull - 0.02 * speed
+            if speed == 0.0 and abs(push) < 0.5:
+                continue
+            way = np.sign(speed) if speed else np.sign(push)
+            after = speed + step / 20 * (push - 0.5 * way) / 0.01
+            speed = 0.0 if after * way < 0.0 else after
+            angle += step / 20 * speed
+        rows.append(round(angle, 3))
+        torques.append(torque)
+    table = {"time": step * np.arange(1500), "u": np.array(torques), "theta_m": np.array(rows)}
+    longest = max(len(list(same)) for _, same in itertools.groupby(rows))
+    assert longest > 40
+    assert record_from_columns(table, "held").size == 1500
 
 
 def test_steps_of_milliseconds_are_named(columns: dict[str, np.ndarray]) -> None:
