@@ -49,4 +49,6 @@ def _shift(record: Record, motor: float, load: float) -> Record:
     shifts = [f"{name} from {shift:.9g} rad" for name, shift in (("theta_m", motor), ("theta_l", load)) if shift]
     note = f"encoders' zeros lie elsewhere: angles count {' and '.join(shifts)} on"
     theta_l = None if record.theta_l is None else record.theta_l - load
-    return replace(record, theta_m=record.theta_m - motor, theta_l=theta_l, notes=(*record.notes, note))
+    return replace(
+        record, theta_m=record.theta_m - motor, theta_l=theta_l, notes=(*record.notes, note), zeros_set=motor != 0.0
+    )

@@ -35,6 +35,7 @@ class Record:
         notes: what was detected and assumed, one sentence each.
         averaged: how many samples of the file went into one of these by ``rate``.
         angle_unit: in which the file has angles: rad, deg, arcmin or turns; rad where it is another.
+        zeros_set: whether the encoders' zeros were brought near each other, by an estimate that may be a little off.
     """
 
     time: Array
@@ -51,6 +52,7 @@ class Record:
     u_sampled: Array | None = None
     u_raster: float = 0.0
     angle_unit: str = "rad"
+    zeros_set: bool = False
 
     @property
     def size(self) -> int:

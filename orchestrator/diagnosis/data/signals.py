@@ -35,6 +35,7 @@ class Signals:
         source: name of the record.
         rows_each: rows of the record for each row here.
         torque_raster: step of the torque's own rows [s], where these are rarer than the record's; else 0.0.
+        zeros_set: the encoders' zeros were brought near each other, and what is left of that is unknown.
         smoothing: (n,) what the torque changes by when its own rows are samples of a smooth signal [N.m]; empty
             where they are not rarer.
     """
@@ -50,6 +51,7 @@ class Signals:
     rows_each: int = 1
     torque_raster: float = 0.0
     smoothing: Array = field(default_factory=lambda: np.empty(0))
+    zeros_set: bool = False
 
     @property
     def size(self) -> int:
@@ -93,7 +95,7 @@ def prepare_signals(
     return Signals(
         step, np.ascontiguousarray(torques[0]), np.ascontiguousarray(angles), held,
         tuple(min(cutoff, top) for cutoff in cutoffs), noise, measured, record.source, factor, record.u_raster,
-        np.ascontiguousarray(torques[1]) if len(torques) > 1 else np.empty(0),
+        np.ascontiguousarray(torques[1]) if len(torques) > 1 else np.empty(0), record.zeros_set and len(angles) > 1,
     )  # fmt: skip
 
 

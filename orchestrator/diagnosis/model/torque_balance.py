@@ -52,6 +52,8 @@ from orchestrator.records.record import Record
 Array = NDArray[np.float64]
 SHORTEST = 1e-9  # rad: distance over which friction of a body that does not move builds up
 INITIAL_TORQUE = "initial torque"
+ZERO = "zero of the load's encoder"  # a value of the log: no effect of the machine is what is left of our correction
+ZERO_SPREAD = 0.03  # rad: how far an estimate of it may be off
 MOST_KEPT = 60  # intermediate signals, for the next values
 _POOL = ThreadPoolExecutor(2)
 
@@ -89,19 +91,24 @@ class TorqueBalance(ResidualModel):
         self._places = [plant.index(entry.name) for entry in self.parameters if not entry.local]
         self.active = np.array([self._active(speed) for speed in self._speeds])
         self._hidden = self._simulate_hidden_load(self.nominal)[0] if self.hides_load else np.empty((0, 2))
-        self.effects: Mapping[str, CandidateEffect] = candidate_effects(model, self.scales, self.channels)
+        effects = candidate_effects(model, self.scales, self.channels)
+        shifted = {
+            row.label for row in plant.bank if plant.offsets and set(row.parameters.values()) <= set(plant.offsets)
+        }
+        self.effects: Mapping[str, CandidateEffect] = {
+            label: one for label, one in effects.items() if not (signals.zeros_set and label in shifted)
+        }
 
     def _uncertain(self, model: Model) -> tuple[UncertainParameter, ...]:
         known = tuple(
             as_uncertain(entry) for entry in model.uncertain if entry.value != 0.0 or entry.name in self.plant.linear
         )
-        lag = self.plant.value(self.nominal, self.plant.drive.lag)
-        if lag <= 3.0 * self.step:
-            return known
-        return (
-            *known,
-            UncertainParameter(INITIAL_TORQUE, 0.0, 1.0, "N.m", True, scale=rms(self.signals.torque), reported=False),
-        )
+        local, torque = [], rms(self.signals.torque)
+        if self.plant.value(self.nominal, self.plant.drive.lag) > 3.0 * self.step:
+            local.append(UncertainParameter(INITIAL_TORQUE, 0.0, 1.0, "N.m", True, scale=torque, reported=False))
+        if self.signals.zeros_set:
+            local.append(UncertainParameter(ZERO, 0.0, 1.0, "rad", True, scale=ZERO_SPREAD, reported=False))
+        return (*known, *local)
 
     def _active(self, speed: Array) -> Array:
         """Return the rows (n,) at which a body moves: at rest dry friction takes whatever is left there."""
@@ -143,6 +150,8 @@ class TorqueBalance(ResidualModel):
         """Return the plant's parameters (n,) at a point."""
         p = self.nominal.copy()
         p[self._places] = point.parameters[: len(self._places)]
+        if self.signals.zeros_set:
+            p[self.plant.index(self.plant.offsets[-1])] += self._local(ZERO, point)
         given: dict[str, float] = {}
         for label, values in point.effects.items():  # the first effect that has a parameter sets it
             given = {**effect_parameters(self.plant, self.effects[label], values), **given}
@@ -173,7 +182,7 @@ class TorqueBalance(ResidualModel):
     def residual(self, point: ModelPoint) -> Array:
         """Return the residuals (channels, n) [N.m] at a point."""
         p = self.values_at(point)
-        return np.asarray(self.balance(p, self._initial(point)) * self.residual_scale(point)[:, None])
+        return np.asarray(self.balance(p, self._local(INITIAL_TORQUE, point)) * self.residual_scale(point)[:, None])
 
     def residual_scale(self, point: ModelPoint) -> Array:
         """Return (channels,) residual over missing torque, as the head of the module says."""
@@ -186,8 +195,9 @@ class TorqueBalance(ResidualModel):
             scale *= rms(self._torque(self.nominal)) / rms(self._torque(p))
         return scale
 
-    def _initial(self, point: ModelPoint) -> float:
-        return point.parameters[-1] if len(point.parameters) > len(self._places) else 0.0
+    def _local(self, name: str, point: ModelPoint) -> float:
+        pairs = zip(self.parameters, point.parameters, strict=False)
+        return next((value for entry, value in pairs if entry.name == name), 0.0)
 
     def balance(self, p: Array, initial: float = 0.0) -> Array:
         """Return the torques (channels, n) [N.m] that are missing at each body.
