@@ -11,7 +11,7 @@ from orchestrator.diagnosis.inference.fitting import compare, fit_model
 from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParameter
 from orchestrator.diagnosis.report.estimates import parameter_estimates
-from orchestrator.diagnosis.selection.search import settle
+from orchestrator.diagnosis.selection.settling import settle
 from orchestrator.diagnosis.settings import FitSettings
 from tests.support.linear_model import LinearModel, linear_problem
 

@@ -36,7 +36,8 @@ from orchestrator.diagnosis.selection.evidence import (
     torque_shares,
 )
 from orchestrator.diagnosis.selection.remaining import find_dependences
-from orchestrator.diagnosis.selection.search import fit_base, fit_effects, search_effects
+from orchestrator.diagnosis.selection.search import fit_effects, search_effects
+from orchestrator.diagnosis.selection.settling import fit_base
 from orchestrator.diagnosis.settings import DiagnosisSettings, FitSettings
 from orchestrator.errors import ScenarioError
 

@@ -18,7 +18,7 @@ from orchestrator.diagnosis.selection.outcome import (
     RecordEvidence,
     SearchResult,
 )
-from orchestrator.diagnosis.selection.search import leave_out
+from orchestrator.diagnosis.selection.settling import leave_out
 from orchestrator.diagnosis.settings import DiagnosisSettings
 
 Array = NDArray[np.float64]

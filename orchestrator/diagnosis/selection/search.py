@@ -6,23 +6,22 @@ family.
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from orchestrator.diagnosis.inference.fitting import FittedModel, compare, fit_model, weigh_prior
+from orchestrator.diagnosis.inference.fitting import FittedModel, compare, fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
 from orchestrator.diagnosis.selection.screening import Screening, start_of_fit
+from orchestrator.diagnosis.selection.settling import fit_base, settle_anew
 from orchestrator.diagnosis.selection.subsets import Neighbours, Score, Subset
 from orchestrator.diagnosis.settings import SelectionSettings
 from orchestrator.errors import ScenarioError
 
 Progress = Callable[[str], None]
-SETTLINGS = 5  # of fit and whitening at most
-SETTLED = 0.02  # share of the score by which one changes it that is the last
 ROUNDS = 3  # of the search at most
 KNOWN = 8  # subsets of the round before that are fitted anew
 ALONE = 8  # effects that are fitted alone on top of re-fitted parameters
@@ -96,42 +95,6 @@ def _check_asked(problem: FitProblem, labels: Collection[str]) -> None:
         other = next((one for one in labels if one in problem.effects[label].excludes), None)
         if other is not None:
             raise ScenarioError(f"`effects` must not have both {label} and {other}: one takes the place of the other")
-
-
-def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
-    """Return the model with re-fitted parameters, and the problem whitened by what it leaves."""
-    starts = [problem.start] if problem.first is None else [problem.first, problem.start]
-    fitted = min((fit_model(problem, start) for start in starts), key=lambda fit: fit.cost)
-    for number in range(SETTLINGS):
-        score = fitted.score
-        problem, fitted = settle(problem, fitted)
-        if number and abs(fitted.score - score) < SETTLED * score:
-            break
-    return fitted, problem
-
-
-def settle(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, FittedModel]:
-    """Return the problem with the whitening and the prior weight that a model asks for, and the model fitted there."""
-    problem = weigh_prior(problem.reweight(fitted.point), fitted)
-    return problem, fit_model(problem, fitted.point)
-
-
-def settle_anew(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, FittedModel]:
-    """Return what :func:`settle` returns, from the model file's values too where these lead to less.
-
-    What the model lacked before may have led its values to where no fit comes back from.
-    """
-    again = fit_model(problem, ModelPoint(problem.start.parameters, fitted.point.effects))
-    return settle(problem, again if again.cost < fitted.cost else fitted)
-
-
-def leave_out(result: SearchResult, labels: Sequence[str]) -> SearchResult:
-    """Return the result with a final model that lacks some effects, the rest fitted anew."""
-    if not labels:
-        return result
-    fitted = fit_model(result.problem, result.final.point.without_effects(labels))
-    problem, final = settle(result.problem, fitted)
-    return replace(result, problem=problem, final=final)
 
 
 def _fit(problem: FitProblem, point: ModelPoint, iterations: int | None = None) -> FittedModel | None:
@@ -219,7 +182,7 @@ class _Round:
             if fitted is not None and len(subset) == len(others) + 1 and others < subset
             for label in subset - others
         ]
-        return tuple(sorted(tried, key=lambda one: -one.comparison.gain))
+        return tuple(sorted(tried, key=lambda trial: -trial.comparison.gain))
 
     def review(self, result: SearchResult) -> SearchResult:
         """Return the result with what each effect of the final model gains there, and its family."""

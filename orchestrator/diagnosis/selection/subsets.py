@@ -196,7 +196,7 @@ class Neighbours:
             best = [max((s for one, s in scores.items() if len(one) == n), default=-np.inf) for n in range(size)]
             if best[-1] < max(best) - HOPELESS:
                 break
-            growing = sorted((one for one in scores if len(one) == size - 1), key=lambda one: -scores[one])[:BEAM]
+            growing = sorted((one for one in scores if len(one) == size - 1), key=lambda subset: -scores[subset])[:BEAM]
             look([one | {label} for one in growing for label in leading(LEADING) if label not in one])
         ranked = {subset: fit for subset, fit in found.items() if fit is not None}
         return dict(sorted(ranked.items(), key=lambda entry: -entry[1][0]))
