@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 
 from orchestrator.errors import FmuError
+from orchestrator.shared.cache import remember
 from orchestrator.shared.machine_code import UNFOLDED, compiler_environment, local_compiler
 from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.tool_runs import run_tool
@@ -104,7 +105,17 @@ def _first_line(path: str) -> str:
 
 
 def compile_library(compiler: Compiler, target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:
-    """Return the shared library of an FMU for one platform, the same bytes for the same sources and compiler."""
+    """Return the shared library of an FMU for one platform, the same bytes for the same sources and compiler.
+
+    It is compiled once for all builds of these sources on this machine.
+    """
+    key = (compiler.identity, *compiler.command, *FLAGS, str(target), name, *(
+        part for file, content in sorted(sources.items()) for part in (file, content)
+    ))  # fmt: skip
+    return remember(name, key, lambda: _compile_all(compiler, target, name, sources))
+
+
+def _compile_all(compiler: Compiler, target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:
     machines = target.zig if compiler.is_zig else ("",)
     with Scratch("compile") as scratch:
         for file, content in sources.items():

@@ -51,7 +51,7 @@ def ensure_fastest(names: Sequence[str], meanwhile: Callable[[], object] | None 
             folder = cache_directory("native")
             with ThreadPoolExecutor(len(names)) as pool:  # each waits for a compiler most of its time
                 each = [[recipe.name] for recipe in recipes_of(names)]  # the catalogue is read before they begin
-                built = pool.map(partial(ensure_native, directory=folder, here=True), each)
+                built = pool.map(partial(ensure_native, directory=folder, here=True, versions=True), each)
                 if meanwhile is not None:
                     pool.submit(meanwhile)  # once a thread is free: all are translated by then
             paths = {name: path for found in built for name, path in found.items()}

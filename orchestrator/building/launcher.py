@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import FmuError
+from orchestrator.shared.cache import remember
 from orchestrator.shared.machine_code import local_compiler
 from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.tool_runs import run_tool
@@ -61,13 +62,24 @@ def find_toolchain() -> Toolchain:
 
 def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
     """Return the shared library, the same bytes wherever it is compiled."""
-    assert toolchain.compiler is not None
+    compiler = toolchain.compiler
+    assert compiler is not None
+    try:
+        found = os.stat(compiler)
+    except OSError as error:
+        raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
+    files = (part for path in sorted(NATIVE.iterdir()) for part in (path.name, path.read_bytes()))
+    made_by = f"{toolchain.compiler} {found.st_size} {found.st_mtime_ns} {toolchain.identity}"
+    return remember("launcher", (made_by, wrapper, *files), lambda: _compile(toolchain, compiler, wrapper))
+
+
+def _compile(toolchain: Toolchain, compiler: str, wrapper: str) -> bytes:
     with Scratch("compile") as scratch:
         folder = scratch.path
         shutil.copytree(NATIVE, folder, dirs_exist_ok=True)
         library = str(toolchain.libpython) if toolchain.libpython else ""
         command = [
-            toolchain.compiler,
+            compiler,
             *("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden", "-Wl,--build-id=none"),
             f'-DWRAPPER="{wrapper}"',
             f"-DPYTHON_LIBRARY={_quote(library)}",

@@ -39,14 +39,18 @@ def ensure_native(
     here: bool = False,
     fmi: int = 2,
     real_outputs: bool = False,
+    versions: bool = False,
 ) -> dict[str, Path]:
     """Return the path of each native FMU in ``names`` (default: all), after building what is missing or stale.
 
     Args:
         here: for this platform alone, with the local compiler where there is one: a second instead of half a minute.
+        versions: FMUs of other sources stay beside them, each in a folder of its own.
     """
     folder = native_directory(fmi) if directory is None else directory
-    return {recipe.name: _ensure(recipe, folder, force, here, fmi, real_outputs) for recipe in recipes_of(names)}
+    return {
+        recipe.name: _ensure(recipe, folder, force, here, fmi, real_outputs, versions) for recipe in recipes_of(names)
+    }
 
 
 def native_remark() -> str | None:
@@ -61,12 +65,15 @@ def native_remark() -> str | None:
     )
 
 
-def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int, real_outputs: bool) -> Path:
+def _ensure(
+    recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int, real_outputs: bool, versions: bool
+) -> Path:
     compiler = find_compiler(here)
     if compiler is None:
         raise FmuError(NO_COMPILER)
     targets = [str(target.zig) for target in compiler.targets]
     current = fingerprint(recipe, "native", f"{fmi} {real_outputs}", compiler.identity, *FLAGS, *targets)
+    directory = directory / current[:16] if versions else directory
     build = partial(_build, recipe, compiler, fmi, real_outputs)
     return bring_up_to_date(directory / f"{recipe.name}.fmu", current, force, build)
 

@@ -4,11 +4,14 @@ Beside a file whose content nothing else vouches for lies its hash; what was dam
 """
 
 import atexit
+import contextlib
 import hashlib
 import logging
 import os
 import shutil
 import tempfile
+import threading
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
@@ -57,6 +60,26 @@ def note_hash(path: Path) -> Path:
     noted = path.with_suffix(".sha256")
     noted.write_text(hashlib.sha256(path.read_bytes()).hexdigest(), encoding="ascii")
     return noted
+
+
+def remember(name: str, key: Iterable[str | bytes], make: Callable[[], bytes]) -> bytes:
+    """Return what ``make`` gives, or what it gave when all of ``key`` was the same; ``name`` begins the file's name."""
+    digest = hashlib.sha256()
+    for part in key:
+        data = part.encode() if isinstance(part, str) else part
+        digest.update(len(data).to_bytes(8, "little") + data)
+    path = cache_directory("libraries") / f"{name}-{digest.hexdigest()[:32]}.bin"
+    if is_intact(path):
+        return path.read_bytes()
+    if path.exists():
+        tell_damage(path)
+    content = make()
+    with contextlib.suppress(OSError):  # a full cache costs time, no result
+        part_of_it = path.with_name(f".{path.name}-{os.getpid()}-{threading.get_ident()}")
+        part_of_it.write_bytes(content)
+        part_of_it.replace(path)
+        note_hash(path)
+    return content
 
 
 def tell_damage(path: Path) -> None:

@@ -12,6 +12,7 @@ import os
 import platform
 import shutil
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -104,10 +105,26 @@ def compile_text(
     if (folder / name).exists():
         tell_damage(folder / name)
     try:
-        make_library(folder / name, text(), headers)
+        _link_library(folder, name, text(), headers)
     except (OSError, OutputError):  # behind walls, or a cache that is full: there is a way without
         return None
     return folder / name if is_intact(folder / name) else None
+
+
+def _link_library(folder: Path, name: str, text: str, headers: Sequence[Path]) -> None:
+    """Give a library the name that its caller knows; texts that are the same, whatever they come from, share it."""
+    digest = hashlib.sha256(text.encode())
+    for header in headers:
+        digest.update(header.read_bytes())
+    made = folder / library_file(f"text-{digest.hexdigest()[:32]}")
+    if not is_intact(made):
+        make_library(made, text, headers)
+    for source, target in ((made, folder / name), *((p.with_suffix(".sha256") for p in (made, folder / name)),)):
+        if source.exists():
+            part = target.with_name(f".{target.name}-{os.getpid()}-{threading.get_ident()}")
+            os.link(source, part)
+            part.replace(target)
+            part.unlink(missing_ok=True)  # where it is the same file already, nothing was replaced
 
 
 def library_file(stem: str, target: Platform = HERE) -> str:

@@ -39,7 +39,21 @@ def test_a_damaged_library_is_made_anew(tmp_path: Path, monkeypatch: pytest.Monk
     assert made(source) == path  # nothing is compiled when all is well
     path.unlink()  # the loaded file itself must not shrink: the linker touches its pages once more at exit
     path.touch()
+    assert made(source) == path  # the same text under another name
+    for library in tmp_path.glob("*.so"):
+        library.unlink()
     assert made(source) is None
+
+
+def test_a_text_is_compiled_once_whatever_it_comes_from(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(machine_code, "machine_code_folder", lambda: tmp_path)
+    text = "double half(double x) { return 0.5 * x; }\n"
+    first = machine_code.compile_text("one-1", lambda: text)
+    monkeypatch.setattr(machine_code, "compiler_command", lambda *target: None)
+    second = machine_code.compile_text("two-2", lambda: text)
+    assert first.name != second.name
+    assert first.read_bytes() == second.read_bytes()
+    assert machine_code.compile_text("two-3", lambda: text.replace("0.5", "0.25")) is None
 
 
 def test_no_room_means_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
