@@ -19,6 +19,8 @@ from orchestrator.estimation import design as designing
 from orchestrator.estimation.apply import UNSEEN
 from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, MachineLimits
 from orchestrator.estimation.protocol import DEFAULT_SIZE
+from orchestrator.records.columns import Column, scale_of, unit_of
+from orchestrator.records.formats.heads import head_of
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import LONGEST_STEP, natural_frequency
 from orchestrator.records.record import MINIMUM_ROWS
@@ -34,6 +36,20 @@ RANGES = {
 }
 
 
+@dataclass(frozen=True)
+class RequestUnit:
+    """How a drive takes its request: ``label`` names it with its unit; numbers are of the log's column of ``u``."""
+
+    label: str
+    scale: float
+    factor: float
+    offset: float
+
+    def number(self, torque: float) -> float:
+        """Return the number that asks for a torque [N.m]."""
+        return (torque / self.scale - self.offset) / self.factor
+
+
 @dataclass(frozen=True, repr=False)
 class DesignResult(PlottedResult):
     """Excitations for one gap, the best first.
@@ -42,6 +58,7 @@ class DesignResult(PlottedResult):
         size: half-gap that is to be seen [rad].
         time: the grid [s], shape (n,).
         candidates: what was judged: torque ``u`` [N.m] of shape (n,), and the bound on the half-gap [rad].
+        request: the unit in which the model file says that the drive takes its request; None: N.m, or volts.
         arguments: what was asked for.
     """
 
@@ -50,6 +67,7 @@ class DesignResult(PlottedResult):
     size: float
     time: NDArray[np.float64]
     candidates: tuple[Excitation, ...]
+    request: RequestUnit | None = None
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -63,7 +81,7 @@ class DesignResult(PlottedResult):
         return self.best.bound <= 0.5 * self.size
 
     def write_csv(self, path: Path | str) -> None:
-        """Write the record to run: ``time`` [s] and ``u`` [N.m].
+        """Write the best record: ``time`` [s], ``u`` [N.m], and the request as the drive takes it where that differs.
 
         Args:
             path: of the CSV file to write.
@@ -74,21 +92,33 @@ class DesignResult(PlottedResult):
         try:
             with Path(path).open("w", newline="", encoding="utf-8") as file:
                 writer = csv.writer(file)
-                writer.writerow(("time", "u"))
+                request = self.request
+                writer.writerow(("time", "u") if request is None else ("time", "u", request.label))
                 rows = zip(self.time.tolist(), self.best.u.tolist(), strict=True)
-                writer.writerows((f"{t:.9g}", f"{u:.6g}") for t, u in rows)
+                asked = (lambda u: ()) if request is None else (lambda u: (f"{request.number(u):.6g}",))
+                writer.writerows((f"{t:.9g}", f"{u:.6g}", *asked(u)) for t, u in rows)
         except OSError as error:
             raise OutputError(f"cannot write {path}: {error.strerror}") from None
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the candidates."""
+        request, best = self.request, self.best
         rows = [
-            [c.name, f"{c.bound:.2g}" if c.bound < UNSEEN else "not seen", f"{c.torque:.4g}", f"{c.speed:.4g}"]
+            [
+                c.name + " (design.csv)" * (c is best),
+                f"{c.bound:.2g}" if c.bound < UNSEEN else "not seen",
+                f"{c.torque:.4g}",
+                f"{c.speed:.4g}",
+            ]
             for c in self.candidates
         ]
         head = ("excitation", "bound on the half-gap [rad]", "peak torque [N.m]", "peak motor speed [rad/s]")
         duration = float(self.arguments["duration"])
-        return [table(f"To see a half-gap of {self.size:g} rad in {duration:g} s", head, rows)]
+        shown: list[Block] = [table(f"To see a half-gap of {self.size:g} rad in {duration:g} s", head, rows)]
+        if request is not None:
+            peak = max(abs(request.number(best.torque)), abs(request.number(-best.torque)))
+            shown.append(f"design.csv has the request in `{request.label}` too, at most {peak:.4g}.")
+        return shown
 
     def entries(self) -> tuple[ExcitationFound, ...]:
         """List the candidates that see anything, as ``estimate.json`` does.
@@ -177,4 +207,15 @@ def design(
     time, candidates = designing.design(model, size, limits, duration, rate, motor_only, progress)
     given = {"size": size, "torque_limit": torque_limit, "speed_limit": speed_limit, "duration": duration}
     given |= {"rate": rate, "motor_only": motor_only}
-    return DesignResult(size, time, tuple(candidates), given)
+    return DesignResult(size, time, tuple(candidates), _request_unit(model), given)
+
+
+def _request_unit(model: Model) -> RequestUnit | None:
+    """Return the unit of the drive's request as the model file has it."""
+    column = model.columns.get("u", Column())
+    head = head_of(column.name)
+    unit = unit_of("u", column, head.unit, column.name, model.source)
+    if unit is None or unit.kind == "voltage" or (unit.factor, column.factor, unit.kind) == (1.0, 1.0, "torque"):
+        return None
+    scale = scale_of("u", column, unit, column.name, model.source)
+    return RequestUnit(f"{head.name or 'request'} [{column.unit or head.unit}]", scale, column.factor, column.offset)

@@ -245,13 +245,21 @@ def test_a_designed_record_measures_better_on_other_machines() -> None:
 
 
 def test_limits_that_show_nothing_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--torque-limit", "0.001", "--duration", "1", "--motor-only"]
+    model = tmp_path / "machine.toml"
+    model.write_text('[columns.u]\nname = "Iq_ref [A]"\ntorque_constant = 0.42\nfactor = -1\n')
+    words = ["--torque-limit", "0.001", "--duration", "1", "--motor-only", "--model", str(model)]
     assert main(["estimate", "--design", *words, "--out", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr().out
     assert "not seen" in shown
     assert "No excitation within these limits shows a half-gap of 0.005 rad: raise `--torque-limit`" in shown
     results = json.loads((tmp_path / "out" / "estimate.json").read_text())["results"]
     assert results == {"schema_version": 1, "design": []}
+    head, *rows = (tmp_path / "out" / "design.csv").read_text().splitlines()
+    assert head == "time,u,Iq_ref [A]"
+    asked = np.array([row.split(",")[1:] for row in rows], dtype=float)
+    assert np.ptp(asked[:, 0]) > 0.0
+    assert np.allclose(asked[:, 1], -asked[:, 0] / 0.42, rtol=1e-4)
+    assert "design.csv has the request in `Iq_ref [A]` too" in shown
 
 
 @pytest.fixture(scope="module")
