@@ -20,7 +20,6 @@ from ..laws import drive, friction, stops, waves
 from ..laws.drive import UNASKED, request_rate
 from ..laws.friction import (
     BodyFriction,
-    bristle_sign,
     builds_up,
     capacity,
     directional_friction,
@@ -148,16 +147,6 @@ def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
     lag = (asked - x[2]) / p.tau if p.tau > 0.0 else 0.0
     torque = sliding_torque(x, p, u, T_l) - sign * sliding_friction(friction_of(p), x[1], x[0], 0.0)
     return (x[1], torque / inertia(x, p), lag, 0.0, follows)
-
-
-def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> State:
-    """Return the derivative of ``x``; an axis in mode 0 bends its bristle, or sticks where it has none."""
-    if mode != 0:
-        return rates(x, float(mode), p, u, T_l)
-    f = friction_of(p)
-    sign, bends = bristle_sign(f, mode, x[3], x[1], x[0], 0.0)
-    r = rates(x, sign, p, u, T_l)
-    return (r[0], r[1], r[2], bends, r[4]) if builds_up(f) else (0.0, 0.0, r[2], 0.0, r[4])
 
 
 def slip_at_rest(x: State, p: Parameters, u: float, T_l: float) -> int:

@@ -1,145 +1,78 @@
-"""The single axis as the adapters and the orchestrator use it: start, advance, read.
+"""The single axis as the adapters and the orchestrator use it: start, advance, read; outputs for model exchange.
 
-Its equations are in :mod:`axis_equations`, its integration steps in :mod:`axis_steps`.
+Its equations are in :mod:`axis_equations`; the hybrid machine moves it, bound to :mod:`hybrid_plant`.
 
 In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m]; ``mode``:
 direction of sliding, 0: none.
 """
 
-from ..laws.drive import UNASKED, ramp
-from ..laws.friction import bristle_slip, builds_up, is_dry, leaving_speed, reach
-from ..laws.parameter_rows import BIG
+from ..hybrid import machine as template
+from ..hybrid.binding import bind
+from ..laws.drive import saturated
+from ..laws.friction import is_dry
+from . import hybrid_plant
 from .axis_equations import (
     Parameters,
     State,
     drive_torque,
-    filtered,
     friction_of,
     inertia,
     initial_mode,
-    mode_rates,
     past_stop,
     rates,
     sliding_torque,
-    slip_at_rest,
     start,
 )
-from .axis_steps import BREAKS, MEETS, SLOWS, event_time, held, longest_step, smooth_step
+from .hybrid_plant import Mode, mode_rates
 
 __all__ = [
     "State", "advance", "advance_to_event", "drive_torque", "inertia", "initial_mode", "mode_rates",
     "past_stop", "rates", "sliding_torque", "start",
 ]  # fmt: skip
 
-# Integration steps that one communication step may take, and how many more for each second of it.
-MAX_STEPS = 20000
-MAX_STEPS_PER_SECOND = 20000.0
+Indicators = tuple[float, float]
+Outputs = tuple[float, float, float]
+
+machine = bind(template, hybrid_plant)
+# Direction of sliding before the first request, which decides.
+UNDECIDED = 2
 
 
 def advance(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, int]:
-    """Return state and direction of sliding after ``h`` [s], positive, with the inputs held; stops are located.
-
-    The state is NaN where damping, lag or ripple are so quick that no sensible number of steps resolves them.
-    """
-    if x[4] == UNASKED and filtered(p):
-        x = (x[0], x[1], x[2], x[3], u)
-    if p.rate_limit_rate >= BIG:
-        return advance_request(x, mode, p, u, T_l, h)
-    duration, target, end = ramp(x[4], u, p.drive_filter_time_constant, p.rate_limit_rate, h)
-    if duration > 0.0:
-        x, mode = advance_request(x, mode, p, target, T_l, duration)
-    if duration < h:
-        if duration > 0.0:
-            x = (x[0], x[1], x[2], x[3], end)
-        x, mode = advance_request(x, mode, p, u, T_l, h - duration)
-    return (x, mode)
-
-
-def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, int]:
-    """Return :func:`advance` for a request whose ramp does not end inside the step."""
-    elapsed = 0.0
-    pieces = 0
-    event = True
-    while event:
-        x, mode, elapsed, pieces, event = request_to_event(x, mode, p, u, T_l, h, elapsed, pieces)
-    return (x, mode)
+    """Return state and direction of sliding after ``h`` [s], positive, with the inputs held; NaN if it is too stiff."""
+    x, after = machine.advance(x, (mode, past_stop(x, p)), p, u, T_l, h)
+    return (x, after[0])
 
 
 def advance_to_event(
     x: State, mode: int, p: Parameters, u: float, T_l: float, h: float
-) -> tuple[State, int, float, bool]:
+) -> tuple[State, int, float, int]:
     """Return :func:`advance` over at most ``h`` [s], positive, up to the first event, its effect included.
 
     Returns:
-        State, direction of sliding, how far it is [s], and whether there is an event.
+        State, direction of sliding, how far it is [s], and the number of the event (``NO_EVENT``: there is none).
     """
-    if x[4] == UNASKED and filtered(p):
-        x = (x[0], x[1], x[2], x[3], u)
-    duration = 0.0
-    if p.rate_limit_rate < BIG:
-        duration, target, end = ramp(x[4], u, p.drive_filter_time_constant, p.rate_limit_rate, h)
-        if duration > 0.0:
-            x, mode, elapsed, _, event = request_to_event(x, mode, p, target, T_l, duration, 0.0, 0)
-            if event or duration >= h:
-                return (x, mode, elapsed, event)
-            x = (x[0], x[1], x[2], x[3], end)
-    x, mode, elapsed, _, event = request_to_event(x, mode, p, u, T_l, h - duration, 0.0, 0)
-    return (x, mode, duration + elapsed, event)
+    x, after, elapsed, which = machine.advance_to_event(x, (mode, past_stop(x, p)), p, u, T_l, h)
+    x, after, _ = machine.after_events(x, after, which, 0, p, u, T_l)
+    return (x, after[0], elapsed, which)
 
 
-def request_to_event(
-    x: State, mode: int, p: Parameters, u: float, T_l: float, h: float, elapsed: float, pieces: int
-) -> tuple[State, int, float, int, bool]:
-    """Return the solution right after its next event, or at the end of a step: it breaks away, stops, or meets a stop.
-
-    An axis that breaks away is still at rest; its direction follows from the torque of what comes next. ``x`` is at the
-    time ``elapsed`` [s] since the beginning of the step.
-    """
+def decided(x: State, mode: int, p: Parameters, u: float) -> int:
+    """Return the direction of sliding (-1, 0, 1), from state and request if nothing has decided it yet."""
+    if mode == UNDECIDED:
+        mode = initial_mode(x, p, u)
     f = friction_of(p)
-    bends = builds_up(f)
-    dry = is_dry(f)
-    least = leaving_speed(f)
-    if mode == 0 and not dry:
-        mode = 1
-    most = MAX_STEPS + int(MAX_STEPS_PER_SECOND * h)
-    while h - elapsed > 1e-12 * h:
-        pieces += 1
-        if pieces > most:
-            nan = float("nan")
-            return ((nan, nan, nan, nan, nan), mode, h, pieces, False)
-        step = min(longest_step(x, mode, p, u, T_l, h), h - elapsed)
-        if dry and not bends and mode == 0:
-            mode = slip_at_rest(x, p, u, T_l)
-            if mode == 0:
-                stays = held(x, p, u, T_l, step)
-                breaks = slip_at_rest(stays, p, u, T_l) != 0
-                if breaks:
-                    step = event_time(BREAKS, x, mode, p, u, T_l, step, least)
-                    stays = held(x, p, u, T_l, step)
-                x = stays
-                elapsed += step
-                if breaks:
-                    return (x, mode, elapsed, pieces, True)
-                continue
-        moved = smooth_step(x, mode, p, u, T_l, step)
-        meets = past_stop(x, p) != past_stop(moved, p)
-        if meets:
-            step = event_time(MEETS, x, mode, p, u, T_l, step, least)
-            moved = smooth_step(x, mode, p, u, T_l, step)
-        if dry and mode != 0 and moved[1] * mode < least:
-            step = event_time(SLOWS, x, mode, p, u, T_l, step, least)
-            moved = smooth_step(x, mode, p, u, T_l, step)
-            if bends:
-                x = (moved[0], moved[1], moved[2], mode * reach(f, moved[1], moved[0], 0.0), moved[4])
-                mode = 0
-            else:
-                x = (moved[0], 0.0, moved[2], moved[3], moved[4])
-                mode = slip_at_rest(x, p, u, T_l)
-            return (x, mode, elapsed + step, pieces, True)
-        x = moved
-        if bends and mode == 0:
-            mode = bristle_slip(f, mode, x[3], x[1], x[0], 0.0)
-        elapsed += step
-        if meets:
-            return (x, mode, elapsed, pieces, True)
-    return (x, mode, elapsed, pieces, False)
+    return 1 if mode == 0 and not is_dry(f) else mode
+
+
+def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) -> tuple[State, Outputs]:
+    """Return the derivatives, and the outputs theta_m, omega_m and T_m; limits ``u``."""
+    asked = saturated(u, p.torque_saturation_limit)
+    outputs = (x[0] + p.sensor_offset_motor_offset, x[1], drive_torque(x, p, asked))
+    return (mode_rates(x, (mode, 0), p, asked, T_l), outputs)
+
+
+def after_events(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: float) -> tuple[State, Mode]:
+    """Return the state, and direction of sliding and end stop (-1, 0: none, 1) once none of them is at its end."""
+    x, after, _ = machine.settled(x, (decided(x, mode, p, u), stop), 0, p, u, T_l)
+    return (x, after)

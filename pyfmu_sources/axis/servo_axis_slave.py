@@ -11,8 +11,7 @@ from ..adapters.slave_base import TOO_STIFF, StepRefusedError
 from ..hybrid.event_numbers import NO_EVENT
 from . import servo_axis
 from .axis_equations import PARAMETERS, AxisParameters
-from .servo_axis import State
-from .servo_axis_modes import UNDECIDED, Indicators, Outputs, after_events, decided, indicators, rates_and_outputs
+from .servo_axis import UNDECIDED, Indicators, Outputs, State, decided, rates_and_outputs
 
 THETA_M, OMEGA_M, T_M = range(T_L + 1, T_L + 4)
 FIRST_PARAMETER = T_M + 1
@@ -76,8 +75,7 @@ class ServoAxis(PlantSlave):
     def _moved_to_event(self, x: State, mode: int, u: float, time: float, step: float) -> tuple[State, int, float, int]:
         if mode == UNDECIDED:
             mode = servo_axis.initial_mode(x, self._p, u)
-        x, mode, taken, event = servo_axis.advance_to_event(x, mode, self._p, u, self.real[T_L], step)
-        return (x, mode, taken, 0 if event else NO_EVENT)
+        return servo_axis.advance_to_event(x, mode, self._p, u, self.real[T_L], step)
 
     def _take(self, x: State, mode: int, acting: float, step: float) -> None:
         if x[0] != x[0]:
@@ -93,7 +91,7 @@ class ServoAxis(PlantSlave):
         """Return the derivatives of the state."""
         u = self._acting_request()
         mode = decided(self._x, self._mode, self._p, u)
-        return servo_axis.mode_rates(self._x, mode, self._p, u, self.real[T_L])
+        return servo_axis.mode_rates(self._x, (mode, self._end_stop), self._p, u, self.real[T_L])
 
     def output_rates(self) -> Outputs:
         """Return the derivatives of the outputs, SI units per second; a drive without a lag holds its torque."""
@@ -102,15 +100,16 @@ class ServoAxis(PlantSlave):
 
     def indicators(self) -> Indicators:
         """Return the event indicators, for model exchange."""
-        return indicators(self._x, self._mode, self._end_stop, self._p, self._request(), self.real[T_L])
+        mode = (self._mode, self._end_stop)
+        return servo_axis.machine.indicators(self._x, mode, self._p, self._request(), self.real[T_L])
 
     def update(self, time: float) -> None:
         """Settle state and mode at an event at ``time`` [s], at the inputs of the moment."""
         u = self._acting_request()
-        x, mode, stop = after_events(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
+        x, mode = servo_axis.after_events(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
         self._x = x
-        self._mode = mode
-        self._end_stop = stop
+        self._mode = mode[0]
+        self._end_stop = mode[1]
         self._event = NO_EVENT
         self.observe()
 

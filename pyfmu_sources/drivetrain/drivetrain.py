@@ -1,7 +1,7 @@
 """The drivetrain as the adapters and the orchestrator use it: prepare, start, advance, read.
 
 A step of ``h`` seconds with held inputs goes to the exact linear solution when no nonlinear effect is on
-(:mod:`linear_mode`), else to the integrator with event location (:mod:`smooth_mode`).
+(:mod:`linear_mode`), else to the hybrid machine (:mod:`smooth_mode`).
 
 In all functions: ``h``: length of the step [s]; ``u``: requested torque [N.m], delayed and saturated already;
 ``T_l``: load torque [N.m]; ``table``: ``prepare(p, h)`` of the same ``p`` and ``h``.
@@ -11,9 +11,7 @@ from math import exp
 
 from ..hybrid.event_numbers import NO_EVENT, TOO_MUCH
 from ..laws.backlash_models import NONE
-from ..laws.drive import UNASKED, ramp
-from ..laws.parameter_rows import BIG
-from .contact import asked, consistent_start, initial_contact
+from .contact import consistent_start, initial_contact
 from .dry_friction import shaft_torque, slips
 from .equations import (
     DEFAULTS,
@@ -30,7 +28,7 @@ from .equations import (
 )
 from .linear_mode import law_of
 from .linear_steps import Table, advance_linear, leap, linear_to_event
-from .smooth_mode import advance_smooth, advance_smooth_to_event, refused
+from .smooth_mode import advance_smooth, refused, smooth_to_event
 from .transition import relaxation_rate, transition
 
 __all__ = [
@@ -82,28 +80,12 @@ def reported_contact(x: State, mode: Mode, p: Parameters) -> int:
 def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, table: Table) -> tuple[State, Mode]:
     """Return state and mode after ``h`` [s], positive, with the inputs held."""
     if table[4]:
-        if x[11] == UNASKED and (p.drive_filter_time_constant > 0.0 or p.rate_limit_rate < BIG):
-            x = asked(x, u)
-        if p.rate_limit_rate < BIG:
-            return advance_ramp(x, mode, p, u, T_l, h)
         return advance_smooth(x, mode, p, u, T_l, h)
     if not is_rigid(p):
         moved, clear = leap(x, mode[0], p, u, T_l + p.load_torque_torque, h, table)
         if clear:
             return (moved, mode)
     return advance_linear(x, mode, p, u, T_l + p.load_torque_torque, h, table[2])
-
-
-def advance_ramp(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, Mode]:
-    """Return state and mode after ``h`` [s] of a drive limited in its rate; the end of a ramp is met exactly."""
-    duration, target, end = ramp(x[11], u, p.drive_filter_time_constant, p.rate_limit_rate, h)
-    if duration > 0.0:
-        x, mode = advance_smooth(x, mode, p, target, T_l, duration)
-    if duration < h:
-        if duration > 0.0:
-            x = asked(x, end)
-        x, mode = advance_smooth(x, mode, p, u, T_l, h - duration)
-    return (x, mode)
 
 
 def advance_to_event(
@@ -115,28 +97,10 @@ def advance_to_event(
         State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
     """
     if table[4]:
-        if x[11] == UNASKED and (p.drive_filter_time_constant > 0.0 or p.rate_limit_rate < BIG):
-            x = asked(x, u)
-        if p.rate_limit_rate < BIG:
-            return ramp_to_event(x, mode, p, u, T_l, h)
-        return advance_smooth_to_event(x, mode, p, u, T_l, h)
+        return smooth_to_event(x, mode, p, u, T_l, h)
     if not is_rigid(p):
         moved, clear = leap(x, mode[0], p, u, T_l + p.load_torque_torque, h, table)
         if clear:
             return (moved, mode, h, NO_EVENT)
     x, elapsed, _, which = linear_to_event(x, mode[0], p, u, T_l + p.load_torque_torque, h, table[2], 0.0, 0)
     return (refused(x) if which == TOO_MUCH else x, mode, elapsed, which)
-
-
-def ramp_to_event(
-    x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float
-) -> tuple[State, Mode, float, int]:
-    """Return :func:`advance_ramp` up to the first event, as :func:`advance_to_event` does."""
-    duration, target, end = ramp(x[11], u, p.drive_filter_time_constant, p.rate_limit_rate, h)
-    if duration > 0.0:
-        x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, target, T_l, duration)
-        if which != NO_EVENT or duration >= h:
-            return (x, mode, elapsed, which)
-        x = asked(x, end)
-    x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, u, T_l, h - duration)
-    return (x, mode, duration + elapsed, which)

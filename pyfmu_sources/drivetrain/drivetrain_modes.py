@@ -1,25 +1,18 @@
-"""The drivetrain as model exchange sees it: state derivatives, event indicators, what follows at an event.
-
-The laws and their guards are those of :mod:`smooth_events`; here they are without the integrator, which is the host's.
+"""The drivetrain as model exchange sees it: derivatives of states and outputs; the integrator is the host's.
 
 In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
 from typing import Annotated
 
-from ..hybrid.event_numbers import NO_EVENT
 from ..laws.drive import saturated
-from .dormand_prince import mode_rates
-from .dry_friction import NEVER, shaft_torque
+from .dry_friction import shaft_torque
 from .equations import Mode, Parameters, State
-from .smooth_events import GUARDS, guard, guard_room, settled, switched
+from .hybrid_plant import GUARDS, mode_rates
 
 Indicators = Annotated[tuple[float, ...], GUARDS]
 Outputs = tuple[float, float, float, float, float, float]
 
-# An indicator turns negative when its guard is this many roundings below zero, so that the event update, which
-# wants one, surely finds it violated.
-ROOMS = 2.0
 # Events that follow each other within this time [s] are chattering, as events within one communication step are.
 QUIET = 1e-3
 # Half the time [s] over which the derivative of the shaft's torque is taken: rounding and curvature are equally small.
@@ -41,19 +34,6 @@ def rates_and_outputs(x: State, mode: Mode, p: Parameters, u: float, T_l: float)
     return (state_rates(x, mode, p, saturated(u, p.torque_saturation_limit), T_l), outputs)
 
 
-def indicator(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: float) -> float:
-    """Return the event indicator ``which`` (0, 1: contact; 2: motor's friction; 3: load's), 1 if it is not in use."""
-    value = guard(x, mode, which, p, u, T_l)
-    if value >= NEVER:
-        return 1.0
-    return value + ROOMS * guard_room(x, mode, which, p)
-
-
-def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Indicators:
-    """Return all event indicators; the mode ends when one turns negative."""
-    return tuple(indicator(x, mode, which, p, u, T_l) for which in range(GUARDS))
-
-
 def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Outputs:
     """Return the derivatives of the outputs of :func:`rates_and_outputs` [1/s]; of T_shaft by a central difference."""
     r = state_rates(x, mode, p, u, T_l)
@@ -68,13 +48,3 @@ def along(x: State, r: State, h: float) -> State:
         x[0] + h * r[0], x[1] + h * r[1], x[2] + h * r[2], x[3] + h * r[3], x[4] + h * r[4], x[5] + h * r[5],
         x[6] + h * r[6], x[7] + h * r[7], x[8] + h * r[8], x[9] + h * r[9], x[10] + h * r[10], x[11],
     )  # fmt: skip
-
-
-def after_events(
-    x: State, mode: Mode, which: int, events: int, p: Parameters, u: float, T_l: float
-) -> tuple[State, Mode, int]:
-    """Return state, mode and number of events in a row once no guard is violated."""
-    if which != NO_EVENT:
-        x, mode = switched(x, mode, which, events, p, u, T_l)
-        events += 1
-    return settled(x, mode, events, p, u, T_l)

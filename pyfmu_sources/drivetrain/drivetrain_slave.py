@@ -14,17 +14,9 @@ from ..laws.parameter_rows import Parameter
 from . import drivetrain
 from .contact import asked
 from .drivetrain import Mode, Parameters, State, Table
-from .drivetrain_modes import (
-    QUIET,
-    Indicators,
-    Outputs,
-    after_events,
-    indicators,
-    output_rates,
-    rates_and_outputs,
-    state_rates,
-)
+from .drivetrain_modes import QUIET, Indicators, Outputs, output_rates, rates_and_outputs, state_rates
 from .equations import NAMES, PARAMETERS
+from .smooth_mode import after_events, indicators
 
 THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(T_L + 1, T_L + 8)
 FIRST_PARAMETER = CONTACT + 1

@@ -16,7 +16,7 @@ from .transition import fastest_rate
 # Transitions with and without contact, relaxation of a parted shaft (rate, and factor of a step), whether nonlinear.
 Table = tuple[Transition, Transition, float, float, bool]
 
-# Work that one communication step may take, and how much more for each second of it; see ``smooth_mode``.
+# Work that one communication step may take, and how much more for each second of it; see ``hybrid.machine``.
 MAX_EVENTS = 5000
 MAX_PIECES = 1000
 MAX_PIECES_PER_SECOND = 20000.0

@@ -73,13 +73,13 @@ def stepped(slave, values, inputs, model=None):
 def work(monkeypatch):
     """The number of integration steps that are taken."""
     count = [0]
-    step = smooth_mode.runge_kutta
+    step = smooth_mode.machine.runge_kutta
 
     def counted(*arguments):
         count[0] += 1
         return step(*arguments)
 
-    monkeypatch.setattr(smooth_mode, "runge_kutta", counted)
+    monkeypatch.setattr(smooth_mode.machine, "runge_kutta", counted)
     return count
 
 
@@ -89,7 +89,7 @@ def work(monkeypatch):
 def test_a_drivetrain_of_extreme_values_ends_or_says_why_not(values, torque, model, work):
     said = stepped(Drivetrain(instance_name="a"), values, {"u": torque, "T_l": 0.0}, model)
     assert all(any(reason in text for reason in REASONS) for text in said), said
-    assert work[0] <= STEPS * (smooth_mode.MAX_STEPS + STEP * smooth_mode.MAX_STEPS_PER_SECOND)
+    assert work[0] <= STEPS * (smooth_mode.machine.MAX_STEPS + STEP * smooth_mode.machine.MAX_STEPS_PER_SECOND)
 
 
 @pytest.mark.parametrize("torque", [1.0, 1e12])

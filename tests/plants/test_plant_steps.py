@@ -40,13 +40,13 @@ def run(p, torques, h, start=(0.0,) * 8, T_l=0.0, source=drivetrain):
 def counted(monkeypatch):
     """Count the integration steps of the plain source."""
     calls = [0]
-    step = smooth_mode.runge_kutta
+    step = smooth_mode.machine.runge_kutta
 
     def counting(*arguments):
         calls[0] += 1
         return step(*arguments)
 
-    monkeypatch.setattr(smooth_mode, "runge_kutta", counting)
+    monkeypatch.setattr(smooth_mode.machine, "runge_kutta", counting)
     return calls
 
 

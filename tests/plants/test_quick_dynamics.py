@@ -112,7 +112,7 @@ def counted(monkeypatch, module, name) -> list[int]:
 )
 def test_an_axis_takes_short_steps_only_while_they_are_needed(monkeypatch, values):
     """A step follows the lag while the torque is behind, and falling friction while the speed is near its own."""
-    steps, p = counted(monkeypatch, servo_axis, "smooth_step"), axis({"J": 0.0023, "b": 0.046} | values)
+    steps, p = counted(monkeypatch, servo_axis.machine, "runge_kutta"), axis({"J": 0.0023, "b": 0.046} | values)
     x, mode = servo_axis.start(0.0, 0.5, 0.0, p), 1
     for n in range(25):
         x, mode = servo_axis.advance(x, mode, p, 0.3 * math.sin(0.35 * n + 0.3), 0.0, 8e-3)
@@ -121,7 +121,7 @@ def test_an_axis_takes_short_steps_only_while_they_are_needed(monkeypatch, value
 
 
 def test_a_quick_drive_asks_a_drivetrain_for_no_short_steps(monkeypatch):
-    steps = counted(monkeypatch, smooth_mode, "runge_kutta")
+    steps = counted(monkeypatch, smooth_mode.machine, "runge_kutta")
     p = with_values(parameters(tau=1e-6), {"effects.gravity_load.amplitude": 0.5})
     x = drivetrain.consistent_start((0.0,) * 12, p)
     mode, table = drivetrain.initial_mode(x, p), drivetrain.prepare(p, 1.2e-3)

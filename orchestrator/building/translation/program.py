@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -173,7 +174,7 @@ class Program:
             if function.module != module:
                 module = function.module
                 first = docstring(self._sources[module].tree).split("\n\n")[0]
-                title = f"{module.replace('.', '/')}.py: {first}"
+                title = f"{module.partition('[')[0].replace('.', '/')}.py: {first}"
                 parts.append(f"/* {'-' * 110} */\n{comment_of(title)}".rstrip())
             parts.append(function.text)
         return "\n\n".join(parts)
@@ -184,8 +185,8 @@ class Program:
 
 
 def _name_in(module: str, name: str) -> str:
-    """Return a name in C with that of its module, ``laws.friction``, in front."""
-    return f"{module.replace('.', '_')}_{name}"
+    """Return a name in C with that of its module, ``laws.friction`` or ``hybrid.machine[axis]``, in front."""
+    return f"{re.sub(r'[^A-Za-z0-9]+', '_', module).strip('_')}_{name}"
 
 
 def _function_in_c(source: ModuleSource, node: ast.FunctionDef) -> Function:

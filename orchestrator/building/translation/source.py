@@ -105,7 +105,7 @@ def read_source(name: str) -> ModuleSource:
         raise FmuError(f"the source {name} cannot be read: {error}") from None
     functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
     remarks, whole = _remarks(content)
-    short = name.partition("[")[0].removeprefix(f"{PACKAGE}.")
+    short = name.removeprefix(f"{PACKAGE}.") if name.startswith(f"{PACKAGE}.") else name.partition("[")[0]
     return ModuleSource(short, _relative_path(path), tree, module, functions, remarks, whole)
 
 

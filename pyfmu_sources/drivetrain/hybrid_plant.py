@@ -1,4 +1,4 @@
-"""The events of the drivetrain with nonlinear effects: what ends a smooth mode, and what follows it.
+"""The drivetrain with nonlinear effects as the hybrid machine asks for it: rates in a mode, what ends it, what follows.
 
 Dry friction is set-valued: a sliding part whose speed reaches zero sticks when the torque on it stays below the
 breakaway torque, else it slides on the other way.
@@ -7,9 +7,9 @@ In all functions: ``u``: requested torque [N.m], delayed and saturated already; 
 """
 
 from ..laws.backlash_models import BOUNCING, HELD, NONE
-from ..laws.friction import builds_up, reach
-from .bristles import bent, capacity_l, capacity_m, carried_l, carried_m
-from .contact import after_event, join_teeth, on_flank, stop_bodies
+from ..laws.friction import bristle_sign, builds_up, reach
+from .bristles import bent, capacity_l, capacity_m, carried_l, carried_m, settled_slips
+from .contact import after_event, asked, join_teeth, on_flank, stop_bodies
 from .dry_friction import (
     LOAD,
     MOTOR,
@@ -36,13 +36,38 @@ from .equations import (
     load_torque,
     motor_friction,
     motor_torque,
+    rates,
     rigid_acceleration,
     teeth_never_pull,
     twist,
     twist_rate,
 )
 
+__all__ = [
+    "COUNT", "DRIVE", "GUARDS", "REQUEST", "Mode", "Parameters", "State", "asked", "begin_step", "end_step", "guard",
+    "guard_room", "mode_rates", "switched", "turning", "with_drive",
+]  # fmt: skip
+
+COUNT = 12
+DRIVE, REQUEST = 4, 11
 GUARDS = 4
+
+
+def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
+    """Return the derivative of ``x`` in ``mode``; what sticks does not move."""
+    contact, slip_m, slip_l = mode
+    if slip_m != 0 and slip_l != 0:
+        return rates(x, contact, float(slip_m), float(slip_l), p, u, T_l)
+    motor, load = motor_friction(p), load_friction(p)
+    sign_m, bends_m = bristle_sign(motor, slip_m, x[8], x[1], x[0], carried_m(x, contact, p))
+    sign_l, bends_l = bristle_sign(load, slip_l, x[9], x[3], x[2], carried_l(x, contact, p))
+    r = rates(x, contact, sign_m, sign_l, p, u, T_l)
+    still_m = slip_m == 0 and not builds_up(motor)
+    still_l = slip_l == 0 and not builds_up(load)
+    return (
+        0.0 if still_m else r[0], 0.0 if still_m else r[1], 0.0 if still_l else r[2], 0.0 if still_l else r[3], r[4],
+        r[5], r[6], r[7], bends_m, bends_l, r[10], r[11],
+    )  # fmt: skip
 
 
 def guard(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: float) -> float:
@@ -92,20 +117,6 @@ def guard_room(x: State, mode: Mode, which: int, p: Parameters) -> float:
     return 1e-11 * (1.0 + abs(x[4]))
 
 
-def violated(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> int:
-    """Return the guard that ``x`` violates most, relative to its room, or -1."""
-    worst = -1
-    depth = 1.0
-    for which in range(GUARDS):
-        value = guard(x, mode, which, p, u, T_l)
-        if value < 0.0:
-            excess = -value / guard_room(x, mode, which, p)
-            if excess > depth:
-                depth = excess
-                worst = which
-    return worst
-
-
 def switched(x: State, mode: Mode, which: int, events: int, p: Parameters, u: float, T_l: float) -> tuple[State, Mode]:
     """Return state and mode after the guard ``which`` has ended ``mode``."""
     contact, slip_m, slip_l = mode
@@ -145,18 +156,7 @@ def switched(x: State, mode: Mode, which: int, events: int, p: Parameters, u: fl
     return (x, (follows, slip_m, slip_l))
 
 
-def settled(x: State, mode: Mode, events: int, p: Parameters, u: float, T_l: float) -> tuple[State, Mode, int]:
-    """Return state and mode once no guard is violated any more at this moment."""
-    for _ in range(2 * GUARDS):
-        which = violated(x, mode, p, u, T_l)
-        if which < 0:
-            break
-        x, mode = switched(x, mode, which, events, p, u, T_l)
-        events += 1
-    return (x, mode, events)
-
-
-def joined_body(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State, Mode]:
+def begin_step(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State, Mode]:
     """Return state and mode with rigid teeth in contact at one flank, one speed and one direction of friction."""
     contact = mode[0]
     if contact == 0 or not is_rigid(p):
@@ -166,3 +166,32 @@ def joined_body(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State,
         slip_m, slip_l = slips(x, contact, p, T_l)
         return (x, (contact, slip_m, slip_l))
     return (x, mode)
+
+
+def turning(x: State, k1: State, after: State, k7: State, mode: Mode, p: Parameters, h: float) -> float:
+    """Return the moment [s] inside a step at which a twist or a speed turns back, or 0 when none does."""
+    turn = 0.0
+    rate = twist_rate(x, p)
+    rate_after = twist_rate(after, p)
+    if (mode[0] != 0 and direction(mode[0]) * rate < 0.0 < direction(mode[0]) * rate_after) or (
+        mode[0] == 0 and rate * rate_after < 0.0
+    ):
+        turn = h * rate / (rate - rate_after)
+    if mode[1] * k1[1] < 0.0 < mode[1] * k7[1]:
+        turn = h * k1[1] / (k1[1] - k7[1])
+    if mode[2] * k1[3] < 0.0 < mode[2] * k7[3]:
+        turn = h * k1[3] / (k1[3] - k7[3])
+    return turn
+
+
+def end_step(x: State, mode: Mode, p: Parameters) -> tuple[Mode, bool]:
+    """Return the mode after a step of the integrator, in which a settled bristle slides, and whether it is new."""
+    if mode[1] != 0 and mode[2] != 0:
+        return (mode, False)
+    follows = settled_slips(x, mode, p)
+    return (follows, follows[1] != mode[1] or follows[2] != mode[2])
+
+
+def with_drive(x: State, torque: float) -> State:
+    """Return the state with the ``torque`` [N.m] of the motor behind its lag."""
+    return (x[0], x[1], x[2], x[3], torque, x[5], x[6], x[7], x[8], x[9], x[10], x[11])
