@@ -11,7 +11,7 @@ from ..adapters.slave_base import TOO_STIFF, StepRefusedError
 from ..hybrid.event_numbers import NO_EVENT
 from . import servo_axis
 from .axis_equations import PARAMETERS, AxisParameters
-from .servo_axis import UNDECIDED, Indicators, Outputs, State, decided, rates_and_outputs
+from .servo_axis import UNDECIDED, Indicators, Outputs, State, decided, machine, rates_and_outputs
 
 THETA_M, OMEGA_M, T_M = range(T_L + 1, T_L + 4)
 FIRST_PARAMETER = T_M + 1
@@ -101,7 +101,7 @@ class ServoAxis(PlantSlave):
     def indicators(self) -> Indicators:
         """Return the event indicators, for model exchange."""
         mode = (self._mode, self._end_stop)
-        return servo_axis.machine.indicators(self._x, mode, self._p, self._request(), self.real[T_L])
+        return machine.indicators(self._x, mode, self._p, self._request(), self.real[T_L])
 
     def update(self, time: float) -> None:
         """Settle state and mode at an event at ``time`` [s], at the inputs of the moment."""
