@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.effects.effect import Bounds, Effect, PlaceScales, Starts
-from pyfmu_sources.laws import port as laws
+from pyfmu_sources.laws import body as laws
 
 Array = NDArray[np.float64]
 Values = tuple[float, ...]

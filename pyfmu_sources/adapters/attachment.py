@@ -1,7 +1,7 @@
 """An effect attached to an FMU: the same arithmetic as in the loop that fitted it, one communication step at a time.
 
 ``AttachedEffect`` stands between a signal and an input (or behind an output), adds the force of a law of
-:mod:`laws.port` to it, lies in a connection between two FMUs, or sets a parameter that changes.
+:mod:`laws.body` to it, lies in a connection between two FMUs, or sets a parameter that changes.
 It is built with PythonFMU into each corrected system.
 """
 
@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
-from ..laws.port import across, built_up, cuts, distance_of, has_memory, resistance
+from ..laws.body import across, built_up, cuts, distance_of, has_memory, resistance
 
 FEEDBACK = "feedback"
 SERIES = (

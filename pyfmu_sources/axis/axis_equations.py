@@ -14,22 +14,21 @@ same, the model file states the unit.
 In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
+import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..laws import drive, friction, stops, waves
+from ..hybrid.binding import bind
+from ..laws import body, drive, friction, stops, waves
 from ..laws.drive import UNASKED, request_rate
 from ..laws.friction import (
     BodyFriction,
     builds_up,
     capacity,
     directional_friction,
-    quadratic_drag,
     sliding_friction,
     start_bristle,
 )
 from ..laws.parameter_rows import BIG, TINY, Parameter, field_name, keep_last, mark_linear
-from ..laws.stops import end_stop_torque, spring_torque
-from ..laws.waves import inertia_at, inertia_torque, periodic
 
 PARAMETERS = (
     *mark_linear(
@@ -53,6 +52,7 @@ PARAMETERS = (
     *stops.SPRING,
     *stops.END_STOPS,
     *waves.VARYING_INERTIA,
+    *body.FURTHER,
 )
 
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
@@ -67,6 +67,7 @@ DEFAULTS = AxisParameters(*(parameter.default for parameter in PARAMETERS))
 
 State = tuple[float, float, float, float, float]
 Parameters = AxisParameters
+of_body = bind(body, sys.modules[__name__])
 
 
 def start(position: float, speed: float, drive: float, p: Parameters) -> State:
@@ -100,37 +101,14 @@ def drive_torque(x: State, p: Parameters, u: float) -> float:
 
 def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
     """Return the torque on the axis [N.m] of all but dry friction."""
-    torque = drive_torque(x, p, u) + periodic(
-        x[0], p.torque_ripple_amplitude, p.torque_ripple_cycles_per_rev, p.torque_ripple_phase
-    )
-    if p.torque_ripple_second_amplitude != 0.0 or p.torque_ripple_third_amplitude != 0.0:
-        torque += periodic(
-            x[0], p.torque_ripple_second_amplitude, 2.0 * p.torque_ripple_cycles_per_rev, p.torque_ripple_second_phase
-        )
-        torque += periodic(
-            x[0], p.torque_ripple_third_amplitude, 3.0 * p.torque_ripple_cycles_per_rev, p.torque_ripple_third_phase
-        )
-    torque -= p.b * x[1] + quadratic_drag(x[1], p.quadratic_drag_coefficient) + p.load_torque_torque + T_l
-    torque -= directional_friction(x[1], p.directional_friction_motor_difference)
-    torque -= periodic(x[0], p.gravity_load_amplitude, 1.0, p.gravity_load_phase)
-    if p.spring_load_stiffness != 0.0 or p.spring_load_cubic != 0.0:
-        torque -= spring_torque(x[0], p.spring_load_stiffness, p.spring_load_cubic, p.spring_load_angle)
-    if x[0] > p.end_stop_upper or x[0] < p.end_stop_lower:
-        torque -= end_stop_torque(
-            x[0], x[1], p.end_stop_lower, p.end_stop_upper, p.end_stop_stiffness, p.end_stop_dissipation
-        )
-    if p.varying_inertia_amplitude != 0.0:
-        torque -= inertia_torque(
-            x[0], x[1], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
-        )
-    return torque
+    against = of_body.resisted(p.b * x[1] + p.load_torque_torque + T_l, x[0], x[1], p)
+    against += directional_friction(x[1], p.directional_friction_motor_difference)
+    return drive_torque(x, p, u) + of_body.ripple(x[0], p) - against
 
 
 def inertia(x: State, p: Parameters) -> float:
-    """Return the inertia [kg.m2] at a position; a wave larger than it leaves a thousandth of it."""
-    if p.varying_inertia_amplitude == 0.0:
-        return p.J
-    return inertia_at(p.J, x[0], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase)
+    """Return the inertia [kg.m2] at a position."""
+    return of_body.inertia_of(p.J, x[0], p)
 
 
 def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:

@@ -20,9 +20,11 @@ In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where bot
 friction, -1 to 1; ``T_l``: load torque [N.m].
 """
 
+import sys
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..laws import drive, friction, shaft, stops, waves
+from ..hybrid.binding import bind
+from ..laws import body, drive, friction, shaft, stops, waves
 from ..laws.backlash_models import (
     DEAD_ZONE,
     GRADUAL,
@@ -35,11 +37,10 @@ from ..laws.backlash_models import (
     RIGID,
 )
 from ..laws.drive import request_rate
-from ..laws.friction import BodyFriction, directional_friction, quadratic_drag, sliding_friction
+from ..laws.friction import BodyFriction, directional_friction, sliding_friction
 from ..laws.parameter_rows import BIG, TINY, Parameter, field_name, keep_last, mark_linear, with_values
 from ..laws.shaft import hardening_torque, hysteresis_rate, resonance_torque, set_in
-from ..laws.stops import end_stop_torque, spring_torque
-from ..laws.waves import inertia_at, inertia_torque, periodic, periodic_curvature, periodic_slope
+from ..laws.waves import periodic, periodic_curvature, periodic_slope
 
 # Of the plant without effects.
 PLAIN = mark_linear(
@@ -82,6 +83,7 @@ PARAMETERS = (
     *stops.END_STOPS,
     *waves.VARYING_INERTIA,
     *shaft.TEETH,
+    *body.FURTHER,
 )
 
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
@@ -98,6 +100,7 @@ DEFAULTS = DrivetrainParameters(*(parameter.default for parameter in PARAMETERS)
 State = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 Mode = tuple[int, int, int]
 Parameters = DrivetrainParameters
+of_body = bind(body, sys.modules[__name__])
 
 # An eccentric gear whose ratio passes through infinity has no meaning; below this slope the ratio is cut off.
 SMALLEST_SLOPE = 1e-12
@@ -223,20 +226,13 @@ motor_friction = keep_last(_motor_friction)
 load_friction = keep_last(_load_friction)
 
 
-def ripple(theta_m: float, p: Parameters) -> float:
-    """Return the ripple of the motor's torque [N.m] with its harmonics at the motor's angle [rad]."""
-    cycles = p.torque_ripple_cycles_per_rev
-    torque = periodic(theta_m, p.torque_ripple_amplitude, cycles, p.torque_ripple_phase)
-    if p.torque_ripple_second_amplitude != 0.0 or p.torque_ripple_third_amplitude != 0.0:
-        torque += periodic(theta_m, p.torque_ripple_second_amplitude, 2.0 * cycles, p.torque_ripple_second_phase)
-        torque += periodic(theta_m, p.torque_ripple_third_amplitude, 3.0 * cycles, p.torque_ripple_third_phase)
-    return torque
-
-
 def motor_torque(x: State, transmitted: float, sign_m: float, p: Parameters) -> float:
     """Return the torque on the motor [N.m] without the shaft's: drive, ripple, viscous and dry friction."""
     torque = (
-        x[4] + ripple(x[0], p) - p.b_m * x[1] - sign_m * sliding_friction(motor_friction(p), x[1], x[0], transmitted)
+        x[4]
+        + of_body.ripple(x[0], p)
+        - p.b_m * x[1]
+        - sign_m * sliding_friction(motor_friction(p), x[1], x[0], transmitted)
     )
     if p.directional_friction_motor_difference != 0.0:
         torque -= directional_friction(x[1], p.directional_friction_motor_difference)
@@ -256,33 +252,17 @@ def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l:
     against = (
         T_l + p.load_torque_torque + p.b_l * x[3] + sign_l * sliding_friction(load_friction(p), x[3], x[2], transmitted)
     )
-    against += periodic(x[2], p.gravity_load_amplitude, 1.0, p.gravity_load_phase) + quadratic_drag(
-        x[3], p.quadratic_drag_coefficient
-    )
+    against = of_body.resisted(against, x[2], x[3], p)
     if p.extra_resonance_inertia > 0.0:
         against += follower_torque(x, p)
     if p.directional_friction_load_difference != 0.0:
         against += directional_friction(x[3], p.directional_friction_load_difference)
-    if p.spring_load_stiffness != 0.0 or p.spring_load_cubic != 0.0:
-        against += spring_torque(x[2], p.spring_load_stiffness, p.spring_load_cubic, p.spring_load_angle)
-    if x[2] > p.end_stop_upper or x[2] < p.end_stop_lower:
-        against += end_stop_torque(
-            x[2], x[3], p.end_stop_lower, p.end_stop_upper, p.end_stop_stiffness, p.end_stop_dissipation
-        )
-    if p.varying_inertia_amplitude != 0.0:
-        against += inertia_torque(
-            x[2], x[3], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
-        )
     return -against
 
 
 def load_inertia(x: State, p: Parameters) -> float:
-    """Return the load's inertia [kg.m2] at its angle; a wave larger than the inertia leaves a thousandth of it."""
-    if p.varying_inertia_amplitude == 0.0:
-        return p.J_l
-    return inertia_at(
-        p.J_l, x[2], p.varying_inertia_amplitude, p.varying_inertia_cycles_per_rev, p.varying_inertia_phase
-    )
+    """Return the load's inertia [kg.m2] at its angle."""
+    return of_body.inertia_of(p.J_l, x[2], p)
 
 
 def gear(x: State, p: Parameters) -> float:

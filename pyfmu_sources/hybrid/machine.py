@@ -35,7 +35,10 @@ from .plant import (
     with_drive,
 )
 
-SLOTS = "plant"
+SLOTS = (
+    "COUNT", "DRIVE", "GUARDS", "REQUEST", "Mode", "Parameters", "State", "asked", "begin_step", "end_step", "guard",
+    "guard_room", "mode_rates", "switched", "turning", "with_drive",
+)  # fmt: skip
 
 RELATIVE_TOLERANCE = 1e-11
 ABSOLUTE_TOLERANCE = 1e-13

@@ -7,11 +7,6 @@ and saturated already; ``T_l``: load torque [N.m]; all are those of the plant.
 
 from typing import NamedTuple
 
-__all__ = [
-    "COUNT", "DRIVE", "GUARDS", "REQUEST", "Mode", "Parameters", "State", "asked", "begin_step", "end_step", "guard",
-    "guard_room", "mode_rates", "switched", "turning", "with_drive",
-]  # fmt: skip
-
 COUNT = 4
 """Number of states."""
 DRIVE, REQUEST = 2, 3

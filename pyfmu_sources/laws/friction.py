@@ -109,9 +109,14 @@ def sliding_friction(f: BodyFriction, speed: float, angle: float, carried: float
     """Return the magnitude of dry friction [N.m] of a body that slides."""
     if f.breakaway == 0.0 and f.sliding == 0.0:
         return with_dependence(f, f.coulomb, angle, carried)
-    ratio = speed / f.stribeck_speed
-    level = f.coulomb + f.sliding + (f.breakaway - f.sliding) * exp(-ratio * ratio)
+    level = falling_level(f.coulomb + f.sliding, f.breakaway - f.sliding, f.stribeck_speed, speed)
     return with_dependence(f, level, angle, carried)
+
+
+def falling_level(sliding: float, more: float, stribeck_speed: float, speed: float) -> float:
+    """Return the level of friction [N.m] that falls with speed: at rest it is ``more`` than when ``sliding``."""
+    ratio = speed / stribeck_speed
+    return sliding + more * exp(-ratio * ratio)
 
 
 def with_dependence(f: BodyFriction, level: float, angle: float, carried: float) -> float:
@@ -192,3 +197,14 @@ def bristle_slip(f: BodyFriction, slip: int, bristle: float, speed: float, angle
     side = 1 if speed > 0.0 else -1
     near = SETTLED_FALLING if falls(f) and abs(speed) > QUICKEST * far else SETTLED
     return side if abs(side * bristle - far) <= near * far else 0
+
+
+def built_up(z: float, v: float, distance: float, time: float) -> float:
+    """Return the share ``z`` (-1 to 1) of its reach that a bristle is bent by, after ``time`` [s] at a constant speed.
+
+    Dahl's law, ``z' = (v - |v| z) / distance``, solved exactly; ``v`` [rad/s].
+    """
+    if v == 0.0:
+        return z
+    end = 1.0 if v > 0.0 else -1.0
+    return end + (z - end) * exp(-abs(v) * time / distance)

@@ -5,6 +5,7 @@ In all functions: ``speed`` [rad/s]; ``stiffness`` [N.m/rad].
 
 from math import exp
 
+from . import friction
 from .parameter_rows import BIG, TINY, Parameter, mark_linear
 from .waves import wave_rows
 
@@ -49,6 +50,16 @@ def hysteresis_rate(memory: float, rate: float, width: float) -> float:
     It turns round over the twist ``width`` [rad] (Wen, J. Engineering Mechanics 102(2), 1976).
     """
     return (rate - 0.5 * abs(rate) * memory - 0.5 * rate * abs(memory)) / width
+
+
+def built_up(memory: float, rate: float, width: float, time: float) -> float:
+    """Return the memory of :func:`hysteresis_rate` after ``time`` [s] at a constant ``rate``: straight back to zero."""
+    side = 1.0 if rate > 0.0 else -1.0
+    back = -memory * side
+    way = abs(rate) * time / width
+    if back <= 0.0:
+        return friction.built_up(memory, rate, width, time)
+    return memory + side * way if way <= back else friction.built_up(0.0, side, 1.0, way - back)
 
 
 def resonance_torque(angle: float, speed: float, inertia: float, frequency: float, damping_ratio: float) -> float:

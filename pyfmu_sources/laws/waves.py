@@ -74,6 +74,11 @@ def periodic(angle: float, amplitude: float, cycles_per_rev: float, phase: float
     return amplitude * sine(cycles_per_rev * angle + phase)
 
 
+def wave(angle: float, sine_part: float, cosine_part: float, cycles_per_rev: float) -> float:
+    """Return :func:`periodic` by its parts of sine and cosine, in which it is linear."""
+    return sine_part * sine(cycles_per_rev * angle) + cosine_part * cosine(cycles_per_rev * angle)
+
+
 def periodic_slope(angle: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
     """Return the derivative of :func:`periodic` by the angle, in the unit of the amplitude a radian."""
     if amplitude == 0.0:

@@ -10,7 +10,7 @@ from orchestrator.effects.of_fmus import BANK, PORT, FmuEffect
 from orchestrator.effects.of_plants import DRIVETRAIN_BANK
 from pyfmu_sources.axis import axis_equations
 from pyfmu_sources.drivetrain import equations
-from pyfmu_sources.laws import port
+from pyfmu_sources.laws import body as port
 from pyfmu_sources.laws.parameter_rows import with_values
 
 ROUNDS, SAMPLES = 6, 4000

@@ -21,7 +21,7 @@ from orchestrator.master.native_calls import (
     call_step,
     call_transfer,
 )
-from pyfmu_sources.laws.port import across, built_up, cuts, distance_of, has_memory, resistance
+from pyfmu_sources.laws.body import across, built_up, cuts, distance_of, has_memory, resistance
 
 __all__ = ["efforts_along", "lag_input", "lag_output", "limit_rate", "run_loop"]
 
@@ -98,7 +98,7 @@ def efforts_along(law: int, x: Reals, v: Reals, a: Reals, q: Reals, step: float,
     """Fill ``out`` (n,) with the effort against a motion that a law has in each sample.
 
     Args:
-        law: number of the law in ``laws.port``.
+        law: number of the law in ``laws.body``.
         x: (n,) position.
         v: (n,) speed.
         a: (n,) acceleration.

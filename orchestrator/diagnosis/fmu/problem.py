@@ -15,7 +15,7 @@ from orchestrator.diagnosis.fmu.runner import Runner
 from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
 from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import Value
-from pyfmu_sources.laws.port import COMPLIANCE
+from pyfmu_sources.laws.body import COMPLIANCE
 
 Array = NDArray[np.float64]
 ABSURD = 1e9  # times an output's largest value, beyond which a run has failed

@@ -26,7 +26,7 @@ from orchestrator.diagnosis.model.interface import (
     as_uncertain,
 )
 from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, FmuEffect
-from pyfmu_sources.laws.port import COMPLIANCE
+from pyfmu_sources.laws.body import COMPLIANCE
 
 Array = NDArray[np.float64]
 FAILED = 1e3  # times the span of an output: residual of a run that failed, from which every fit turns back

@@ -11,7 +11,7 @@ from orchestrator.diagnosis.fmu.mapping import read_map
 from orchestrator.diagnosis.fmu.system import read_system
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import InputError
-from pyfmu_sources.laws import port as laws
+from pyfmu_sources.laws import body as laws
 from tests.support.box_fmu import DOMAINS, write_fmu, write_map, write_scenario
 from tests.support.box_records import changing_record, coupled_record
 from tests.support.c_fmu import have_compiler
