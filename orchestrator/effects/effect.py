@@ -14,6 +14,8 @@ from pyfmu_sources.laws.parameter_rows import Parameter
 Array = NDArray[np.float64]
 Starts = Mapping[str, tuple[float, ...]]
 Bounds = Mapping[str, tuple[float, float]]
+DRIVETRAIN, AXIS = "Drivetrain", "ServoAxis"  # plants
+BOTH_PLANTS = (DRIVETRAIN, AXIS)
 
 
 class ParameterTable(Protocol):
@@ -158,6 +160,7 @@ class Effect:
         scan: scales -> values in order, so close that the best of them leads a fit to the right one: more than an FMU
             is run for, looked through where it is linear.
         motion: what it does to the motion, in words of a drive engineer; "": nothing is said.
+        plants: names of the plants on which it stands, whose tables have its parameters; around an FMU none count.
     """
 
     name: str
@@ -187,6 +190,7 @@ class Effect:
     remembers: bool = False
     scan: Callable[[Any], tuple[float, ...]] = lambda scales: ()
     motion: str = ""
+    plants: tuple[str, ...] = (DRIVETRAIN,)
 
     @property
     def label(self) -> str:

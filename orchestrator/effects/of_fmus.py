@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.effects import of_bodies
 from orchestrator.effects.effect import Bounds, Effect, PlaceScales, Starts
 from pyfmu_sources.laws import body as laws
 
@@ -51,11 +52,6 @@ def _repeats(values: Mapping[str, float], scales: PlaceScales) -> bool:
     """Tell whether a ripple comes back within the motion, more than once a turn: else it is a spring, or gravity."""
     slow = bool(scales.cycles) and abs(values["wavenumber"]) < 0.5 * scales.cycles[0]
     return not slow and not (scales.angular and abs(values["wavenumber"] - 1.0) < ONCE_A_TURN)
-
-
-def _positive(values: Mapping[str, float], scales: PlaceScales) -> bool:
-    del scales
-    return next(iter(values.values())) > 0.0
 
 
 def _row(
@@ -121,12 +117,11 @@ _FEEDBACK = (
          bounds=lambda s: {"sliding": (0.0, np.inf), "breakaway": (0.0, np.inf), "speed": (1e-300, np.inf),
                            "distance": (1e-300, np.inf)},
          possible=lambda v, s: v["breakaway"] > max(1.03 * v["sliding"], 0.0)),
-    _row(PORT, "quadratic_drag", "speed", {"coefficient": "effort.s2/flow2"},
-         lambda s: (0.01 * s.size / s.speed**2,), law=laws.QUADRATIC, signed=False, possible=_positive),
+    *of_bodies.AT_PORT,
     _row(PORT, "viscous_drag", "speed", {"coefficient": "effort.s/flow"}, lambda s: (0.01 * s.size / s.speed,),
-         law=laws.VISCOUS, signed=False, possible=_positive),
+         law=laws.VISCOUS, signed=False, possible=of_bodies.is_positive),
     _row(PORT, "spring", "position", {"stiffness": "effort/flow"}, lambda s: (0.01 * s.size / s.position,),
-         law=laws.SPRING, signed=False, possible=_positive),
+         law=laws.SPRING, signed=False, possible=of_bodies.is_positive),
     _row(PORT, "hardening_spring", "position", {"cubic": "effort/flow3"}, lambda s: (0.01 * s.size / s.position**3,),
          law=laws.HARDENING),
     _row(PORT, "gravity", "position", {"sine": "effort", "cosine": "effort"},
@@ -154,7 +149,7 @@ _ELSEWHERE = (
          starts=_shares("width", (0.1, 0.4, 1.5, 6.0, 25.0), "size"), law=laws.BACKLASH, bounds=_from("width", 0.0),
          possible=lambda v, s: 0.0 < v["width"] < 0.5 * s.span),
     _row(CUT, "compliance", "resonance", {"compliance": "flow/effort"}, lambda s: (0.01 * s.size / s.effort,),
-         law=laws.COMPLIANCE, signed=False, possible=_positive),
+         law=laws.COMPLIANCE, signed=False, possible=of_bodies.is_positive),
 )  # fmt: skip
 
 BANK: Mapping[str, Effect] = {row.name: row for row in (*_SERIES, *_FEEDBACK, *_ELSEWHERE)}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.effects.effect import Effect, SignalScales
+from orchestrator.effects.effect import BOTH_PLANTS, Effect, SignalScales
 from pyfmu_sources.laws.parameter_rows import Parameter
 
 LEAD = Parameter("measurement.lead", "s", 0.0, 0.0, 1.0, "Time by which torques act before their stamp")
@@ -40,7 +40,7 @@ def is_within(time: float, scales: SignalScales, top: float) -> bool:
 EARLY_TORQUE = Effect(
     "early_torque", "log", "timing", {"lead": LEAD.name}, "lead", lambda s: {"lead": 0.3 * s.step},
     lambda s: {"lead": times(s, longest_time(s))}, bounds=lambda s: {"lead": (0.0, longest_time(s))},
-    possible=lambda v, s: is_within(v["lead"], s, longest_time(s)), measurement=True,
+    possible=lambda v, s: is_within(v["lead"], s, longest_time(s)), measurement=True, plants=BOTH_PLANTS,
 )  # fmt: skip
 LATE_LOAD = Effect(
     "late_load", "log", "timing", {"shift": SHIFT.name}, "shift", lambda s: {"shift": 0.3 * s.step},
@@ -51,4 +51,5 @@ LATE_LOAD = Effect(
 SAMPLED_TORQUE = Effect(
     "sampled_torque", "log", "sampling", {"share": SAMPLED.name}, "share", lambda s: {"share": 0.5},
     amplitudes=("share",), signed=False, bounds=lambda s: {"share": (0.0, 1.0)}, measurement=True, rare_torque=True,
+    plants=BOTH_PLANTS,
 )  # fmt: skip

@@ -1,7 +1,6 @@
-"""The effects that the drivetrain may lack, one row each.
+"""The effects that plants may lack, one row each, which says on which plants it stands.
 
-An effect is added in three places: its law in :mod:`pyfmu_sources.laws` (and where the equations call it), its
-parameters in the plant's table, and one row here; ``docs/extending.md`` walks through an example.
+``docs/extending.md`` walks through an example.
 """
 
 import math
@@ -9,7 +8,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from orchestrator.effects.effect import Effect, SignalScales, rms
+from orchestrator.effects import of_bodies, of_logs
+from orchestrator.effects.effect import BOTH_PLANTS, DRIVETRAIN, Effect, SignalScales, rms
 from orchestrator.effects.of_logs import is_within, longest_lag, longest_time, times
 from pyfmu_sources.laws.parameter_rows import BIG, Parameter
 
@@ -45,6 +45,10 @@ def group(effect: str, *names: str) -> dict[str, str]:
     return {name.rpartition(".")[2]: f"effects.{effect}.{name}" for name in names}
 
 
+# A body of the axis is its motor.
+_PLANTS = {"motor": BOTH_PLANTS, "load": (DRIVETRAIN,)}
+
+
 def _largest_torque(scales: SignalScales, site: str) -> float:
     return float(np.abs(scales.requests).max()) * (1.0 if site == "motor" else scales.ratio)
 
@@ -70,7 +74,7 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         lambda s: {"torque": small(s), "presliding": SMALL_LOGARITHM}, lambda s: {"presliding": (distance(s),)},
         ("torque",), signed=False, priors=build_up, unreported=unreported,
         possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed",
-        motion="a torque of one size against every motion; at a reversal the axis sticks",
+        motion="a torque of one size against every motion; at a reversal the axis sticks", plants=_PLANTS[site],
     )  # fmt: skip
     stribeck = Effect(
         "stribeck_friction", site, "friction",
@@ -85,6 +89,7 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         and v["stribeck_speed"] > 0.01 * s.rms_speed(site),
         contains="coulomb_friction", against="speed",
         motion="a torque against every motion that is largest at a crawl: stick-slip at low speed",
+        plants=_PLANTS[site],
     )  # fmt: skip
     loaded = Effect(
         "load_dependent_friction", site, "friction", group("load_dependent_friction", f"{site}.coefficient"),
@@ -102,7 +107,7 @@ def _directional_friction(site: str) -> Effect:
         "directional_friction", site, "speed", group("directional_friction", f"{site}.difference"), "difference",
         lambda s: {"difference": 0.01 * s.torque_at(site) / s.rms_speed(site)}, amplitudes=("difference",),
         possible=lambda v, s: abs(v["difference"]) <= v["viscous"], against="speed",
-        motion="the axis is braked more in one direction than in the other",
+        motion="the axis is braked more in one direction than in the other", plants=_PLANTS[site],
     )  # fmt: skip
 
 
@@ -111,6 +116,7 @@ def _timing(name: str, parameter: str, top: Callable[[SignalScales], float], mot
         name, "actuator", "timing", group(name, parameter), parameter, lambda s: {parameter: 0.3 * s.step},
         lambda s: {parameter: times(s, top(s))}, bounds=lambda s: {parameter: (0.0, top(s))},
         possible=lambda v, s: is_within(v[parameter], s, top(s)), takes_drive=True, motion=motion,
+        plants=BOTH_PLANTS,
     )  # fmt: skip
 
 
@@ -160,7 +166,7 @@ def _is_gap(values: Mapping[str, float], scales: SignalScales) -> bool:
     return not scales.twist_is_measured or values["alpha"] < 0.95 * float(np.abs(scales.twist).max())
 
 
-def _wave(name: str, site: str, small: str, motion: str) -> Effect:
+def _wave(name: str, site: str, small: str, motion: str, plants: tuple[str, ...] = (DRIVETRAIN,)) -> Effect:
     """Return the row of a wave over the motor's angle; ``small`` says what its amplitude is measured by."""
 
     def least(scales: SignalScales) -> float:
@@ -172,7 +178,7 @@ def _wave(name: str, site: str, small: str, motion: str) -> Effect:
         lambda s: {"amplitude": sizes[small](s), "cycles_per_rev": 0.02 / s.turns}, amplitudes=("amplitude",),
         phase="phase", bounds=lambda s: {"cycles_per_rev": (least(s), math.inf)},
         possible=lambda v, s: v["cycles_per_rev"] > 1.03 * least(s), wave_site="motor", angular=True,
-        motion=motion,
+        motion=motion, plants=plants,
     )  # fmt: skip
 
 
@@ -198,12 +204,12 @@ def _end_stop(side: str) -> Effect:
         {"angle": f"effects.end_stop.{side}", "stiffness": "effects.end_stop.stiffness"}, "stiffness",
         lambda s: {"angle": 1e-3 * float(np.ptp(s.angles["load"])), "stiffness": stiffness(s)},
         lambda s: {"angle": angles(s)}, ("stiffness",), signed=False, possible=is_touched, against="position",
-        motion=f"the axis runs into a stop at the {side} end and bounces",
+        motion=f"the axis runs into a stop at the {side} end and bounces", plants=BOTH_PLANTS,
     )  # fmt: skip
 
 
 _OFFSET = "the encoders' zeros are not where the model has them: no motion, but a biased twist"
-DRIVETRAIN_BANK: tuple[Effect, ...] = (
+PLANT_BANK: tuple[Effect, ...] = (
     Effect(
         "backlash", "shaft", "gap", {"alpha": "alpha"}, "alpha", lambda s: {"alpha": _small_twist(s)},
         lambda s: {"alpha": _gaps(s)}, possible=_is_gap,
@@ -222,6 +228,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         bounds=lambda s: {"limit": (_middle_request(s), BIG)},
         possible=lambda v, s: _middle_request(s) < v["limit"] < 0.999 * _largest_request(s), takes_drive=True,
         motion="requests beyond the limit are not delivered: the axis lags when it must accelerate most",
+        plants=BOTH_PLANTS,
     ),
     Effect(
         "rate_limit", "actuator", "timing", group("rate_limit", "rate"), "rate",
@@ -229,6 +236,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         bounds=lambda s: {"rate": (1e-3 * float(np.max(_changes(s), initial=1.0)), BIG)},
         possible=lambda v, s: _is_reached(v["rate"], s) and not s.torque_raster, takes_drive=True,
         motion="the torque cannot follow fast requests: steps become ramps, and the axis answers late",
+        plants=BOTH_PLANTS,
     ),
     Effect(
         "hardening_stiffness", "shaft", "gap", group("hardening_stiffness", "cubic", "sharpness"), "cubic",
@@ -238,19 +246,20 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         motion="the shaft is soft for small twists and stiff for large ones: its resonance moves with load",
     ),
     _wave("torque_ripple", "motor", "torque",
-          "a torque that repeats with the motor's angle: speed ripple at constant request"),
+          "a torque that repeats with the motor's angle: speed ripple at constant request", BOTH_PLANTS),
     _wave("gear_eccentricity", "shaft", "twist",
           "the load's angle wanders about the motor's once in each cycle of the gear"),
     Effect(
         "load_torque", "load", "constant", group("load_torque", "torque"), "torque",
         lambda s: {"torque": 0.01 * s.torque_at("load")}, amplitudes=("torque",),
-        motion="a constant torque pulls the load to one side",
+        motion="a constant torque pulls the load to one side", plants=BOTH_PLANTS,
     ),
     Effect(
         "gravity_load", "load", "position", group("gravity_load", "amplitude", "phase"), "amplitude",
         lambda s: {"amplitude": 0.01 * s.torque_at("load")}, amplitudes=("amplitude",), phase="phase", angular=True,
         against="angle",
         motion="a torque that turns with the load's angle: it helps on one side and hinders on the other",
+        plants=BOTH_PLANTS,
     ),
     Effect(
         "extra_resonance", "load", "resonance",
@@ -263,12 +272,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         priors=lambda s: {"damping_ratio": (0.03, 0.03)}, memory=True,
         motion="a part of the load swings on its own: a further resonance and its notch",
     ),
-    Effect(
-        "quadratic_drag", "load", "speed", group("quadratic_drag", "coefficient"), "coefficient",
-        lambda s: {"coefficient": 0.01 * s.torque_at("load") / s.rms_speed("load") ** 2},
-        amplitudes=("coefficient",), signed=False, against="speed",
-        motion="a brake that grows with the square of the speed",
-    ),
+    *of_bodies.AT_LOAD,
     Effect(
         "sensor_offset", "motor", "constant", group("sensor_offset", "motor.offset"), "offset",
         lambda s: {"offset": _small_twist(s) * s.ratio}, amplitudes=("offset",), both_encoders=True,
@@ -281,6 +285,8 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     ),
     _directional_friction("motor"),
     _directional_friction("load"),
+    # A spring and a varying inertia are not searched on the axis, whose FMU has them: without a second encoder they take
+    # up what an imperfect law of dry friction leaves.
     Effect(
         "spring_load", "load", "position", group("spring_load", "stiffness", "angle"), "stiffness",
         lambda s: {"stiffness": 0.01 * s.torque_at("load") / rms(s.angles["load"] - s.angles["load"].mean()),
@@ -301,4 +307,12 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         possible=lambda v, s: v["twist"] < 4.75 * s.typical_twist, memory=True,
         motion="the twist depends on where the torque came from: lost motion without a free gap",
     ),
+    of_logs.EARLY_TORQUE,
+    of_logs.LATE_LOAD,
+    of_logs.SAMPLED_TORQUE,
 )  # fmt: skip
+
+
+def bank_of(plant: str) -> tuple[Effect, ...]:
+    """Return the effects and nuisances that stand on a ``plant``, by its name."""
+    return tuple(row for row in PLANT_BANK if plant in row.plants)

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.effects.effect import Effect, PlaceScales
 from orchestrator.effects.of_fmus import BANK, PORT, FmuEffect
-from orchestrator.effects.of_plants import DRIVETRAIN_BANK
+from orchestrator.effects.of_plants import PLANT_BANK
 from pyfmu_sources.axis import axis_equations
 from pyfmu_sources.drivetrain import equations
 from pyfmu_sources.laws import body as port
@@ -18,7 +18,7 @@ PLACE = PlaceScales(0.01, 1.0, 2.0, np.linspace(-1.0, 1.0, 50), speed=1.0, span=
 # What is no resistance, or whose size depends on the direction or the place.
 MAY_DRIVE = {"sensor_offset@load", "directional_friction@load", "directional_friction@port", "stribeck_friction@port",
              "extra_resonance@load", "varying_inertia@load"}  # fmt: skip
-RESIST_AT_LOAD = [row for row in DRIVETRAIN_BANK if row.site == "load" and row.label not in MAY_DRIVE]
+RESIST_AT_LOAD = [row for row in PLANT_BANK if row.site == "load" and row.label not in MAY_DRIVE]
 # Two rounds of one motion each: at equal speeds both ways, and quicker one way than back.
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -109,4 +109,4 @@ def test_a_law_of_the_plants_makes_no_energy(row: Effect) -> None:
 
 
 def test_laws_that_may_make_energy_are_in_the_bank() -> None:
-    assert {row.label for row in (*DRIVETRAIN_BANK, *BANK.values())} >= MAY_DRIVE
+    assert {row.label for row in (*PLANT_BANK, *BANK.values())} >= MAY_DRIVE

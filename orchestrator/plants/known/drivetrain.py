@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.effects.of_logs import EARLY_TORQUE, LATE_LOAD, LEAD, SAMPLED, SAMPLED_TORQUE, SHIFT
-from orchestrator.effects.of_plants import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
+from orchestrator.effects.effect import DRIVETRAIN
+from orchestrator.effects.of_logs import LEAD, SAMPLED, SHIFT
+from orchestrator.effects.of_plants import PRESLIDING, bank_of, build_up_distance
 from orchestrator.plants.description import Body, Drive, Plant, Resonance, Shaft
 from pyfmu_sources.drivetrain import equations as dt
 from pyfmu_sources.laws.backlash_models import GRADUAL, MODELS
@@ -39,7 +40,7 @@ def fmu_parameters(p: Array) -> Array:
 
 
 PLANT = Plant(
-    name="Drivetrain",
+    name=DRIVETRAIN,
     table=dt.PARAMETERS,
     linear=("J_m", "J_l", "k", "c", "b_m", "b_l", "i", "tau"),
     spread=0.05,
@@ -63,7 +64,7 @@ PLANT = Plant(
     offsets=("effects.sensor_offset.motor.offset", "effects.sensor_offset.load.offset"),
     nuisances=(*(PRESLIDING._replace(name=name) for name in NUISANCES), LEAD, SHIFT, SAMPLED),
     enumerations=("backlash_model",),
-    bank=(*DRIVETRAIN_BANK, EARLY_TORQUE, LATE_LOAD, SAMPLED_TORQUE),
+    bank=bank_of(DRIVETRAIN),
     kernel="orchestrator.plants.kernels.drivetrain",
     presliding=NUISANCES[:2],
     refused=refusal,
