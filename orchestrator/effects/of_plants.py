@@ -285,8 +285,8 @@ PLANT_BANK: tuple[Effect, ...] = (
     ),
     _directional_friction("motor"),
     _directional_friction("load"),
-    # A spring and a varying inertia are not searched on the axis, whose FMU has them: without a second encoder they take
-    # up what an imperfect law of dry friction leaves.
+    # Spring and varying inertia are not searched on the axis, whose FMU has them: without a second encoder they take up
+    # what an imperfect law of dry friction leaves.
     Effect(
         "spring_load", "load", "position", group("spring_load", "stiffness", "angle"), "stiffness",
         lambda s: {"stiffness": 0.01 * s.torque_at("load") / rms(s.angles["load"] - s.angles["load"].mean()),
