@@ -5,6 +5,7 @@ import re
 from functools import cache
 
 from orchestrator.cli import COMMANDS, build_parser
+from orchestrator.shared.equation_files import read_imports
 from tests.support.sources import ROOT, SOURCES, nodes_of, tree_of
 
 # Words without which a command line is refused.
@@ -88,6 +89,23 @@ def test_the_sources_of_the_fmus_stand_alone():
     for path in (ROOT / "pyfmu_sources").rglob("*.py"):
         for name in imports(path):
             assert name.split(".")[0] not in {"orchestrator", "numpy", "scipy", "fmpy"}, f"{path}: {name}"
+
+
+SOURCE_LAYERS = (
+    {"laws"}, {"hybrid"}, {"adapters"}, {"axis", "drivetrain"}, {"halves", "train"}, {"controllers"}, {"estimators"},
+)  # fmt: skip
+
+
+def test_imports_between_rooms_of_the_sources_point_one_way():
+    level = {room: n for n, rooms in enumerate(SOURCE_LAYERS) for room in rooms}
+    top, wrong = ROOT / "pyfmu_sources", []
+    for path in top.rglob("*/*.py"):
+        room = path.relative_to(top).parts[0]
+        for target in read_imports(path):
+            other = target.relative_to(top).parts[0]
+            if other != room and level[other] >= level[room]:
+                wrong.append(f"{path.relative_to(ROOT)} imports {target.relative_to(top)}")
+    assert wrong == []
 
 
 def test_every_part_of_the_orchestrator_has_a_layer():
@@ -272,3 +290,40 @@ def test_headers_of_native_fmus_use_one_another_one_way(tmp_path):
     (tmp_path / "b.h").write_text("static int g(int x)\n{\n    return f(x);\n}\n")
     (tmp_path / "c.h").write_text("static int h(int x)\n{\n    return f(x);\n}\n")
     assert circle_in(headers_in_use(tmp_path)) == ["a.h", "b.h", "c.h"]
+
+
+MATHEMATICS = {"sin", "cos", "exp", "sqrt", "abs", "sine", "cosine"}
+
+
+def shape_of(node: ast.expr, names: dict[str, str]) -> str:
+    """An expression with its names as they come, so that the same law in other letters looks the same."""
+    if isinstance(node, ast.BinOp):
+        return f"({shape_of(node.left, names)} {type(node.op).__name__} {shape_of(node.right, names)})"
+    if isinstance(node, ast.UnaryOp):
+        return f"({type(node.op).__name__} {shape_of(node.operand, names)})"
+    if isinstance(node, ast.Constant):
+        return repr(node.value)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in MATHEMATICS:
+        return f"{node.func.id}({', '.join(shape_of(given, names) for given in node.args)})"
+    return names.setdefault(ast.unparse(node), f"n{len(names)}")
+
+
+def test_a_law_stands_once():
+    """What a law returns, if it is more than a product, stands nowhere else; only waves have sines."""
+    rooms = ("pyfmu_sources", "orchestrator/plants", "orchestrator/effects", "orchestrator/diagnosis/fmu")
+    files = {path: path.relative_to(ROOT).as_posix() for path in SOURCES}
+    laws, places = set(), {}
+    for path, file in files.items():
+        if not file.startswith(rooms) or file.endswith("learned_law.py"):
+            continue
+        for node in nodes_of(path):
+            if isinstance(node, ast.BinOp):
+                places.setdefault(shape_of(node, {}), set()).add(file)
+            if isinstance(node, ast.Return) and "/laws/" in file and isinstance(node.value, ast.BinOp):
+                laws.add(shape_of(node.value, {}))
+    long = {s for s in laws if s.count("(") > (2 if any(f"{name}(" in s for name in MATHEMATICS) else 3)}
+    stand = {shape: sorted(places[shape]) for shape in long}
+    assert len(stand) > 8
+    assert {shape: found for shape, found in stand.items() if len(found) > 1} == {}
+    sines = [f for p, f in files.items() if f.startswith(rooms[:2]) and {"math.sin", "math.cos"} & set(imports(p))]
+    assert sines == ["pyfmu_sources/laws/waves.py"]

@@ -22,7 +22,9 @@ from .waves import inertia_at, inertia_torque, periodic, wave
 SLOTS = ("Parameters",)
 Parameters = Any
 
-FURTHER: tuple[Parameter, ...] = ()
+FURTHER: tuple[Parameter, ...] = (
+    # Rows of further laws follow here.
+)
 """Rows at the end of the table of every plant whose load a law resists."""
 
 COULOMB, STRIBECK, QUADRATIC, VISCOUS, SPRING, HARDENING, GRAVITY, RIPPLE, LOAD, DIRECTIONAL, INERTIA = range(1, 12)
@@ -31,9 +33,8 @@ HYSTERESIS, BACKLASH, COMPLIANCE = 12, 13, 14
 
 def resisted(against: float, angle: float, speed: float, p: Parameters) -> float:
     """Return the torque ``against`` a body [N.m] with that of all laws of one that carries the load."""
-    against += periodic(angle, p.gravity_load_amplitude, 1.0, p.gravity_load_phase) + quadratic_drag(
-        speed, p.quadratic_drag_coefficient
-    )
+    gravity = periodic(angle, p.gravity_load_amplitude, 1.0, p.gravity_load_phase)
+    against += gravity + quadratic_drag(speed, p.quadratic_drag_coefficient)
     if p.spring_load_stiffness != 0.0 or p.spring_load_cubic != 0.0:
         against += spring_torque(angle, p.spring_load_stiffness, p.spring_load_cubic, p.spring_load_angle)
     if angle > p.end_stop_upper or angle < p.end_stop_lower:
