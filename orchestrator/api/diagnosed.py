@@ -16,6 +16,7 @@ from orchestrator.diagnosis.report.corrected import (
     BeforeAfter,
     before_and_after,
     build_corrected,
+    fitted_record_of,
     fmu_name,
     format_corrected_model,
 )
@@ -27,6 +28,7 @@ from orchestrator.records.record import Record
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound
 from orchestrator.shared.scratch import Scratch
+from orchestrator.shared.trust import Level
 
 
 @dataclass(frozen=True, repr=False)
@@ -144,8 +146,18 @@ class DiagnosisResult(AnyDiagnosisResult):
         """Write ``diagnose.csv`` and ``corrected.toml``."""
         self.write_csv(folder / "diagnose.csv")
         (folder / "corrected.toml").write_text(
-            format_corrected_model(self.diagnosis.model, self.diagnosis), encoding="utf-8"
+            format_corrected_model(self.diagnosis.model, self.diagnosis, fitted_record_of(self.diagnosis)),
+            encoding="utf-8",
         )
+
+    @property
+    def can_compensate(self) -> bool:
+        """Whether `compensate` takes the corrected model."""
+        d = self.diagnosis
+        plant = d.model.plant
+        gap = plant.name == "Drivetrain" and plant.value(d.workings.final, "alpha") > 0.0
+        known = d.verdict != "unknown" and d.trust.level is not Level.RED
+        return gap and known and self.record.theta_l is not None
 
 
 def _torque_table(diagnosis: DiagnosisResult) -> Iterator[Block]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import msgspec
+import numpy as np
 
 from orchestrator.api.diagnose import diagnose as find_missing
 from orchestrator.api.diagnosed import DiagnosisResult
@@ -29,7 +30,9 @@ from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSetting
 from orchestrator.estimation.tables import write_tables
 from orchestrator.estimation.trust import trust_of_estimates
 from orchestrator.records.model_file import Model, read_model
+from orchestrator.records.model_text import fitted_record, model_text
 from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
 from orchestrator.shared.results.estimate import EstimateFound, MethodFound, RepeatsFound
@@ -207,6 +210,36 @@ class EstimateResult(PlottedResult):
                 write_tables(folder, self.record, [estimate], self.model.parameters["i"].value)
             elif estimate.method in ("maximum_likelihood", WITHOUT_TORQUE):
                 write_tables(folder, self.record, [estimate], self._ratio(estimate))
+        if self.diagnosis is None and self.visible_fit is not None:
+            (folder / "corrected.toml").write_text(self._corrected_model(self.visible_fit), encoding="utf-8")
+
+    @property
+    def visible_fit(self) -> Estimate | None:
+        """The fit of all parameters, where it shows a gap."""
+        return next((e for e in self.estimates if e.method == FITTED and e.visible), None)
+
+    @property
+    def can_compensate(self) -> bool:
+        """Whether `compensate` takes the fitted model."""
+        if self.diagnosis is not None:
+            return self.diagnosis.can_compensate
+        both = self.record.theta_l is not None
+        return both and self.visible_fit is not None and self.trust.level is not Level.RED
+
+    def _corrected_model(self, fit: Estimate) -> str:
+        """Return the model file of the fitted values, with their joint covariance."""
+        fitted, model = fit.diagnostics["parameters"], self.model
+        kept = [(n, name) for n, name in enumerate(fitted) if name in model.parameters]
+        values = {name: float(fitted[name]["value"]) for _, name in kept}
+        places = [n for n, _ in kept]
+        covariance = fit.curves["covariance"][np.ix_(places, places)]
+        half = dict(zip(values, NORMAL_95 * np.sqrt(np.diag(covariance)), strict=True))
+        stated = [name for name in model.parameters if name in {*model.plant.linear, *model.stated, *values}]
+        table = {name: (values.get(name, model.parameters[name].value), float(half.get(name, 0.0))) for name in stated}
+        noise = fit.diagnostics["measurement_noise"]
+        return model_text(
+            model, table, fitted_record(self.record, model, "none", self.trust, noise, values, covariance)
+        )
 
 
 def estimate(

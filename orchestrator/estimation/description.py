@@ -95,6 +95,7 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     curves = {"states": kept.states, "contacts": kept.contacts, "errors": kept.errors, "profile": curve}
     curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
     curves["model"] = likelihood.parameters(fit.point.theta)
+    curves["covariance"] = wider * fit.covariance  # of diagnostics["parameters"], in their order
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
 
 

@@ -17,6 +17,8 @@ A model file is TOML::
     name = "qm"                     # what the record calls the column
     unit = "deg"                    # see docs/records.md
 
+A corrected model has a table ``[record]`` beside these: see :class:`FittedRecord`.
+
 A parameter that is not named keeps the FMU's default, without uncertainty when the file names any uncertainty
 at all. Without a file, the model is ``Drivetrain`` with the thesis's values, no backlash, and each linear
 parameter known to 5 %.
@@ -29,10 +31,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from orchestrator.errors import ScenarioError
 from orchestrator.plants.description import Plant
 from orchestrator.plants.known import plants
 from orchestrator.records.columns import COLUMNS, EXAMPLES, KINDS, Column
+from orchestrator.records.fitted_record import FittedRecord
 from orchestrator.records.units import parse_unit
 from orchestrator.shared.numbers import exact_text
 from orchestrator.shared.toml_files import read_toml
@@ -84,6 +89,7 @@ class Model:
         source: file name, for messages.
         header: line of the record that holds the names, from 1; 0: there are none; None: found.
         stated: parameters that the file names; the others are the thesis's.
+        record: what the record showed that the model was fitted to; None: it was fitted to none.
     """
 
     fmu: str
@@ -93,6 +99,7 @@ class Model:
     source: str = "default model"
     header: int | None = None
     stated: tuple[str, ...] = ()
+    record: FittedRecord | None = None
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -154,6 +161,7 @@ class _Content:
     fmu: str
     entries: Mapping[str, Mapping[str, Entry]]
     header: int | None
+    record: object
 
     def wrong(self, key: str, must: str) -> ScenarioError:
         """Return the error that says what ``key`` must be."""
@@ -187,15 +195,26 @@ def read_model(path: Path | None) -> Model:
         path.name,
         content.header,
         tuple(parameters),
+        None if content.record is None else _record(content, frozenset(table)),
     )
+
+
+def _record(content: _Content, parameters: frozenset[str]) -> FittedRecord:
+    try:
+        record = msgspec.convert(content.record, FittedRecord)
+    except msgspec.ValidationError as error:
+        raise content.wrong("record", f"be as `diagnose` writes it: {error}") from None
+    if problem := record.problem(parameters):
+        raise ScenarioError(f"{content.where}: {problem}")
+    return record
 
 
 def _content(raw: dict[str, Any], where: str) -> _Content:
     """Return the file's content once every key is known and every value is of its kind."""
     fmu = raw.get("fmu", DEFAULT)
     entries = {name: raw.get(name, {}) for name in _ENTRIES}
-    content = _Content(where, fmu, entries, raw.get("header"))
-    _check_keys(raw, ("fmu", "header", *_ENTRIES), "", content)
+    content = _Content(where, fmu, entries, raw.get("header"), raw.get("record"))
+    _check_keys(raw, ("fmu", "header", "record", *_ENTRIES), "", content)
     if content.header is not None and not (type(content.header) is int and content.header >= 0):
         raise content.wrong("header", f"be a line of the record from 1 on, or 0, but is {content.header!r}")
     _check_kind(fmu, str, "fmu", content)

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from orchestrator.building.build import build_variant
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.diagnosis.model.drive import shift_signal
+from orchestrator.diagnosis.model.plant_effects import effect_parameters
+from orchestrator.diagnosis.report.estimates import joint_covariance
 from orchestrator.diagnosis.report.free_run import free_runs, run_parts
 from orchestrator.diagnosis.report.open_test_data import signals_of_test_data
 from orchestrator.diagnosis.report.simulation import RunSignals
@@ -23,8 +26,9 @@ from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
+from orchestrator.records.fitted_record import FittedRecord
 from orchestrator.records.model_file import Model
-from orchestrator.records.model_text import entry_texts, toml_text
+from orchestrator.records.model_text import fitted_record, model_text
 
 Array = NDArray[np.float64]
 
@@ -145,11 +149,14 @@ def requests_for_fmu(signals: RunSignals, plant: Plant, p: Array) -> Array:
     return shift_signal(signals.requests_of(plant, p), -lead / signals.step)
 
 
-def format_corrected_model(model: Model, diagnosis: Diagnosis) -> str:
+def format_corrected_model(model: Model, diagnosis: Diagnosis, record: FittedRecord | None = None) -> str:
     """Return the TOML text of a model with the values of a diagnosis; it reads records as ``model`` does.
 
     Every value that differs from the FMU's default is stated. Those that were fitted carry the half-width of their
     95 % interval as uncertainty, so that another record may move them; all others are exact.
+
+    Args:
+        record: what :func:`fitted_record_of` says; None: that is left out.
     """
     plant, final = model.plant, diagnosis.workings.final
     fitted: dict[str, ValueEstimate] = dict(diagnosis.parameters)
@@ -157,8 +164,7 @@ def format_corrected_model(model: Model, diagnosis: Diagnosis) -> str:
         named = next((one for one in diagnosis.effects if one.label == row.label and one.in_model), None)
         if named is not None:
             fitted |= {name: named.parameters[short] for short, name in row.parameters.items()}
-    lines = [f"fmu = {toml_text(model.fmu)}"]
-    lines += [] if model.header is None else [f"header = {model.header}"]
+    values: dict[str, tuple[float, float]] = {}
     for place, entry in enumerate(plant.table):
         value = float(final[place])
         if value == entry.default and entry.name not in fitted and entry.name not in plant.linear:
@@ -168,8 +174,27 @@ def format_corrected_model(model: Model, diagnosis: Diagnosis) -> str:
             low, high = fitted[entry.name].interval
             half = 0.5 * float(high - low)
             uncertainty = half if math.isfinite(half) else model.parameters[entry.name].uncertainty
-        lines += ["", f"[parameters.{toml_text(entry.name)}]", f"value = {value!r}", f"uncertainty = {uncertainty!r}"]
-    for table, entries in (("encoders", model.encoders), ("columns", model.columns)):
-        for name, said in entries.items():
-            lines += ["", f"[{table}.{name}]", *(f"{key} = {text}" for key, text in entry_texts(said).items())]
-    return "\n".join(lines) + "\n"
+        values[entry.name] = (value, uncertainty)
+    return model_text(model, values, record)
+
+
+def fitted_record_of(diagnosis: Diagnosis) -> FittedRecord:
+    """Return what the first record showed, and what all records of a diagnosis left open."""
+    workings, model, plant = diagnosis.workings, diagnosis.model, diagnosis.model.plant
+    problem, fitted = workings.search.problem, workings.search.final
+    rows = {row.label: row for row in plant.bank}
+
+    def named(label: str) -> Callable[[tuple[float, ...]], Mapping[str, float]]:
+        effect = problem.effects[label]
+        return lambda values: {
+            name: effect_parameters(plant, effect, values)[name] for name in rows[label].parameters.values()
+        }
+
+    names, covariance = joint_covariance(
+        problem, fitted, {label: named(label) for label in fitted.labels}, diagnosis.settings.report.level
+    )
+    kept = [n for n, name in enumerate(names) if name in model.parameters]
+    return fitted_record(
+        workings.records[0], model, diagnosis.verdict, diagnosis.trust, workings.balances[0].signals.noise,
+        {names[n]: plant.value(workings.final, names[n]) for n in kept}, covariance[np.ix_(kept, kept)],
+    )  # fmt: skip

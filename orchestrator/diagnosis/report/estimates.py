@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 from scipy.stats import t as student
 
 from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, fit_model
@@ -65,6 +66,32 @@ def effect_estimates(
     return result
 
 
+def joint_covariance(
+    problem: FitProblem, fitted: FittedModel, named: Mapping[str, Callable[[Values], Mapping[str, float]]], level: float
+) -> tuple[tuple[str, ...], Array]:
+    """Return names (n,) and covariance (n, n) of all fitted parameters; its normal intervals are those of Student.
+
+    Args:
+        named: by label of each effect, its parameters by full name of its values.
+    """
+    slopes: dict[str, Array] = {}
+    size = len(fitted.coordinates)
+    for n, entry in enumerate(problem.shared):
+        slopes[entry.name] = abs(entry.nominal) * np.eye(size)[n]
+    for n, coordinate in enumerate(fitted.coordinates):
+        if isinstance(coordinate, int):
+            continue
+        label, place = coordinate
+        values = fitted.point.effects[label]
+        step = 1e-4 * problem.effects[label].scales[place]
+        before, after = (named[label]((*values[:place], values[place] + s, *values[place + 1 :])) for s in (0.0, step))
+        for name in before:
+            slopes.setdefault(name, np.zeros(size))[n] = _wrap_phase(name, after[name] - before[name]) / 1e-4
+    rows = np.array(list(slopes.values())).reshape(len(slopes), size)
+    width = interval_width(problem, level) / float(norm.ppf(0.5 + 0.5 * level))
+    return tuple(slopes), width**2 * rows @ value_covariance(fitted) @ rows.T
+
+
 def block_values(
     problem: FitProblem, fitted: FittedModel, label: str, names: Callable[[tuple[float, ...]], Mapping[str, float]]
 ) -> dict[str, tuple[float, ...]]:
@@ -104,7 +131,7 @@ def interval_width(problem: FitProblem, level: float) -> float:
 
 
 def _wrap_phase(name: str, difference: float) -> float:
-    return float((difference + np.pi) % (2.0 * np.pi) - np.pi) if name == "phase" else difference
+    return float((difference + np.pi) % (2.0 * np.pi) - np.pi) if name.endswith("phase") else difference
 
 
 def report_effect(
