@@ -53,6 +53,11 @@ def ensure_native(
     }
 
 
+def build_native(recipe: Recipe, directory: Path, fmi: int = 2) -> Path:
+    """Return the native FMU of a recipe of one's own, for this platform; its sources are in it."""
+    return _ensure(recipe, directory, False, True, fmi, False)
+
+
 def native_remark() -> str | None:
     """Return one line on what is missing for all platforms, or ``None``."""
     compiler = find_compiler()
