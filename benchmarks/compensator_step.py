@@ -19,16 +19,18 @@ import numpy as np
 
 from orchestrator.building.native_build import ensure_native
 from orchestrator.control.loops import COMPENSATOR, FMUS, ControlTask, make_loop
+from orchestrator.control.machine import thesis_machine
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.result import Recording
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
+from orchestrator.records.model_file import read_model
 from orchestrator.scenarios.scenario import Scenario, simulate
 from pyfmu_sources.controllers.backlash_compensator_slave import BacklashCompensator
 from tests.support.played_slave import play
 
-TASK = ControlTask()
+TASK = ControlTask(thesis_machine(read_model(None), 0.02, 5e-3, 2.0), 0.1)
 TIMES = 20  # that the inputs are played one after the other in the long run
 INPUTS = tuple(v.name for v in BacklashCompensator.table if v.causality == "input")
 OUTPUTS = ("u", "flank", "crossing")

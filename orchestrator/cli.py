@@ -24,7 +24,7 @@ COMMANDS = {
     "diagnose": "where a record and the model disagree, and which effect is missing",
     "calibrate": "parameters of any FMU from a measured record, with intervals",
     "regulator": "gains of an LQR, and whether its loop rests in spite of a gap",
-    "compensate": "control laws across the gap on the same plants, beside the bound",
+    "compensate": "a controller that crosses a machine's gap softly, judged on plants that its record allows",
     "thesis": "every published number beside the recomputed one",
     "ssp": "write the paired loops as an SSP file, or run any SSP file",
     "workbench": "all of it in the browser, on this machine alone",

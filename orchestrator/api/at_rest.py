@@ -1,10 +1,15 @@
 """What a loop with a gap will do at rest, as results and commands say it."""
 
 import math
+from collections.abc import Sequence
 
+from orchestrator.api.arguments import within
 from orchestrator.control.standstill import LONGEST, forecast_rest
-from orchestrator.plants.design import DrivetrainValues
+from orchestrator.errors import ScenarioError
+from orchestrator.plants.design import REGULATOR_STATES, DrivetrainValues
 from orchestrator.shared.results.regulator import ForecastFound
+
+LARGEST_WEIGHT = 1e12
 
 
 def rest_forecast(
@@ -60,3 +65,10 @@ def margins_text(f: ForecastFound) -> str:
         f"{f.lower_gain or 0.0:.3g} to {most} times as large. "
         f"Its request moves {f.rank} of 6 states: not the load torque."
     )
+
+
+def five(name: str, numbers: Sequence[float], least: float) -> tuple[float, ...]:
+    """Return five numbers within their bounds, one for each of ``REGULATOR_STATES``."""
+    if len(numbers) != len(REGULATOR_STATES):
+        raise ScenarioError(f"`{name}` must be {len(REGULATOR_STATES)} numbers, but are {len(numbers)}", name)
+    return tuple(within(name, float(number), least, LARGEST_WEIGHT) for number in numbers)

@@ -1,7 +1,8 @@
 """The same plants under the plain LQR, the LQR shifted by the half-gap, an MPC, and the compensator of the gap."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -9,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
-from orchestrator.api.at_rest import margins_text, rest_forecast, rest_text
+from orchestrator.api.at_rest import five, margins_text, rest_forecast, rest_text
+from orchestrator.api.machine import read_fitted_model, trusted_machine
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import ensure_fastest
-from orchestrator.control.loops import COMPENSATOR, FMUS, LQR, MPC, SHIFTED, ControlTask, make_loop
+from orchestrator.building.starts import SAMPLE_TIME
+from orchestrator.control.loops import COMPENSATOR, FMUS, LQR, MPC, SHIFTED, ControlTask, make_loop, make_task
+from orchestrator.control.machine import thesis_machine
 from orchestrator.control.measures import (
     LoopMeasures,
     bound_path,
@@ -23,7 +27,10 @@ from orchestrator.control.measures import (
     quickest_landing,
 )
 from orchestrator.control.predictive import PredictiveLaw, make_predictive_loop
+from orchestrator.control.take_away import file_names, write_loop
+from orchestrator.control.weights import choose_weights
 from orchestrator.errors import ScenarioError
+from orchestrator.records.model_file import Model, read_model
 from orchestrator.scenarios.scenario import simulate
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.compensate import CompensateFound, LawFound
@@ -31,19 +38,26 @@ from orchestrator.shared.results.regulator import ForecastFound
 
 Array = NDArray[np.float64]
 
-# Least and largest value of each argument: rad, s, rad/s, N.m, plants, seed.
+# Least and largest value of each argument: rad, s, rad/s, N.m, N.m, s, plants, seed.
 RANGES = {
-    "alpha": (1e-4, 0.2),
+    "alpha": (1e-6, 0.5),
     "tau": (1e-3, 2.0),
     "impact_speed": (1e-3, 10.0),
     "friction": (0.0, 100.0),
+    "torque_limit": (1e-6, 1e6),
+    "sample_time": (1e-4, 0.05),
     "plants": (1, 1000),
     "seed": (0, 2**32),
 }
+# Where no machine is given.
+BENCHMARK = {"alpha": 0.02, "tau": 5e-3, "impact_speed": 0.1, "friction": 2.0, "plants": 5}
+PLANTS = 100  # that a machine's controller is judged on
+MEASURES = ("time", "landing", "impact", "error", "rest")
 HEAD = (
     "law", "traversal [s]", "its impact [rad/s]", "largest impact [rad/s]", "rms error [mrad]", "rest [counts]",
-    "contacts at rest [1/s]",
+    "contacts at rest [1/s]", "unstable",
 )  # fmt: skip
+NOTABLE = 1.5  # standard deviations, by which unstable plants lie off in what makes them so
 _BOUND_SPEEDS = np.geomspace(0.02, 2.0, 30)  # of the curve beside the traversals [rad/s]
 
 
@@ -65,6 +79,8 @@ class CompensateResult(PlottedResult):
     task: ControlTask
     forecast: ForecastFound
     arguments: Mapping[str, Any] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
+    name: str = ""
 
     @property
     def seed(self) -> int:
@@ -72,23 +88,33 @@ class CompensateResult(PlottedResult):
         return int(self.arguments["seed"])
 
     def blocks(self) -> Sequence[Block]:
-        """Return the table of the laws, and the bound."""
+        """Return the table of the laws, the bound, what the loop does at rest, and doubts."""
+        task = self.task
         rows = [
             (
                 law.law,
-                *(f"{np.median(v):.3f}" if v else "none" for v in (law.times, law.impacts)),
-                f"{law.impact:.3f}",
-                f"{1e3 * law.error:.1f}",
-                f"{law.rest:.1f}",
+                *(_with_upper(law, name, 1.0) for name in ("time", "landing", "impact")),
+                _with_upper(law, "error", 1e3),
+                _with_upper(law, "rest", 1.0),
                 f"{law.contacts:.1f}",
+                f"{law.unstable} of {self.arguments['plants']}",
             )
             for law in self.laws
         ]
-        title = f"A move of {self.task.height:g} rad with a half-gap of {self.task.alpha:g} rad: medians over plants"
-        bound = (
-            f"No traversal from rest that lands at {self.task.impact_speed:g} rad/s takes less than {self.bound:.4f} s."
-        )
-        return [table(title, HEAD, rows), bound, rest_text(self.forecast, "the plain LQR"), margins_text(self.forecast)]
+        title = f"A move of {task.height:.4g} rad in {task.duration:g} s, half-gap {task.machine.alpha:.4g} rad"
+        speed = f"{task.impact_speed:.3g} rad/s"
+        bound = f"No traversal from rest that lands at {speed} takes less than {self.bound:.4f} s."
+        weights = ", ".join(f"{weight:.4g}" for weight in task.state_weights)
+        chosen = f"Weights of the states {weights}, of the request {task.torque_weight:g}: gains "
+        chosen += ", ".join(f"{gain:.6g}" for gain in task.gains)
+        return [
+            table(f"{title}: medians over plants (95 %)", HEAD, rows),
+            bound,
+            chosen,
+            rest_text(self.forecast, "the plain LQR"),
+            margins_text(self.forecast),
+            *self.doubts,
+        ]
 
     def results(self, place: Path | None = None) -> CompensateFound:
         """Return what ``compensate.json`` says."""
@@ -96,8 +122,8 @@ class CompensateResult(PlottedResult):
         bounds = {speed: bound_time(self.task, speed) for speed in _BOUND_SPEEDS.tolist()}
         bounds = {speed: time for speed, time in bounds.items() if time > 0.0}
         return CompensateFound(
-            alpha=self.task.alpha,
-            tau=self.task.tau,
+            alpha=self.task.machine.alpha,
+            tau=self.task.nominal.tau,
             impact_speed=self.task.impact_speed,
             bound=self.bound,
             forecast=self.forecast,
@@ -106,7 +132,24 @@ class CompensateResult(PlottedResult):
             bound_times=tuple(bounds.values()),
             path_times=tuple(times.tolist()),
             path=tuple(path.tolist()),
+            machine=self.name or None,
+            plants=int(self.arguments["plants"]),
+            weights=self.task.state_weights,
+            gains=self.task.gains,
+            doubts=self.doubts,
+            files=self.files,
         )
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files of a machine's controller; none without a machine."""
+        return file_names(self.name, bool(self.arguments["native"]), int(self.arguments["fmi"])) if self.name else ()
+
+    def write_files(self, folder: Path) -> None:
+        """Write the controllers of a machine beside the data: FMUs, scenario, SSP, settings and plain C."""
+        super().write_files(folder)
+        if self.name:
+            write_loop(folder, self.name, self.task, bool(self.arguments["native"]), int(self.arguments["fmi"]))
 
     def write_data(self, folder: Path) -> None:
         """Write ``traversals.csv``."""
@@ -122,38 +165,56 @@ class CompensateResult(PlottedResult):
 
 
 def compensate(
-    alpha: float = 0.02,
+    alpha: float | None = None,
     *,
-    tau: float = 5e-3,
-    impact_speed: float = 0.1,
-    friction: float = 2.0,
-    plants: int = 5,
+    model: Model | Path | str | None = None,
+    tau: float | None = None,
+    impact_speed: float | None = None,
+    friction: float | None = None,
+    torque_limit: float | None = None,
+    state_weights: Sequence[float] | None = None,
+    sample_time: float = SAMPLE_TIME,
+    plants: int | None = None,
     seed: int = 0,
     mpc: bool = False,
+    native: bool = False,
+    fmi: int = 2,
+    force: bool = False,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> CompensateResult:
-    """Compare control laws on the same plants with a gap: a smooth move of 0.5 rad, then rest.
+    """Make a controller that crosses the gap of a machine softly, and say what its loop will do.
 
-    These are the plain LQR, the LQR shifted by the half-gap, and the compensator. The plants have parameters up to 5 %
-    off, encoders with noise and dry friction at the load that no law knows.
-    The half-gap is given to 1 %.
+    It is judged beside the plain LQR, the LQR shifted by the half-gap and, if asked for, an MPC, on plants drawn from
+    what the record of the machine left open. The loads make a smooth move, then rest. Without a ``model`` the laws run
+    on the thesis's drivetrain, known to 5 %, with dry friction at the load that no law knows.
 
     Args:
-        alpha: half-gap [rad].
-        tau: time constant of the drive [s].
-        impact_speed: at which the compensator shall let the teeth meet [rad/s].
-        friction: dry friction at the load [N.m].
-        plants: their number, from 1 to 1000.
+        alpha: half-gap [rad] (default: the model's, else 0.02).
+        model: of the machine, as ``diagnose`` or ``estimate`` wrote it: ``corrected.toml``, or ``estimate.json``.
+        tau: without a model, time constant of the drive [s] (default: 5 ms).
+        impact_speed: at which the compensator shall let the teeth meet [rad/s] (default: 0.4 of the mean speed of
+            a quick crossing, without a model 0.1).
+        friction: without a model, dry friction at the load [N.m] (default: 2).
+        torque_limit: of the drive [N.m] (default: the model's, else the largest request of the record).
+        state_weights: of the LQR for ``theta_m``, ``omega_m``, ``theta_l``, ``omega_l`` and ``T_m``, at a weight of 1
+            for the request (default: searched so that the loop rests).
+        sample_time: of the controller [s].
+        plants: their number (default: 100 for a model, else 5).
         seed: of plants and noise.
         mpc: runs a model predictive controller too; needs the extra ``mpc``.
+        native: FMUs that are written need no Python; they need a C compiler when they are made.
+        fmi: version of FMI of these, 2, or 3 with ``native``.
+        force: go on with a model that cannot be trusted, or with a half-gap that the record excludes.
         progress: called with (runs done, in all).
 
     Returns:
         Times and impacts of all traversals, error of the load, motion and contacts at rest; beside them the bound.
+        ``save`` writes FMUs, scenario, SSP and plain C of a machine's controller.
 
     Raises:
-        ScenarioError: a number is out of its range, or no traversal ends with the impact speed.
-        DesignError: the extra ``mpc`` is not installed.
+        ScenarioError: a number is out of its range, no traversal ends with the impact speed, or the model cannot be
+            trusted.
+        DesignError: the extra ``mpc`` is not installed, or no LQR has the margins that are needed.
         FmuError: an FMU cannot be built.
 
     Examples:
@@ -161,22 +222,56 @@ def compensate(
         >>> found.laws[2].law
         'compensator'
     """
-    given = {"alpha": alpha, "tau": tau, "impact_speed": impact_speed, "friction": friction}
-    given |= {"plants": plants, "seed": seed}
+    given = {"alpha": alpha, "tau": tau, "impact_speed": impact_speed, "friction": friction, "plants": plants}
+    if model is None:
+        given |= {name: value for name, value in BENCHMARK.items() if given[name] is None}
+    elif tau is not None or friction is not None:
+        raise ScenarioError(
+            "`tau` and `friction` must be left out beside `model`, but are given", "tau", "friction", "model"
+        )
+    given |= {"torque_limit": torque_limit, "sample_time": sample_time, "seed": seed}
+    given["plants"] = PLANTS if given["plants"] is None else given["plants"]
     for name, value in given.items():
-        within(name, value, *RANGES[name])
-    task = ControlTask(alpha=alpha, tau=tau, impact_speed=impact_speed, friction=friction)
-    bound = bound_time(task, impact_speed)
+        if value is not None:
+            within(name, value, *RANGES[name])
+    if fmi not in (2, 3) or (fmi == 3 and not native):
+        raise ScenarioError("`fmi` must be 2, or 3 with `native`", "fmi", "native")
+    said = None if model is None else model if isinstance(model, Model) else read_fitted_model(Path(model))
+    doubts: tuple[str, ...] = ()
+    if said is None:
+        machine = thesis_machine(read_model(None), given["alpha"], given["tau"], given["friction"])
+        machine = machine if torque_limit is None else replace(machine, torque_limit=torque_limit)
+        task = ControlTask(machine, given["impact_speed"], sample_time=sample_time)
+    else:
+        machine, doubts = trusted_machine(said, alpha, torque_limit, force)
+        task = make_task(machine, sample_time, impact_speed)
+    if state_weights is not None:
+        task = replace(task, state_weights=five("state_weights", state_weights, 0.0), torque_weight=1.0)
+    elif said is not None:
+        task = replace(task, state_weights=choose_weights(machine, sample_time).weights, torque_weight=1.0)
+    bound = bound_time(task, task.impact_speed)
     if bound == 0.0:
         most = 0.99 * quickest_landing(task)  # so that the number that is told is possible
-        text = f"`impact_speed` must be at most {most:.3g} rad/s, but is {impact_speed:g} rad/s"
+        text = f"`impact_speed` must be at most {most:.3g} rad/s, but is {task.impact_speed:g} rad/s"
         raise ScenarioError(f"{text}: no traversal of this gap from rest ends quicker", "impact_speed")
+    laws, measured = _run_laws(task, int(given["plants"]), seed, mpc, progress)
+    forecast = rest_forecast(task.nominal, task.gains, task.sample_time)
+    doubts += tuple(_doubts(task, forecast, measured[COMPENSATOR], seed, said is not None))
+    name = "" if said is None else re.sub(r"\W+", "_", Path(machine.source).stem).strip("_") or "machine"
+    asked = given | {"model": None if said is None else said.source, "mpc": mpc, "native": native, "fmi": fmi}
+    return CompensateResult(laws, bound, task, forecast, asked | {"force": force}, doubts, name[:60])
+
+
+def _run_laws(
+    task: ControlTask, plants: int, seed: int, mpc: bool, progress: Callable[[int, int], None]
+) -> tuple[tuple[LawFound, ...], dict[str, list[LoopMeasures]]]:
+    """Return what was measured of each law, and the measures of each plant."""
     predictive = PredictiveLaw(task) if mpc else None
     names = (LQR, SHIFTED, MPC, COMPENSATOR) if mpc else (LQR, SHIFTED, COMPENSATOR)
     fmus = ensure_fastest(FMUS).paths
-    laws = []
+    laws, found = [], {}
     for n, law in enumerate(names):
-        measured = []
+        measured: list[LoopMeasures] = []
         path = (np.zeros(0), np.zeros(0))
         for plant in range(plants):
             if law == MPC and predictive is not None:
@@ -188,20 +283,75 @@ def compensate(
             path = first_path(run, task) if not path[0].size else path
             progress(n * plants + plant + 1, len(names) * plants)
         laws.append(_summarise(law, measured, path))
-    forecast = rest_forecast(task.nominal, task.gains(), task.sample_time)
-    return CompensateResult(tuple(laws), bound, task, forecast, given | {"mpc": mpc})
+        found[law] = measured
+    return tuple(laws), found
 
 
 def _summarise(law: str, measured: Sequence[LoopMeasures], path: tuple[Array, Array]) -> LawFound:
-    """Return the medians over plants."""
+    """Return medians and 95 % quantiles over plants that are stable."""
+    stable = [m for m in measured if m.stable]
+    every = {
+        "time": np.concatenate([np.zeros(0), *(m.times for m in stable)]),
+        "landing": np.concatenate([np.zeros(0), *(m.impacts for m in stable)]),
+        "impact": np.array([m.largest_impact for m in stable]),
+        "error": np.array([m.error for m in stable]),
+        "rest": np.array([m.rest for m in stable]),
+    }
+    medians = {name: float(np.median(values)) if values.size else 0.0 for name, values in every.items()}
     return LawFound(
         law,
-        impact=float(np.median([m.largest_impact for m in measured])),
-        error=float(np.median([m.error for m in measured])),
-        rest=float(np.median([m.rest for m in measured])),
-        contacts=float(np.median([m.contacts for m in measured])),
-        times=tuple(float(t) for m in measured for t in m.times),
-        impacts=tuple(float(v) for m in measured for v in m.impacts),
+        impact=medians["impact"],
+        error=medians["error"],
+        rest=medians["rest"],
+        contacts=float(np.median([m.contacts for m in stable])) if stable else 0.0,
+        unstable=len(measured) - len(stable),
+        upper={name: float(np.quantile(values, 0.95)) for name, values in every.items() if values.size},
+        times=tuple(every["time"].tolist()),
+        impacts=tuple(every["landing"].tolist()),
         path_times=tuple(path[0].tolist()),
         path=tuple(path[1].tolist()),
     )
+
+
+def _with_upper(law: LawFound, name: str, factor: float) -> str:
+    """Return median and 95 % quantile of a measure as text."""
+    medians = {
+        "time": law.times,
+        "landing": law.impacts,
+        "impact": (law.impact,),
+        "error": (law.error,),
+        "rest": (law.rest,),
+    }
+    if name not in law.upper:
+        return "none"
+    return f"{factor * float(np.median(medians[name])):.3g} ({factor * law.upper[name]:.3g})"
+
+
+def _doubts(
+    task: ControlTask, forecast: ForecastFound, measured: Sequence[LoopMeasures], seed: int, of_record: bool
+) -> Iterator[str]:
+    """Yield what is not as it should be, with the cure."""
+    if forecast.cycles and of_record:
+        yield (
+            "No weights were found whose loop rests without friction: these cycle least. Friction stops it where the "
+            "table says so; `state_weights` takes others."
+        )
+    wrong = [n for n, one in enumerate(measured) if not one.stable]
+    if not wrong:
+        return
+    draws = [task.machine.draw(np.random.default_rng((seed, n))) for n in range(len(measured))]
+    named = _cause(draws, wrong)
+    why = f"these differ in {named}" if named else "no single parameter tells them from the others"
+    yield (
+        f"Unstable under the compensator: {len(wrong)} of {len(measured)} plants; {why}. A record that knows the "
+        "machine better makes them fewer: `design` proposes one."
+    )
+
+
+def _cause(draws: Sequence[Mapping[str, float]], wrong: Sequence[int]) -> str:
+    """Return the parameter in which some plants differ most from all, or nothing."""
+    names = list(draws[0])
+    values = np.array([[draw[name] for name in names] for draw in draws]).reshape(len(draws), len(names))
+    spread = values.std(axis=0)
+    off = np.abs(values[wrong] - values.mean(axis=0)).mean(axis=0) / np.where(spread > 0.0, spread, np.inf)
+    return names[int(off.argmax())] if off.size and off.max() > NOTABLE else ""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
-from orchestrator.api.at_rest import margins_text, rest_forecast, rest_text
+from orchestrator.api.at_rest import LARGEST_WEIGHT, five, margins_text, rest_forecast, rest_text
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, table
 from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, TORQUE_WEIGHT
@@ -22,7 +22,6 @@ from orchestrator.shared.output import write_columns, write_whole
 from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound
 
 RANGES = {"torque_weight": (1e-12, 1e12), "sample_time": (1e-4, 0.05), "delay": (0, 100)}  # s, samples
-LARGEST_WEIGHT = 1e12
 POINTS = 400  # of the response
 LOWEST = 1e-2  # frequency of the response [Hz]
 
@@ -141,20 +140,13 @@ def design_regulator(
             raise ScenarioError(
                 "`state_weights` must be left out beside `gains`, but are given", "state_weights", "gains"
             )
-        chosen = _five("gains", gains, -LARGEST_WEIGHT)
+        chosen = five("gains", gains, -LARGEST_WEIGHT)
         given["gains"] = chosen
     else:
-        weights = _five("state_weights", STATE_WEIGHTS if state_weights is None else state_weights, 0.0)
+        weights = five("state_weights", STATE_WEIGHTS if state_weights is None else state_weights, 0.0)
         if weights[0] + weights[2] == 0.0:
             raise ScenarioError("`state_weights` must weigh an angle, but has 0 for both", "state_weights")
         given["state_weights"] = weights
         chosen = design.design_regulator(five_state_model(values), np.diag(weights), torque_weight, sample_time).gains
     forecast = rest_forecast(values, chosen, sample_time, delay)
     return RegulatorResult(chosen, values, sample_time, delay, forecast, given)
-
-
-def _five(name: str, numbers: Sequence[float], least: float) -> tuple[float, ...]:
-    """Return five numbers within their bounds."""
-    if len(numbers) != len(REGULATOR_STATES):
-        raise ScenarioError(f"`{name}` must be {len(REGULATOR_STATES)} numbers, but are {len(numbers)}", name)
-    return tuple(within(name, float(number), least, LARGEST_WEIGHT) for number in numbers)

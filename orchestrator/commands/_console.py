@@ -3,7 +3,8 @@
 import shutil
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
@@ -11,6 +12,12 @@ from rich.table import Table
 from orchestrator.api.shown import Block, plain_block
 from orchestrator.commands._lines import PIPE_WIDTH, fold
 from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
+
+
+def next_step(usable: bool, file: Path) -> Iterator[str]:
+    """Yield the command that goes on from a file, where that is of use."""
+    if usable:
+        yield f"Next: `compensate --model {file}` makes a controller that crosses the gap softly"
 
 
 def print_blocks(blocks: Sequence[Block]) -> None:

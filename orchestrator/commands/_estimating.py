@@ -18,7 +18,7 @@ from orchestrator.api.estimate import DIAGNOSIS, EstimateResult, estimate
 from orchestrator.api.locate_gap import TRAIN, complete_record, locate_gap, require_train
 from orchestrator.api.shown import Block, write_page
 from orchestrator.commands._budget import Budget
-from orchestrator.commands._console import print_blocks
+from orchestrator.commands._console import next_step, print_blocks
 from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
 from orchestrator.commands._reading import what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
@@ -57,7 +57,7 @@ def estimate_or_design(
         results = EstimateFound()
         blocks: list[Block] = []
         found: EstimateResult | None = None
-        interrupted = False
+        interrupted, following = False, list[str]()
         if records:
             budget, seconds = Budget(), _tell_cost(records, model, args, settings)
             blocks += what_was_read(records)
@@ -78,6 +78,7 @@ def estimate_or_design(
             found.write_files(folder)
             found.write_diagnosis(folder, args.out, args.pictures)
             results = found.results(args.out)
+            following = [*next_step(found.can_compensate, args.out / "estimate.json")]
         if args.design and not interrupted:
             size = args.size if args.size is not None else _design_size(found)
             with _progress() as advance:
@@ -94,7 +95,7 @@ def estimate_or_design(
         given |= {k: _plain(v) for k, v in vars(args).items() if k not in ("run", "command", "pictures")}
         write_result(folder, "estimate", given, None, results)
         write_page(folder, "estimate", args.pictures)
-    print_blocks([*blocks, f"Written to {args.out}"])
+    print_blocks([*blocks, f"Written to {args.out}", *following])
     return INTERRUPTED if interrupted else 0
 
 

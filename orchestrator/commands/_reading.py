@@ -55,3 +55,11 @@ def _part(text: str | None) -> tuple[float, float] | None:
     if not colon or not 0.0 <= start < end:
         raise ScenarioError(f"`part` must be START:END in seconds, such as 2:30, but is {text!r}", "part")
     return start, end
+
+
+def numbers_of(flag: str, text: str | None) -> tuple[float, ...] | None:
+    """Return the numbers of a list with commas."""
+    try:
+        return None if text is None else tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise ScenarioError(f"`{flag}` must be numbers separated by commas, but is {text!r}") from None

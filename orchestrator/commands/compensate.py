@@ -1,24 +1,45 @@
-"""``compensate``: plain LQR, shifted LQR, an MPC if wanted, and compensator of the gap on the same plants."""
+"""``compensate``: a controller that crosses a machine's gap softly, beside other laws on the same plants."""
 
 import argparse
+from pathlib import Path
 
 from orchestrator.api.compensate import compensate
+from orchestrator.building.starts import SAMPLE_TIME
 from orchestrator.commands._console import print_blocks
+from orchestrator.commands._reading import numbers_of
 from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what describes the plants and the landing."""
-    for flag, default, unit, text in (
-        ("--alpha", 0.02, "RAD", "half-gap"),
-        ("--tau", 5e-3, "S", "time constant of the drive"),
-        ("--impact-speed", 0.1, "RAD/S", "speed at which the teeth shall meet"),
-        ("--friction", 2.0, "N.M", "dry friction at the load, which no law knows"),
+    """Add machine, landing, plants and files."""
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE",
+        help="corrected.toml of `diagnose` or `estimate`, or estimate.json (default: the thesis's drivetrain)",
+    )
+    for flag, unit, text in (
+        ("--alpha", "RAD", "half-gap (default: the model's, else 0.02)"),
+        ("--tau", "S", "without a model, time constant of the drive (default: 0.005)"),
+        ("--impact-speed", "RAD/S", "at which the teeth shall meet (default: by the machine, without a model 0.1)"),
+        ("--friction", "N.M", "without a model, dry friction at the load, which no law knows (default: 2)"),
+        ("--torque-limit", "N.M", "of the drive (default: the model's, else the record's largest request)"),
     ):
-        parser.add_argument(flag, type=float, default=default, metavar=unit, help=f"{text} (default: %(default)s)")
-    parser.add_argument("--plants", type=int, default=5, metavar="N", help="how many plants (default: %(default)s)")
+        parser.add_argument(flag, type=float, metavar=unit, help=text)
+    parser.add_argument(
+        "--state-weights", metavar="Q,Q,Q,Q,Q", help="of the LQR, at 1 for the request (default: searched)"
+    )
+    parser.add_argument(
+        "--sample-time", type=float, default=SAMPLE_TIME, metavar="S", help="of the controller (default: %(default)s)"
+    )
+    parser.add_argument("--plants", type=int, metavar="N", help="how many plants (default: 100, without a model 5)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of plants and noise (default: %(default)s)")
     parser.add_argument("--mpc", action="store_true", help="a model predictive controller too (extra `mpc`)")
+    parser.add_argument("--native", action="store_true", help="write FMUs that need no Python at run time")
+    parser.add_argument(
+        "--fmi", type=int, choices=(2, 3), default=2, help="of these FMUs (default: 2; 3 with --native)"
+    )
+    parser.add_argument("--force", action="store_true", help="go on with a model that cannot be trusted")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -26,14 +47,23 @@ def run(arguments: argparse.Namespace) -> int:
     with stage_output(arguments.out) as folder:
         result = compensate(
             arguments.alpha,
+            model=arguments.model,
             tau=arguments.tau,
             impact_speed=arguments.impact_speed,
             friction=arguments.friction,
+            torque_limit=arguments.torque_limit,
+            state_weights=numbers_of("--state-weights", arguments.state_weights),
+            sample_time=arguments.sample_time,
             plants=arguments.plants,
             seed=arguments.seed,
             mpc=arguments.mpc,
+            native=arguments.native,
+            fmi=arguments.fmi,
+            force=arguments.force,
         )
         result.write(folder, arguments.out)
     print_blocks(result.blocks())
-    print(f"Written to {arguments.out}: report.html, compensate.json, traversals.csv")
+    print(
+        f"Written to {arguments.out}: {', '.join(('report.html', 'compensate.json', 'traversals.csv', *result.files))}"
+    )
     return 0

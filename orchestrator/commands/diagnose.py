@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from orchestrator.commands._console import print_blocks, say
+from orchestrator.commands._console import next_step, print_blocks, say
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.commands._trust import note_missing_walls
@@ -96,6 +96,7 @@ def run(args: argparse.Namespace) -> int:
             f"Its model file: {args.out / 'corrected.toml'}; `diagnose NEW.csv --no-search --model` with it judges "
             "a new record",
             f"Written to {args.out}: report.html, diagnose.json, diagnose.csv",
+            *next_step(found.can_compensate, args.out / "corrected.toml"),
         ]
     )
     return 0

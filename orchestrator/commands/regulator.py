@@ -7,7 +7,7 @@ from orchestrator.api.records import read_model
 from orchestrator.api.regulator import design_regulator
 from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, TORQUE_WEIGHT
 from orchestrator.commands._console import print_blocks
-from orchestrator.errors import ScenarioError
+from orchestrator.commands._reading import numbers_of
 from orchestrator.shared.output import stage_output
 
 
@@ -39,9 +39,9 @@ def run(arguments: argparse.Namespace) -> int:
     with stage_output(arguments.out) as folder:
         result = design_regulator(
             read_model(arguments.model),
-            state_weights=_numbers("--state-weights", arguments.state_weights),
+            state_weights=numbers_of("--state-weights", arguments.state_weights),
             torque_weight=arguments.torque_weight,
-            gains=_numbers("--gains", arguments.gains),
+            gains=numbers_of("--gains", arguments.gains),
             sample_time=arguments.sample_time,
             delay=arguments.delay,
         )
@@ -49,11 +49,3 @@ def run(arguments: argparse.Namespace) -> int:
     print_blocks(result.blocks())
     print(f"Written to {arguments.out}: report.html, regulator.json, parameters.toml, loop.csv")
     return 0
-
-
-def _numbers(flag: str, text: str | None) -> tuple[float, ...] | None:
-    """Return the numbers of a list with commas."""
-    try:
-        return None if text is None else tuple(float(word) for word in text.split(","))
-    except ValueError:
-        raise ScenarioError(f"`{flag}` must be numbers separated by commas, but is {text!r}") from None

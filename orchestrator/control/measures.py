@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.control.loops import COUNTS, REST, ControlTask
+from orchestrator.control.loops import REST, ControlTask
 from orchestrator.master.result import Recording
 from pyfmu_sources.controllers.gap_traversal import Traversal, plan, point_at
 
@@ -21,8 +21,9 @@ class LoopMeasures:
         impacts: speeds of the twist at their ends [rad/s], shape (traversals,).
         largest_impact: of all contacts, those on the same flank included [rad/s].
         error: root mean square error of the load from the begin of the move on [rad].
-        rest: motion of the load at the end of the run, peak to peak [counts of its encoder].
+        rest: motion of the load at the end of the run, peak to peak [counts of its encoder, or its noise].
         contacts: at the end of the run [1/s].
+        stable: the load stays near the end of the move.
     """
 
     times: Array
@@ -31,6 +32,7 @@ class LoopMeasures:
     error: float
     rest: float
     contacts: float
+    stable: bool
 
 
 def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
@@ -46,6 +48,7 @@ def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
             times.append((end - before[-1]) * task.sample_time)
             impacts.append(speed[end])
     theta_l = run["plant.theta_l"]
+    count = task.machine.counts[1] or task.machine.noise[1]
     moving = task.stop - REST
     tail = run.time >= moving
     reference = task.reference()[0][: theta_l.size]
@@ -54,8 +57,9 @@ def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
         np.array(impacts),
         float(speed[met].max(initial=0.0)),
         float(np.sqrt(np.mean((theta_l - reference)[~tail] ** 2))),
-        float(np.ptp(theta_l[tail]) * COUNTS[1] / (2.0 * np.pi)),
+        float(np.ptp(theta_l[tail]) / count),
         float(np.sum(run.time[met] >= moving) / REST),
+        bool(np.abs(theta_l - reference)[tail].max() < task.height),
     )
 
 
@@ -84,7 +88,9 @@ def bound_path(task: ControlTask, impact_speed: float) -> tuple[Array, Array]:
     t = _best(task, impact_speed)
     times = np.linspace(0.0, t.first + t.second + t.third, 101)
     inertia = task.nominal.J_m * task.nominal.i
-    return times, np.array([point_at(t, float(time), task.tau, inertia)[0] for time in times]) + task.alpha
+    return times, np.array(
+        [point_at(t, float(time), task.nominal.tau, inertia)[0] for time in times]
+    ) + task.machine.alpha
 
 
 def first_path(run: Recording, task: ControlTask) -> tuple[Array, Array]:
@@ -96,11 +102,18 @@ def first_path(run: Recording, task: ControlTask) -> tuple[Array, Array]:
         if now != 0.0:
             if flank and now != flank:
                 twist = now * (run["plant.theta_m"] / task.nominal.i - run["plant.theta_l"])
-                return run.time[begin : n + 1] - run.time[begin], twist[begin : n + 1] + task.alpha
+                return run.time[begin : n + 1] - run.time[begin], twist[begin : n + 1] + task.machine.alpha
             flank, begin = now, n
     return np.zeros(0), np.zeros(0)
 
 
 def _best(task: ControlTask, impact_speed: float) -> Traversal:
     inertia = task.nominal.J_m * task.nominal.i
-    return plan((-task.alpha, 0.0, 0.0), task.alpha, impact_speed, task.torque_limit, task.tau, inertia)
+    return plan(
+        (-task.machine.alpha, 0.0, 0.0),
+        task.machine.alpha,
+        impact_speed,
+        task.machine.torque_limit,
+        task.nominal.tau,
+        inertia,
+    )

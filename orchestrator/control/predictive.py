@@ -62,13 +62,16 @@ class PredictiveLaw:
         daqp = require_solver()
         v, h = task.nominal, task.sample_time
         self.task = task
-        self._reference, self._tuning = task.reference(), Tuning(task.impact_speed, 1.0, task.torque_limit, TOUCH, h)
+        self._reference, self._tuning = (
+            task.reference(),
+            Tuning(task.impact_speed, 1.0, task.machine.torque_limit, TOUCH, h),
+        )
         bound = bound_time(task, task.impact_speed)
         self._steps = max(BLOCKS, round(HORIZON * bound / h))
         blocks = np.unique(np.ceil(self._steps * np.linspace(0.0, 1.0, BLOCKS + 1) ** 2).astype(int))
         held = np.zeros((self._steps, blocks.size - 1))
         for n, (begin, end) in enumerate(pairwise(blocks)):
-            held[begin:end, n] = task.torque_limit
+            held[begin:end, n] = task.machine.torque_limit
         self._ends = blocks[1:] - 1
         box = np.ones(blocks.size - 1)
 
@@ -153,7 +156,7 @@ class PredictiveLaw:
         best, _, flag, _ = model.solve()
         if flag < 1:
             raise SlaveError(f"controller: the quadratic programme of sample {sample} has no solution ({flag})")
-        return float(best[0]) * self.task.torque_limit
+        return float(best[0]) * self.task.machine.torque_limit
 
 
 def predict(sampled: "StateSpace", held: Array) -> tuple[Array, Array]:

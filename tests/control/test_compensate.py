@@ -7,11 +7,20 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.control.loops import ControlTask
+from orchestrator.control.machine import thesis_machine
 from orchestrator.control.measures import bound_path, bound_time, first_path, measure_loop, quickest_landing
 from orchestrator.master.result import Recording
+from orchestrator.records.model_file import read_model
 from tests.support.c_fmu import have_compiler
 
-TASK = ControlTask()
+MODEL = read_model(None)
+
+
+def made_task(alpha=0.02, tau=5e-3, impact_speed=0.1):
+    return ControlTask(thesis_machine(MODEL, alpha, tau, 2.0), impact_speed)
+
+
+TASK = made_task()
 
 
 def record_by_hand(contact, twist, speed):
@@ -54,7 +63,7 @@ def test_a_path_goes_from_one_flank_to_the_other():
     for times, path in (first_path(made_run(), TASK), bound_path(TASK, 0.1)):
         assert times[0] == 0.0
         assert np.all(np.diff(path) >= 0.0)
-        assert path[[0, -1]] == pytest.approx([0.0, 2.0 * TASK.alpha])
+        assert path[[0, -1]] == pytest.approx([0.0, 2.0 * TASK.machine.alpha])
 
 
 def test_a_harder_landing_has_a_shorter_bound():
@@ -68,7 +77,7 @@ def test_an_impact_speed_that_no_traversal_reaches_is_refused_with_one_that_can_
     assert "`--impact-speed` must be at most 0.24" in error
     assert "but is 0.3 rad/s" in error
     told = float(error.split("at most ")[1].split()[0])
-    task = ControlTask(alpha=0.002, tau=0.2, impact_speed=0.3)
+    task = made_task(alpha=0.002, tau=0.2, impact_speed=0.3)
     assert bound_time(task, told) > 0.0 == bound_time(task, 1.02 * told)
     assert quickest_landing(task) == pytest.approx(told / 0.99, rel=5e-3)
 

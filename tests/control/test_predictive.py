@@ -9,9 +9,11 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.control.loops import ControlTask
+from orchestrator.control.machine import thesis_machine
 from orchestrator.control.measures import bound_time
 from orchestrator.control.predictive import TOUCH, PredictiveLaw, PredictiveSlave
 from orchestrator.plants.design import DrivetrainValues, six_state_model
+from orchestrator.records.model_file import read_model
 from tests.support.c_fmu import have_compiler
 
 ALPHA = 0.02
@@ -21,7 +23,7 @@ AFTER = 10_000  # a sample behind the move
 @pytest.fixture(params=[5e-3, 1.0], ids=["fast", "slow"])
 def law(request):
     pytest.importorskip("daqp")
-    return PredictiveLaw(ControlTask(tau=request.param))
+    return PredictiveLaw(ControlTask(thesis_machine(read_model(None), ALPHA, request.param, 2.0), 0.1))
 
 
 def at_rest(task, twist, angle=0.0):
@@ -44,7 +46,7 @@ def test_on_a_flank_it_asks_for_what_the_lqr_asks_for(law, flank):
     for n, size in ((0, 1e-3 * flank), (1, 1e-2), (2, -1e-4 * flank), (3, 1e-3), (5, 0.1)):
         moved = rest.copy()
         moved[n] += size
-        gain = task.gains()[min(n, 4)]
+        gain = task.gains[min(n, 4)]
         change = law.request(AFTER, moved, flank, ALPHA) - still
         assert change / -size == pytest.approx(gain, rel=0.2)  # requests are held in blocks
     held = rest.copy()
@@ -58,13 +60,13 @@ def test_it_knows_the_move_ahead_and_the_torque_limit(law):
     rest = at_rest(task, ALPHA + 1e-6)
     assert law.request(499, rest, 1.0, ALPHA) > 1.0
     far = at_rest(task, ALPHA + 1e-6, angle=1.0)
-    assert law.request(AFTER, far, 1.0, ALPHA) == pytest.approx(-task.torque_limit)
+    assert law.request(AFTER, far, 1.0, ALPHA) == pytest.approx(-task.machine.torque_limit)
 
 
 @pytest.mark.parametrize("flank", [1.0, -1.0])
 def test_it_crosses_quickly_and_lands_softly(law, flank):
     task = law.task
-    free = six_state_model(DrivetrainValues(tau=task.tau, k=0.0, c=0.0, b_m=0.0, b_l=0.0))
+    free = six_state_model(DrivetrainValues(tau=task.nominal.tau, k=0.0, c=0.0, b_m=0.0, b_l=0.0))
     sampled = control.c2d(free, task.sample_time)
     A, B = sampled.A, sampled.B
     x = at_rest(task, -flank * ALPHA, angle=-0.25 * flank)
@@ -72,7 +74,7 @@ def test_it_crosses_quickly_and_lands_softly(law, flank):
     bound = bound_time(task, task.impact_speed)
     while flank * (x[0] / task.nominal.i - x[2]) < ALPHA - TOUCH:
         request = law.request(0, x, flank, ALPHA)
-        assert abs(request) <= 1.0001 * task.torque_limit
+        assert abs(request) <= 1.0001 * task.machine.torque_limit
         x = A @ x + B[:, 0] * request
         samples += 1
         assert samples * task.sample_time < 2.0 * bound

@@ -2,7 +2,7 @@
 
 from statistics import median
 
-from orchestrator.reporting.model import Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.model import Facts, Plot, Report, ReportTable, Series, TableColumn
 from orchestrator.reporting.pages.regulator import rest_facts
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
@@ -27,6 +27,7 @@ def build(source: ResultDocument) -> Report:
         ),
         sections=(
             _table(results),
+            *([Facts("Doubts", tuple(("", doubt) for doubt in results.doubts))] if results.doubts else []),
             *rest_facts(results.forecast, "The plain LQR"),
             Plot(
                 "Traversals",
@@ -58,6 +59,9 @@ def _table(results: CompensateFound) -> ReportTable:
         TableColumn("rms error", "rad", 3),
         TableColumn("rest, peak to peak", "counts", 3),
         TableColumn("contacts at rest", "1/s", 3),
+        TableColumn("impact, 95 %", "rad/s", 3),
+        TableColumn("rms error, 95 %", "rad", 3),
+        TableColumn("unstable"),
     )
     rows = tuple(
         (
@@ -68,6 +72,9 @@ def _table(results: CompensateFound) -> ReportTable:
             law.error,
             law.rest,
             law.contacts,
+            law.upper.get("landing"),
+            law.upper.get("error"),
+            law.unstable,
         )
         for law in results.laws
     )

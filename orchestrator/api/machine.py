@@ -1,0 +1,64 @@
+"""The machine of a fitted model, as far as that can be trusted."""
+
+from pathlib import Path
+
+from orchestrator.control.machine import Machine, machine_of
+from orchestrator.errors import ScenarioError
+from orchestrator.records.model_file import Model, read_model
+
+NAMES = ("corrected.toml", "diagnosis/corrected.toml")  # beside estimate.json; where a diagnosis was made, the second
+FAR = 4.0  # standard deviations of a value that is given beside the one that the record gave
+
+
+def read_fitted_model(path: Path) -> Model:
+    """Return the model that a record was fitted to.
+
+    Args:
+        path: a model file, or ``estimate.json`` or ``diagnose.json`` with the corrected model beside it.
+
+    Raises:
+        ScenarioError: there is no corrected model beside the JSON file, or the model file is wrong.
+    """
+    if path.suffix != ".json":
+        return read_model(path)
+    found = [path.parent / name for name in NAMES if (path.parent / name).exists()]
+    if not found:
+        raise ScenarioError(
+            f"`model` must have a corrected.toml beside it, but {path} has none: run the command again that wrote it",
+            "model",
+        )
+    return read_model(found[-1])
+
+
+def trusted_machine(
+    model: Model, alpha: float | None, torque_limit: float | None, force: bool
+) -> tuple[Machine, tuple[str, ...]]:
+    """Return the machine, and what was to be said of the model before it was forced.
+
+    Raises:
+        ScenarioError: the diagnosis is red or does not know what is missing, or a value is not the record's; ``force``
+            makes a doubt of that.
+    """
+    machine = machine_of(model, alpha=alpha, torque_limit=torque_limit)
+    record = model.record
+    assert record is not None
+    doubts = []
+    if record.trust == "red" or record.verdict == "unknown":
+        why = "; ".join(record.reasons) or "what the model lacks is not known"
+        doubts.append(f"the diagnosis of {model.source} must be neither red nor unknown, but is {record.trust}: {why}")
+    for n, name in enumerate(record.unknowns):
+        value = machine.alpha if name == "alpha" else machine.value(name)
+        off, deviation = abs(value - record.values[n]), record.covariance[n][n] ** 0.5
+        if off > FAR * deviation + 1e-9 * abs(value):
+            doubts.append(
+                f"`{name}` must be what the record says, {record.values[n]:.4g} with a standard error of "
+                f"{deviation:.2g}, but is {value:.4g}"
+            )
+    if doubts and not force:
+        raise ScenarioError(
+            f"{'; '.join(doubts)}. A controller of it may hit its flanks or not be stable: record again "
+            "(`design` proposes how), or give `force`",
+            "model",
+            "force",
+        )
+    return machine, tuple(f"Forced although {doubt}." for doubt in doubts)
