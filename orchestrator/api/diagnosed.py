@@ -11,7 +11,7 @@ import msgspec
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
 from orchestrator.api.live import live_corrected_model
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, doubts_of, table
 from orchestrator.diagnosis.report.corrected import (
     BeforeAfter,
     before_and_after,
@@ -114,12 +114,14 @@ class DiagnosisResult(AnyDiagnosisResult):
 
     def blocks(self) -> Sequence[Block]:
         """Return the summary, and the tables of misfits."""
-        return [*self.summary(), *self._misfit_tables(), *_torque_table(self)]
+        return [*doubts_of((self.record, *self.more)), *self.summary(), *self._misfit_tables(), *_torque_table(self)]
 
     def results(self, place: Path) -> DiagnoseFound:
         """Return what ``diagnose.json`` says; the corrected FMU is in ``place``."""
+        found = diagnosis_found(self.diagnosis)
         return msgspec.structs.replace(
-            diagnosis_found(self.diagnosis),
+            found,
+            notes=(*doubts_of((self.record, *self.more)), *found.notes),
             model=str(place / self.fmu_name),
             cosimulation=DifferenceFound(self.runs.difference, "rad"),
             validation=None

@@ -18,7 +18,7 @@ from orchestrator.api.live import live_fitted_model
 from orchestrator.api.methods import HEAD, MethodResult, describe_record, method_entry, method_row
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, doubts_of, table
 from orchestrator.diagnosis.report.summary import play_of
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
@@ -154,7 +154,16 @@ class EstimateResult(PlottedResult):
         unfit = [f"{m.method} does not apply: {m.reason}" for m in self.methods if m.estimate is None]
         sizes = [f"{self.best.method}: {self._play()}"] if self.estimates and self.best.visible else []
         floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_compare_diagnosis(self.estimates)}"]
-        return [table(title, HEAD, rows), *sizes, *floor, *messages, *doubts, *unfit, *missing]
+        return [
+            *doubts_of((r, *self.more)),
+            table(title, HEAD, rows),
+            *sizes,
+            *floor,
+            *messages,
+            *doubts,
+            *unfit,
+            *missing,
+        ]
 
     def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says."""

@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, doubts_of, table
 from orchestrator.estimation.inspection.channels import (
     Band,
     Channel,
@@ -100,7 +100,7 @@ class InspectResult(PlottedResult):
     def blocks(self) -> Sequence[Block]:
         """Return what was read, the tables and the verdict."""
         r = self.record
-        read = [f"{r.source}: {'; '.join(r.notes)}"] if r.notes else []
+        read = [*doubts_of([r]), *([f"{r.source}: {'; '.join(r.notes)}"] if r.notes else [])]
         timing = "" if r.timing is None else f"; {r.timing.describe()}"
         read.append(f"{r.size} rows, {r.duration:g} s{timing}; {r.n_missing} rows with missing samples")
         channels = table(

@@ -11,7 +11,7 @@ from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, doubts_of, table
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.estimation.effort import Stop, never
 from orchestrator.estimation.protocol import LEVEL
@@ -102,7 +102,13 @@ class LocationResult(PlottedResult):
         rows.append(_row("both, seen from the load", self.total))
         ways = [(_words(name), f"{behind:.1f}") for name, behind in self.location.behind.items()]
         doubts = [f"The answer is {self.trust.level.word}: {reason}" for reason in self.trust.reasons]
-        return [table(title, HEAD, rows), table("Where the gap can be", BEHIND, ways), self.message, *doubts]
+        return [
+            *doubts_of([r]),
+            table(title, HEAD, rows),
+            table("Where the gap can be", BEHIND, ways),
+            self.message,
+            *doubts,
+        ]
 
     def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says, which names nothing of the result's folder."""

@@ -34,7 +34,7 @@ class MethodResult:
 def describe_record(record: Record) -> RecordFound:
     """Return rows, step, source of a record, and what was detected and assumed when it was read."""
     return RecordFound(
-        record.size, record.step, record.source, record.n_missing, tuple(record.notes), record.angle_unit
+        record.size, record.step, record.source, record.n_missing, (*record.doubts, *record.notes), record.angle_unit
     )
 
 

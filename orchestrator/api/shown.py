@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.plain_text import plain_text
+from orchestrator.records.arrays import Record
 from orchestrator.shared.output import stage_output, write_result
 
 
@@ -20,6 +21,11 @@ class TextTable:
 
 
 Block = TextTable | str
+
+
+def doubts_of(records: Sequence[Record]) -> list[str]:
+    """Return what the rows of logs say of how they were taken, a line each, for the head of a result."""
+    return [f"{record.source}: {text}." for record in records for text in record.doubts]
 
 
 class Result:

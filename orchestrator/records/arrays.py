@@ -33,6 +33,7 @@ class Record:
         u_scale_uncertainty: by what share the scale of ``u`` may be off at most.
         timing: what the time stamps said, or None.
         notes: what was detected and assumed, one sentence each.
+        doubts: what the rows of the log say of how it was taken, and what was done about it; see ``records.rows``.
         averaged: how many samples of the file went into one of these by ``rate``.
         angle_unit: in which the file has angles: rad, deg, arcmin or turns; rad where it is another.
         zeros_set: whether the encoders' zeros were brought near each other, by an estimate that may be a little off.
@@ -48,6 +49,7 @@ class Record:
     u_scale_uncertainty: float = 0.0
     timing: Timing | None = None
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
     averaged: int = 1
     u_sampled: Array | None = None
     u_raster: float = 0.0

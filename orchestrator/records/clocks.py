@@ -15,8 +15,12 @@ from orchestrator.records.counters import unwrap_time
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice
 from orchestrator.records.stamps import seconds_of
+from orchestrator.records.timing import LARGEST_STEP
 from orchestrator.records.units import parse_unit
 from orchestrator.records.words import names_time
+
+DAY = 86_400.0  # s
+SERIAL_DAYS = ((20_000.0, 80_000.0), (690_000.0, 800_000.0))  # of 1954 to 2119, by spreadsheets and by MATLAB
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,8 @@ def read_clock(
         return Clock(numbers / rate, f"{label} as sample number at {rate:g} Hz", 1.0 / rate, 0.0, first, True)
     written = source.heads[choice.place].unit
     unit = unit_of("time", column, written, label, str(path))
+    if unit is None:
+        _refuse_days(numbers, label, str(path))
     factor, spoken = (unit.factor, column.unit or written) if unit is not None else _epoch(numbers)
     begun = first * column.factor + column.offset
     start = begun if abs(begun * factor) > 1e6 else 0.0
@@ -163,6 +169,19 @@ def _are_sample_numbers(raw: NDArray[Any]) -> bool:
         return False
     good = raw[np.isfinite(raw)]
     return bool(np.all(good == np.rint(good)) and np.all(np.diff(good) > 0.0))
+
+
+def _refuse_days(numbers: Array, label: str, where: str) -> None:
+    """Refuse serial days of a spreadsheet or of MATLAB: as seconds they would be of a log at more than 50 kHz."""
+    good = numbers[np.isfinite(numbers)]
+    if good.size > 1 and any(low < good[0] < high for low, high in SERIAL_DAYS):
+        step = float(np.median(np.diff(good)))
+        if 0.0 < step < LARGEST_STEP / DAY:
+            raise RecordError(
+                f"{where}: column `{label}` must say its unit, as it seems to count days (from {good[0]:.10g} on, "
+                f'{1.0 / (DAY * step):.6g} Hz): say `[columns.time] unit = "day"` in the model file (`model`), or "s" '
+                f"where the log is of {1.0 / step:.6g} Hz"
+            )
 
 
 def _epoch(numbers: Array) -> tuple[float, str]:

@@ -27,6 +27,7 @@ from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, find_channels
 from orchestrator.records.rasters import bring_to_motor, make_uniform
 from orchestrator.records.requests import SAMPLED
+from orchestrator.records.rows import describe_failed, drop_failed_readings
 from orchestrator.records.topics import has_topics, split_topics
 from orchestrator.records.units import angle_unit, parse_unit
 from orchestrator.records.words import names_time
@@ -65,6 +66,7 @@ class Loaded:
         table: columns in SI by name; ``SAMPLED``: the torque as a sampled signal, where it has rows of its own.
         labels: their names in the file.
         notes: what was detected and assumed.
+        doubts: readings that failed; see ``Record``.
         torque_raster: step of the torque's own rows [s], where they are rarer than the angles'; else 0.0.
         angle_unit: of the load's angles, else of the motor's; see ``Record``.
     """
@@ -72,6 +74,7 @@ class Loaded:
     table: dict[str, Array]
     labels: dict[str, str]
     notes: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
     torque_raster: float = 0.0
     angle_unit: str = "rad"
 
@@ -105,7 +108,7 @@ def load(
         values.pop(chosen["time"].place, None)
     table: dict[str, Array] = {"time": clock.time}
     notes = [source.dialect, *(choice.assumed for choice in chosen.values() if choice.assumed)]
-    units, motor = [clock.spoken], chosen["theta_m"].place
+    units, motor, doubts = [clock.spoken], chosen["theta_m"].place, list[str]()
     own: dict[str, Array] = {}
     for name in COLUMNS[1:]:
         if name in chosen:
@@ -114,7 +117,10 @@ def load(
             if head.raster != source.heads[motor].raster:
                 own[name] = read_own_time(source, place, clock, columns.get("time", Column()), motor, path)
             rows = own.get(name, clock.time)
-            raw = take(place)
+            raw, failed = take(place), np.zeros(0, dtype=np.int64)
+            if name != "u" and (named := columns.get(name, Column())).modulo is None and named.sign_bit is None:
+                raw, failed = drop_failed_readings(raw)  # else they look like an angle that starts again
+            doubts += [describe_failed(failed, labels[name])] if failed.size else []
             table[name], said = _convert(name, raw, columns.get(name, Column()), head.unit, labels[name], path, rows)
             units.append(said)
     for name, place in extra.items():
@@ -139,7 +145,7 @@ def load(
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
     table, more = make_uniform(table, reading.resample)
     texts = [columns.get(n, Column()).unit or source.heads[chosen[n].place].unit for n in ANGLES_OF if n in chosen]
-    return Loaded(table, labels, (*notes, *more), raster, angle_unit(texts))
+    return Loaded(table, labels, (*notes, *more), tuple(doubts), raster, angle_unit(texts))
 
 
 def _unused(source: RecordSource, places: Sequence[int], rasters: Collection[int]) -> list[str]:

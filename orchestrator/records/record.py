@@ -22,15 +22,25 @@ from orchestrator.records.checks import (
     quantisation_step,
 )
 from orchestrator.records.columns import COLUMNS, Array, Column
+from orchestrator.records.drift import join_clocks
 from orchestrator.records.filters import decimate
 from orchestrator.records.formats import open_source
 from orchestrator.records.loading import Reading, load
 from orchestrator.records.rasters import make_uniform
 from orchestrator.records.requests import SAMPLED
+from orchestrator.records.rows import (
+    check_clock,
+    clock_settings,
+    describe_failed,
+    drop_failed_readings,
+    take_new_readings,
+    usual_step,
+)
 from orchestrator.records.timing import Grid, grid_of
 from orchestrator.records.words import RESAMPLING
 from orchestrator.shared.numbers import exact_text
 
+ANGLES = ("theta_m", "theta_l")
 UNEVEN = "linear"  # how samples at uneven times are resampled where nobody says
 
 __all__ = ["COLUMNS", "MINIMUM_ROWS", "RESAMPLING", "Column", "Reading", "Record", "quantisation_step", "read_record"]
@@ -56,7 +66,8 @@ def read_record(
         )
         record = replace(record, notes=(*record.notes, note))
     scale = (columns or {}).get("u", Column()).relative_uncertainty
-    record = replace(record, u_scale_uncertainty=scale, notes=(*loaded.notes, *record.notes))
+    doubts = (*loaded.doubts, *record.doubts)
+    record = replace(record, u_scale_uncertainty=scale, notes=(*loaded.notes, *record.notes), doubts=doubts)
     if reading.rate is not None:
         record = decimate(record, reading.rate)
     return record
@@ -76,6 +87,13 @@ def record_from_columns(
         )
     for name, values in arrays.items():
         check_finite(values, label[name], source)
+    doubts = _drop_failed(arrays, label)
+    angles = {name: arrays[name] for name in ANGLES if name in arrays}
+    if trust_rows:
+        doubts += _follow_rows(arrays, angles)
+    else:
+        cure = "say `[columns.time] rate = {rate}` in the model file (`model`), or `resample` uniform"
+        check_clock(arrays["time"], angles, f"{source}: column `{label['time']}`", cure)
     grid = grid_of(arrays["time"], label["time"], source, trust_rows, arrays["theta_m"])
     if not grid.uniform:
         arrays, more = make_uniform(arrays, UNEVEN)
@@ -84,14 +102,39 @@ def record_from_columns(
     for name in ("u", "theta_m"):
         if name in arrays and np.isnan(arrays[name]).all():
             raise RecordError(f"{source}: column `{label[name]}` must hold numbers, but is empty")
-    for name in ("theta_m", "theta_l"):
+    for name in ANGLES:
         if name in arrays:
             check_range(arrays[name], label[name], source)
             check_moving(
                 {key: interpolate_missing(values) for key, values in arrays.items()}, name, label[name], source
             )
     record = _on_grid(arrays, grid, source)
-    return replace(record, notes=(*notes, *record.notes))
+    record = replace(record, notes=(*notes, *record.notes), doubts=tuple(doubts))
+    return join_clocks(take_new_readings(record))
+
+
+def _drop_failed(arrays: dict[str, Array], label: Mapping[str, str]) -> list[str]:
+    """Take readings that failed out of the angles, and return what was done."""
+    said = []
+    for name in ANGLES:
+        if name in arrays:
+            arrays[name], rows = drop_failed_readings(arrays[name])
+            said += [describe_failed(rows, label[name])] if rows.size else []
+    return said
+
+
+def _follow_rows(arrays: dict[str, Array], angles: Mapping[str, Array]) -> list[str]:
+    """Let stamps that jump, where the motion does not, go on by the step of the rows, and return what was done."""
+    time = arrays["time"]
+    jumps, step = clock_settings(time, angles), usual_step(time)
+    if not jumps.size:
+        return []
+    arrays["time"] = time[0] + step * np.arange(time.size)
+    mean = (time.size - 1) / max(float(time[-1] - time[0]), step)
+    return [
+        f"rows are taken at {1.0 / step:.6g} Hz, their usual step: the stamps jump at row {jumps[0] + 2} where the "
+        f"motion does not, and say {mean:.6g} Hz over all"
+    ]
 
 
 def _stamp(arrays: dict[str, Array], label: str, source: str) -> tuple[dict[str, Array], list[str]]:

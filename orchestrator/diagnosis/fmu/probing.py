@@ -23,8 +23,6 @@ LOUDEST = 10.0  # times that noise, from which it is none: something moves
 QUIETER = 2.0  # times a record's noise from which that of its map is noted to be more
 FIRST_ROWS = 3  # in which a record shows where it begins, at rest or in motion
 AWAY = 30.0  # times its noise that an output is off in the first rows, from which the start is another
-ALONE = 20.0  # times its noise by which a row leaves its neighbours, to be an outlier
-FEW = 0.01  # of the rows that are outliers at most: more are the motion's own
 TRIMMED = 0.7767  # mean magnitude of Gaussian noise of variance 1 without the largest hundredth
 SCATTER = 1.18
 """Relative standard deviation of what third differences of white noise say of it, times the root of the rows."""
@@ -64,7 +62,6 @@ def prepare_problems(
             problem.noise = np.sqrt(noise**2 + error**2)
             residual = (problem.data.outputs - y) / problem.noise
             notes += [*data.notes[2:], *noise_notes, *_start_notes(problem, residual)]
-            notes += _outlier_notes(problem, residual)
             problems.append(problem)
     except BaseException:
         runner.close()
@@ -250,19 +247,4 @@ def _start_notes(problem: FmuProblem, residual: Array) -> list[str]:
         "not begin where the FMU does, and what is named may be that: say where in [start], or cut it to begin at rest"
         for name, times in zip(problem.outputs, off, strict=True)
         if times > AWAY
-    ]
-
-
-def _outlier_notes(problem: FmuProblem, residual: Array) -> list[str]:
-    """Return a sentence for each output with rows that leave their neighbours far behind, if few."""
-    off = np.abs(residual[1:-1] - 0.5 * (residual[:-2] + residual[2:]))
-    padded = np.pad(off, ((1, 1), (0, 0)))
-    # Beside a row alone its neighbours are off by half as much; at a jump that stays two are off by as much.
-    lone = (off > ALONE) & (off > 1.5 * padded[:-2]) & (off > 1.5 * padded[2:])
-    return [
-        f"output `{name}` leaves its neighbours by {np.max(times):.0f} times its noise in one row at "
-        f"{problem.data.time[int(np.argmax(times)) + 1]:.6g} s (so many: {np.count_nonzero(rows)}): outliers of the "
-        "log make a verdict `unknown`, and should be mended there"
-        for name, times, rows in zip(problem.outputs, off.T, lone.T, strict=True)
-        if 0 < np.count_nonzero(rows) <= FEW * len(rows)
     ]

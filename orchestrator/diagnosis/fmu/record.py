@@ -15,6 +15,7 @@ from orchestrator.master.protocol import Unit
 from orchestrator.master.units import contradiction, conversion, resolve
 from orchestrator.records.arrays import interpolate_missing, runs_of
 from orchestrator.records.jitter import describe_jitter, fit_clock
+from orchestrator.records.rows import check_clock, describe_failed, drop_failed_readings, find_repeats
 from orchestrator.records.tables import NamedColumns, Wanted, read_columns, read_unit
 from orchestrator.records.timing import has_unpadded_fractions, interpolate
 from orchestrator.shared.inference.band import content_band
@@ -30,6 +31,7 @@ LOST = 0.5  # of a sample by which a step of time shows that a row is lost or th
 WHOLE = 0.1  # of a sample by which it may miss whole ones then: else the stamps jitter
 SHOWS = 4.0  # power over that of the noise from which motion shows
 PANE = 1024  # samples of a spectrum's pane at most
+CLOCK_CURE = "put {step} s times the row there"
 RATE_ROUNDING = 0.02  # of a rate that time stamps may be off by
 DEFAULT = FmuSettings()
 
@@ -105,12 +107,20 @@ def read_fmu_record(path: Path, given: Map, uneven: float = DEFAULT.uneven) -> F
     time = Wanted(options.time, "$.options.time", cure)
     read = read_columns(path, time, wanted, options.time_factor, options.header)
     good = np.isfinite(read.time)
-    motion = read.values[len(given.inputs)][good]
-    even, place, jitter = _even(read.time[good], motion, path, uneven)
-    filled, notes = [], [*read.notes, *jitter]
+    values, failed = [], []
     for number, (_, name, entry) in enumerate(columns):
+        column = _convert(read, number, wanted[number], entry.factor, given.units.get(name), name, path)
+        if name in given.outputs:
+            column, rows = drop_failed_readings(column)
+            failed += [describe_failed(rows, entry.column)] if rows.size else []
+        values.append(column[good])
+    measured = {name: column for (_, name, _), column in zip(columns, values, strict=True) if name in given.outputs}
+    check_clock(read.time[good], measured, f"{path}: column of times", CLOCK_CURE)
+    even, place, jitter = _even(read.time[good], next(iter(measured.values())), path, uneven)
+    filled, notes = [], [*read.notes, *jitter, *failed]
+    for (_, _, entry), column in zip(columns, values, strict=True):
         spread = np.full(even.size, np.nan)
-        spread[place] = _convert(read, number, wanted[number], entry.factor, given.units.get(name), name, path)[good]
+        spread[place] = column
         whole, note = _fill(spread, even, entry, path)
         filled.append(whole)
         notes += note
@@ -125,7 +135,23 @@ def read_fmu_record(path: Path, given: Map, uneven: float = DEFAULT.uneven) -> F
     if not np.any(np.ptp(inputs, axis=0)):
         raise RecordError(f"{path}: at least one input must change, but none does")
     signals = signals - np.array([e.reference for e in given.signals.values()])
-    return FmuRecord(even, inputs, outputs, str(path), signals, notes=tuple(notes))
+    return _take_new_readings(FmuRecord(even, inputs, outputs, str(path), signals, notes=tuple(notes)), given)
+
+
+def _take_new_readings(record: FmuRecord, given: Map) -> FmuRecord:
+    """Return the rows in which the output that is read most rarely was read; see ``records.rows``."""
+    found = {
+        name: repeats
+        for name, row in zip(given.outputs, record.outputs.T, strict=True)
+        if (repeats := find_repeats(row)) is not None
+    }
+    if not found:
+        return record
+    slowest = max(found.values(), key=lambda repeats: repeats.every)
+    said = slowest.describe([name for name, repeats in found.items() if repeats == slowest], record.step)
+    first = slowest.first
+    whole = record.part(first, first + (record.size - first - 1) // slowest.every * slowest.every + 1)
+    return replace(decimate(whole, slowest.every), notes=(*record.notes, f"{said}; rows of new readings are taken"))
 
 
 def _column_request(where: str, entry: ColumnEntry) -> Wanted:
@@ -254,13 +280,14 @@ def decimate(record: FmuRecord, factor: int) -> FmuRecord:
     if factor == 1:
         return record
     rows = (record.size - 1) // factor * factor
+    held = record.file_inputs[: rows * record.factor]
 
     def mean(columns: Array) -> Array:
         return np.asarray(columns[:rows].reshape(-1, factor, columns.shape[1]).mean(axis=1))
 
     signals = mean(record.signals) if record.signals.size else record.signals
     return replace(record, time=record.time[:rows:factor], inputs=mean(record.inputs), signals=signals,
-                   outputs=record.outputs[:rows:factor], factor=factor, held=record.inputs[:rows])  # fmt: skip
+                   outputs=record.outputs[:rows:factor], factor=factor * record.factor, held=held)  # fmt: skip
 
 
 def repeat_samples(u: Array, m: int, order: int = 0) -> Array:
