@@ -41,7 +41,7 @@ LEAST_FAST = 50  # rows that move so fast, below which nothing is said
 
 
 @dataclass(frozen=True)
-class Repeats:
+class StaleReadings:
     """Readings that stand in several rows: ``every`` rows bring a new one, from row ``first`` on."""
 
     every: int
@@ -164,7 +164,7 @@ def _goes_on(values: Array, row: int, jump: float, noise: float) -> bool | None:
     return bool(off < GOES_ON * jump * abs(usual) + noise and abs(after - before) < 0.5 * abs(usual) + noise)
 
 
-def find_repeats(values: Array) -> Repeats | None:
+def find_repeats(values: Array) -> StaleReadings | None:
     """Return how often each reading stands while an angle moves by several counts a row; None: once."""
     known = np.isfinite(values)
     if not known.all():
@@ -184,7 +184,7 @@ def find_repeats(values: Array) -> Repeats | None:
     every = round(np.count_nonzero(fast) / new.size)
     counts = np.bincount(new % every, minlength=every)
     first = int(np.argmax(counts))
-    return Repeats(every, first) if counts[first] >= REGULAR * new.size else None
+    return StaleReadings(every, first) if counts[first] >= REGULAR * new.size else None
 
 
 def take_new_readings(record: Record) -> Record:
