@@ -1,6 +1,6 @@
 """The FMUs of this project, built."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -13,7 +13,7 @@ from orchestrator.building.sources import catalogue
 from orchestrator.errors import FmuError, OutputError
 from orchestrator.shared.results import BuildFound
 
-PLATFORMS = ("all", "here")
+PLATFORMS = ("here", "all")
 VERSIONS = (2, 3)
 
 
@@ -59,9 +59,10 @@ def build(
     directory: Path | str | None = None,
     force: bool = False,
     native: bool = False,
-    platforms: str = "all",
+    platforms: str = "here",
     fmi: int = 2,
     real_outputs: bool = False,
+    progress: Callable[[str, float], None] | None = None,
 ) -> BuildResult:
     """Build the FMUs that are missing or older than what they are made from.
 
@@ -71,10 +72,11 @@ def build(
             ``fmus/native/``, those of FMI 3.0 ``fmus/fmi3/``).
         force: build also what is up to date.
         native: translate the sources to C and compile them, so that the FMUs need no Python at run time.
-        platforms: of native FMUs: "all" that the compiler can make, or this one alone ("here"), which is quicker.
+        platforms: of native FMUs: that of this machine ("here"), or "all" that the compiler can make.
         fmi: version of FMI, 2 or 3; FMUs of FMI 3.0 are native.
         real_outputs: of native FMUs: make outputs that are no real numbers local variables, for hosts that read every
             output as a real number; they go to ``real/`` within the folder.
+        progress: called after each native FMU with what was done, and the share of all.
 
     Returns:
         The path of each FMU, by name.
@@ -103,17 +105,23 @@ def build(
     if platforms not in PLATFORMS:
         raise FmuError(f"`platforms` must be one of {', '.join(PLATFORMS)}, but is {platforms!r}", "platforms")
     if native:
-        return _native(list(names) if names else None, folder, force, platforms, fmi, real_outputs)
+        return _native(list(names) if names else None, folder, force, platforms, fmi, real_outputs, progress)
     paths = ensure_built(list(names) if names else None, folder, force=force)
     given = {"names": list(paths), "directory": str(folder), "force": force}
     return BuildResult(paths, find_toolchain().remark, given)
 
 
 def _native(
-    names: Sequence[str] | None, folder: Path, force: bool, platforms: str, fmi: int, real_outputs: bool
+    names: Sequence[str] | None,
+    folder: Path,
+    force: bool,
+    platforms: str,
+    fmi: int,
+    real_outputs: bool,
+    progress: Callable[[str, float], None] | None,
 ) -> BuildResult:
     here = platforms == "here"
-    paths = ensure_native(names, folder, force=force, here=here, fmi=fmi, real_outputs=real_outputs)
+    paths = ensure_native(names, folder, force=force, here=here, fmi=fmi, real_outputs=real_outputs, progress=progress)
     given = {"names": list(paths), "directory": str(folder), "force": force, "native": True, "platforms": platforms}
     given |= {"fmi": fmi} if fmi != 2 else {}
     given |= {"real_outputs": True} if real_outputs else {}

@@ -6,7 +6,8 @@ variables, for hosts that read every output as a real number.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from orchestrator.building.reference_files import reference_files
 from orchestrator.building.sources import PLACEHOLDER, Recipe, fingerprint, recipes_of
 from orchestrator.building.stamping import content_guid, final_text, stamp
 from orchestrator.errors import FmuError
+from orchestrator.shared.cores import usable_cores
 
 NO_COMPILER = "native FMUs need a C compiler: install one (cc), or `pip install 'backlash-cosim[native]'` for zig"
 
@@ -40,17 +42,32 @@ def ensure_native(
     fmi: int = 2,
     real_outputs: bool = False,
     versions: bool = False,
+    progress: Callable[[str, float], None] | None = None,
 ) -> dict[str, Path]:
     """Return the path of each native FMU in ``names`` (default: all), after building what is missing or stale.
 
     Args:
         here: for this platform alone, with the local compiler where there is one: a second instead of half a minute.
         versions: FMUs of other sources stay beside them, each in a folder of its own.
+        progress: called after each FMU with what was done, and the share of all.
     """
     folder = native_directory(fmi) if directory is None else directory
-    return {
-        recipe.name: _ensure(recipe, folder, force, here, fmi, real_outputs, versions) for recipe in recipes_of(names)
-    }
+    build = partial(
+        _ensure, directory=folder, force=force, here=here, fmi=fmi, real_outputs=real_outputs, versions=versions
+    )
+    recipes = list(recipes_of(names))
+    with ThreadPoolExecutor(usable_cores()) as pool:  # each waits for a compiler most of its time
+        jobs = {pool.submit(build, recipe): recipe.name for recipe in recipes}
+        try:
+            for n, job in enumerate(as_completed(jobs), start=1):
+                job.result()
+                if progress is not None:
+                    progress(f"built {jobs[job]}", n / len(jobs))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    paths = {name: job.result() for job, name in jobs.items()}
+    return {recipe.name: paths[recipe.name] for recipe in recipes}
 
 
 def build_native(recipe: Recipe, directory: Path, fmi: int = 2) -> Path:

@@ -7,6 +7,7 @@ from orchestrator.api.build import PLATFORMS, VERSIONS, build, short_path
 from orchestrator.building.build import default_directory
 from orchestrator.building.native_build import native_directory
 from orchestrator.commands._console import print_blocks
+from orchestrator.commands._stages import Stages
 from orchestrator.shared.output import stage_output
 
 
@@ -26,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--platforms",
         choices=PLATFORMS,
-        default="all",
-        help="of native FMUs: all that the compiler can make (default), or this one alone, which is quicker",
+        default=PLATFORMS[0],
+        help="of native FMUs: this machine's (default), or all that the compiler can make, which takes minutes",
     )
     parser.add_argument(
         "--fmi",
@@ -46,7 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Build what is missing or stale and say what this machine cannot give."""
-    with stage_output(args.out) as folder:
+    with stage_output(args.out) as folder, Stages() as stages:
+        stages.begin("building", 0.0)
         result = build(
             args.names,
             directory=args.directory,
@@ -55,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
             platforms=args.platforms,
             fmi=args.fmi,
             real_outputs=args.real_outputs,
+            progress=stages.at,
         )
         result.write(folder, args.out)
     print_blocks(result.blocks())

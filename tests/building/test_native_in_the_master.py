@@ -35,7 +35,12 @@ period = 0.3
 @pytest.fixture(scope="module")
 def native(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     names = ["Drivetrain", "LqrController", "KalmanEstimator"]
-    built = oc.build(names, native=True, platforms="here", directory=tmp_path_factory.mktemp("native"))
+    told: list[tuple[str, float]] = []
+    built = oc.build(
+        names, native=True, directory=tmp_path_factory.mktemp("native"), progress=lambda *what: told.append(what)
+    )
+    assert sorted(what for what, _ in told) == sorted(f"built {name}" for name in names)
+    assert [share for _, share in told] == [(n + 1) / len(names) for n in range(len(names))]
     return {name: built[name] for name in names}
 
 
