@@ -98,6 +98,22 @@ for name in ("gauss_seidel", "alternating"):
 """,
         ["True", "1", "2"],
     ),
+    "A field of a result": (
+        """
+import json
+from pathlib import Path
+import orchestrator as oc
+from orchestrator.reporting import report_from_directory
+
+found = oc.inspect("docs/examples/machine.csv")
+found.save("out")
+(told,) = {row["median"] for row in json.loads(Path("out/inspect.json").read_text())["results"]["channels"][:1]}
+page = next(s for s in report_from_directory(Path("out")).all_sections() if s.title == "Channels")
+print(told == found.channels[0].median == page.rows[0][-1], page.columns[-1].name)
+print("median" in str(found).split("Channels")[1].splitlines()[1])
+""",
+        ["True", "median", "True"],
+    ),
     "A page": (
         """
 from pathlib import Path

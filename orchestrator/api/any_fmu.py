@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, text_table
 from orchestrator.diagnosis.fmu.corrected_ssp import write_corrected
 from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnose_records
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
@@ -32,6 +32,7 @@ from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import ParameterFound
+from orchestrator.shared.results.fields import fields_table
 from orchestrator.shared.settings import as_tables, choose_settings
 
 Progress = Callable[[str], None]
@@ -50,7 +51,6 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
     """
 
     replaces: ClassVar[tuple[str, ...]] = ("corrected.ssp", "diagnose.png")
-    signal_word: ClassVar[str] = "output"
     diagnosis: FmuDiagnosis
     validation: TestMisfit | None
     seconds: float
@@ -138,13 +138,9 @@ def parameter_results(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
 
 
 def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
-    d = diagnosis.diagnosis
-    rows = [
-        (name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.standard_error:.2g}", e.unit)
-        for name, e in d.parameters.items()
-    ]
-    if rows:
-        yield table("Parameters", ("name", "nominal", "re-fitted", "standard error", "unit"), rows)
+    parameters = parameter_results(diagnosis.diagnosis)
+    if parameters:
+        yield text_table(fields_table("Parameters", parameters, names="parameter"))
     yield from diagnosis._misfit_tables()
 
 

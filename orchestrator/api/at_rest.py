@@ -1,48 +1,15 @@
-"""What a loop with a gap will do at rest, as results and commands say it."""
+"""What a loop with a gap will do at rest, in sentences."""
 
 import math
 from collections.abc import Sequence
 
 from orchestrator.api.arguments import within
-from orchestrator.control.standstill import LONGEST, forecast_rest
+from orchestrator.control.standstill import LONGEST
 from orchestrator.errors import ScenarioError
-from orchestrator.plants.design import REGULATOR_STATES, DrivetrainValues
+from orchestrator.plants.design import REGULATOR_STATES
 from orchestrator.shared.results.regulator import ForecastFound
 
 LARGEST_WEIGHT = 1e12
-
-
-def rest_forecast(
-    values: DrivetrainValues, gains: tuple[float, ...], sample_time: float, delay: int = 0
-) -> ForecastFound:
-    """Return what the loop ``u = -K x`` does at rest, with its margins.
-
-    Args:
-        gains: for ``REGULATOR_STATES``.
-        sample_time: of the controller [s].
-        delay: of the request [samples].
-
-    Raises:
-        ScenarioError: the loop is unstable even without a gap.
-    """
-    f = forecast_rest(values, gains, sample_time, delay)
-    m = f.margins
-    return ForecastFound(
-        cycles=f.cycles,
-        twist=f.twist,
-        load=f.load,
-        frequency=f.frequency,
-        phase_margin=m.phase,
-        delay_margin=_finite(m.delay),
-        rank=f.rank,
-        settled=f.settled,
-        lower_gain=m.lower or None,
-        upper_gain=_finite(m.upper),
-    )
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def rest_text(f: ForecastFound, loop: str) -> str:

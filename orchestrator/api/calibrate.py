@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.api.any_fmu import Progress, parameter_results, read_records
-from orchestrator.api.shown import Block, Result, table
+from orchestrator.api.shown import Block, Result, text_table
 from orchestrator.diagnosis.fmu.diagnose import FmuCalibration, calibrate_fmu
 from orchestrator.diagnosis.fmu.mapping import read_map
 from orchestrator.diagnosis.fmu.system import read_system
@@ -15,7 +15,7 @@ from orchestrator.diagnosis.report.json_results import misfit_found
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.isolation.walls import support
-from orchestrator.shared.results.any_fmu import FmuCalibrationFound, LearnedParameterFound
+from orchestrator.shared.results.any_fmu import FmuCalibrationFound, LearnedParameterFound, calibration_tables
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
@@ -47,27 +47,15 @@ class CalibrationResult(Result):
 
     def blocks(self) -> Sequence[Block]:
         """Return parameters and misfit."""
-        c, d = self.calibration, self.calibration.diagnosis
-        rows = [
-            (name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.interval[0]:.6g} to {e.interval[1]:.6g}",
-             f"{100.0 * c.learned[name]:.0f} %", e.unit)
-            for name, e in d.parameters.items()
-        ]  # fmt: skip
-        head = ("name", "nominal", "value", "95 % interval", "learned", "unit")
+        c = self.calibration
+        parameters, *misfits = calibration_tables(self.results(Path()))
         lines: list[Block] = [f"Parameters {'explain' if c.explained else 'do not explain'} the record to its noise"]
-        lines.append(table("Parameters", head, rows))
+        lines.append(text_table(parameters))
         lines += [f"Note: {text}" for text in c.notes]
         trust = self.trust
         lines.append(f"Trust: {trust.level.word}")
         lines += [f"  {reason}" for reason in trust.reasons]
-        cells = [
-            (test.source, one.signal, *(f"{v:.4g}" for v in (one.nominal, one.final, one.noise)), one.unit)
-            for test in d.test
-            for one in test.signals
-        ]
-        lines.append(
-            table("Misfit on test data", ("record", "output", "nominal", "calibrated", "noise", "unit"), cells)
-        )
+        lines += map(text_table, misfits)
         return lines
 
     def results(self, place: Path) -> FmuCalibrationFound:

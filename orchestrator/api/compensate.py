@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
-from orchestrator.api.at_rest import five, margins_text, rest_forecast, rest_text
+from orchestrator.api.at_rest import five, margins_text, rest_text
 from orchestrator.api.machine import read_fitted_model, trusted_machine
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, text_table
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.building.starts import SAMPLE_TIME
 from orchestrator.control.loops import COMPENSATOR, FMUS, LQR, MPC, SHIFTED, ControlTask, make_loop, make_task
@@ -27,13 +27,14 @@ from orchestrator.control.measures import (
     quickest_landing,
 )
 from orchestrator.control.predictive import PredictiveLaw, make_predictive_loop
+from orchestrator.control.standstill import forecast_rest
 from orchestrator.control.take_away import file_names, write_loop
 from orchestrator.control.weights import choose_weights
 from orchestrator.errors import ScenarioError
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.scenarios.scenario import simulate
 from orchestrator.shared.output import write_columns
-from orchestrator.shared.results.compensate import CompensateFound, LawFound
+from orchestrator.shared.results.compensate import CompensateFound, LawFound, laws_tables
 from orchestrator.shared.results.regulator import ForecastFound
 
 Array = NDArray[np.float64]
@@ -53,10 +54,6 @@ RANGES = {
 BENCHMARK = {"alpha": 0.02, "tau": 5e-3, "impact_speed": 0.1, "friction": 2.0, "plants": 5}
 PLANTS = 100  # that a machine's controller is judged on
 MEASURES = ("time", "landing", "impact", "error", "rest")
-HEAD = (
-    "law", "traversal [s]", "its impact [rad/s]", "largest impact [rad/s]", "rms error [mrad]", "rest [counts]",
-    "contacts at rest [1/s]", "unstable",
-)  # fmt: skip
 NOTABLE = 1.5  # standard deviations, by which unstable plants lie off in what makes them so
 _BOUND_SPEEDS = np.geomspace(0.02, 2.0, 30)  # of the curve beside the traversals [rad/s]
 
@@ -90,17 +87,6 @@ class CompensateResult(PlottedResult):
     def blocks(self) -> Sequence[Block]:
         """Return the table of the laws, the bound, what the loop does at rest, and doubts."""
         task = self.task
-        rows = [
-            (
-                law.law,
-                *(_with_upper(law, name, 1.0) for name in ("time", "landing", "impact")),
-                _with_upper(law, "error", 1e3),
-                _with_upper(law, "rest", 1.0),
-                f"{law.contacts:.1f}",
-                f"{law.unstable} of {self.arguments['plants']}",
-            )
-            for law in self.laws
-        ]
         title = f"A move of {task.height:.4g} rad in {task.duration:g} s, half-gap {task.machine.alpha:.4g} rad"
         speed = f"{task.impact_speed:.3g} rad/s"
         bound = f"No traversal from rest that lands at {speed} takes less than {self.bound:.4f} s."
@@ -108,7 +94,7 @@ class CompensateResult(PlottedResult):
         chosen = f"Weights of the states {weights}, of the request {task.torque_weight:g}: gains "
         chosen += ", ".join(f"{gain:.6g}" for gain in task.gains)
         return [
-            table(f"{title}: medians over plants (95 %)", HEAD, rows),
+            *map(text_table, laws_tables(f"{title}: medians over {self.arguments['plants']} plants", self.laws)),
             bound,
             chosen,
             rest_text(self.forecast, "the plain LQR"),
@@ -255,7 +241,7 @@ def compensate(
         text = f"`impact_speed` must be at most {most:.3g} rad/s, but is {task.impact_speed:g} rad/s"
         raise ScenarioError(f"{text}: no traversal of this gap from rest ends quicker", "impact_speed")
     laws, measured = _run_laws(task, int(given["plants"]), seed, mpc, progress)
-    forecast = rest_forecast(task.nominal, task.gains, task.sample_time)
+    forecast = forecast_rest(task.nominal, task.gains, task.sample_time)
     doubts += tuple(_doubts(task, forecast, measured[COMPENSATOR], seed, said is not None))
     name = "" if said is None else re.sub(r"\W+", "_", Path(machine.source).stem).strip("_") or "machine"
     asked = given | {"model": None if said is None else said.source, "mpc": mpc, "native": native, "fmi": fmi}
@@ -311,20 +297,6 @@ def _summarise(law: str, measured: Sequence[LoopMeasures], path: tuple[Array, Ar
         path_times=tuple(path[0].tolist()),
         path=tuple(path[1].tolist()),
     )
-
-
-def _with_upper(law: LawFound, name: str, factor: float) -> str:
-    """Return median and 95 % quantile of a measure as text."""
-    medians = {
-        "time": law.times,
-        "landing": law.impacts,
-        "impact": (law.impact,),
-        "error": (law.error,),
-        "rest": (law.rest,),
-    }
-    if name not in law.upper:
-        return "none"
-    return f"{factor * float(np.median(medians[name])):.3g} ({factor * law.upper[name]:.3g})"
 
 
 def _doubts(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from orchestrator.api.arguments import within
 from orchestrator.api.estimable import require_linear
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, text_table
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.estimation import design as designing
 from orchestrator.estimation.apply import UNSEEN
@@ -25,6 +25,7 @@ from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import LONGEST_STEP, natural_frequency
 from orchestrator.records.record import MINIMUM_ROWS
 from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound
+from orchestrator.shared.results.fields import fields_table
 
 # Least and largest value of each argument: rad, N.m, rad/s, s, Hz.
 RANGES = {
@@ -103,18 +104,10 @@ class DesignResult(PlottedResult):
     def blocks(self) -> Sequence[Block]:
         """Return the table of the candidates."""
         request, best = self.request, self.best
-        rows = [
-            [
-                c.name + " (design.csv)" * (c is best),
-                f"{c.bound:.2g}" if c.bound < UNSEEN else "not seen",
-                f"{c.torque:.4g}",
-                f"{c.speed:.4g}",
-            ]
-            for c in self.candidates
-        ]
-        head = ("excitation", "bound on the half-gap [rad]", "peak torque [N.m]", "peak motor speed [rad/s]")
         duration = float(self.arguments["duration"])
-        shown: list[Block] = [table(f"To see a half-gap of {self.size:g} rad in {duration:g} s", head, rows)]
+        title = f"To see a half-gap of {self.size:g} rad in {duration:g} s"
+        rows = [_entry(c, " (design.csv)" if c is best else "") for c in self.candidates]
+        shown: list[Block] = [text_table(fields_table(title, rows))]
         if request is not None:
             peak = max(abs(request.number(best.torque)), abs(request.number(-best.torque)))
             shown.append(f"design.csv has the request in `{request.label}` too, at most {peak:.4g}.")
@@ -126,7 +119,7 @@ class DesignResult(PlottedResult):
         Returns:
             Name, bound [rad], peak torque [N.m] and peak motor speed [rad/s] of each.
         """
-        return tuple(ExcitationFound(c.name, c.bound, c.torque, c.speed) for c in self.candidates if c.bound < UNSEEN)
+        return tuple(_entry(c) for c in self.candidates if c.bound < UNSEEN)
 
     def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says of the design."""
@@ -135,6 +128,10 @@ class DesignResult(PlottedResult):
     def write_data(self, folder: Path) -> None:
         """Write ``design.csv``."""
         self.write_csv(folder / "design.csv")
+
+
+def _entry(c: Excitation, more: str = "") -> ExcitationFound:
+    return ExcitationFound(c.name + more, c.bound if c.bound < UNSEEN else None, c.torque, c.speed)
 
 
 def check_design(

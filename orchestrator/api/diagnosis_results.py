@@ -4,18 +4,17 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, text_table
+from orchestrator.diagnosis.report.json_results import misfit_found
 from orchestrator.diagnosis.result import DiagnosisOutcome, GradedEffect, TestMisfit
+from orchestrator.shared.results.diagnose import misfit_tables
 from orchestrator.shared.trust import Trust
-
-STAGES = ("nominal", "parameters", "final", "noise")
 
 
 class AnyDiagnosisResult(PlottedResult):
     """Verdict, effects, misfits, trust and notes of a diagnosis."""
 
     command: ClassVar[str] = "diagnose"
-    signal_word: ClassVar[str] = "signal"
     diagnosis: DiagnosisOutcome
     validation: TestMisfit | None
 
@@ -50,11 +49,7 @@ class AnyDiagnosisResult(PlottedResult):
         yield from (f"  {reason}" for reason in self.trust.reasons)
 
     def _misfit_tables(self) -> Iterator[Block]:
-        for title, tests in (("Misfit on test data", self.test), ("Misfit on the other record", (self.validation,))):
-            rows = [
-                (test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit)
-                for test in tests if test is not None for one in test.signals
-            ]  # fmt: skip
-            if rows:
-                head = ("record", self.signal_word, "as given", "re-fitted", "with effects", "noise", "unit")
-                yield table(title, head, rows)
+        report = self.diagnosis.settings.report
+        tests = [misfit_found(test, report) for test in self.test]
+        other = None if self.validation is None else misfit_found(self.validation, report)
+        yield from map(text_table, misfit_tables(tests, other))

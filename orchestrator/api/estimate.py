@@ -15,10 +15,10 @@ from orchestrator.api.diagnose import diagnose as find_missing
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.live import live_fitted_model
-from orchestrator.api.methods import HEAD, MethodResult, describe_record, method_entry, method_row
+from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, doubts_of, table
+from orchestrator.api.shown import Block, doubts_of, text_table
 from orchestrator.diagnosis.report.summary import play_of
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
@@ -35,7 +35,7 @@ from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
-from orchestrator.shared.results.estimate import EstimateFound, MethodFound, RepeatsFound
+from orchestrator.shared.results.estimate import EstimateFound, MethodFound, RepeatsFound, methods_table
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Level, Trust
 
@@ -150,20 +150,12 @@ class EstimateResult(PlottedResult):
             missing = [f"The model does not explain the {those}; what it lacks:", *self.diagnosis.summary()]
         elif self.undiagnosed:
             missing = [f"The model does not explain the {those}; no diagnosis: {self.undiagnosed}"]
-        rows = [method_row(m) for m in self.methods if m.estimate is not None]
+        methods = methods_table(title, {m.method: method_entry(m) for m in self.methods})
         unfit = [f"{m.method} does not apply: {m.reason}" for m in self.methods if m.estimate is None]
         sizes = [f"{self.best.method}: {self._play()}"] if self.estimates and self.best.visible else []
         floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_compare_diagnosis(self.estimates)}"]
-        return [
-            *doubts_of((r, *self.more)),
-            table(title, HEAD, rows),
-            *sizes,
-            *floor,
-            *messages,
-            *doubts,
-            *unfit,
-            *missing,
-        ]
+        warnings = doubts_of((r, *self.more))
+        return [*warnings, text_table(methods), *sizes, *floor, *messages, *doubts, *unfit, *missing]
 
     def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says."""

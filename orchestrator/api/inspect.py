@@ -11,10 +11,8 @@ import numpy as np
 from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
-from orchestrator.api.shown import Block, doubts_of, table
+from orchestrator.api.shown import Block, doubts_of, text_table
 from orchestrator.estimation.inspection.channels import (
-    Band,
-    Channel,
     channels_of,
     delay_between,
     excitation_of,
@@ -39,6 +37,7 @@ from orchestrator.shared.results.inspect import (
     InspectFound,
     LagFound,
     ReversalsFound,
+    inspect_tables,
 )
 
 STARTER = "model.toml"
@@ -73,12 +72,12 @@ class InspectResult(PlottedResult):
     replaces: ClassVar[tuple[str, ...]] = ("inspect.png",)
     record: Record
     model: Model
-    channels: tuple[Channel, ...]
-    excitation: tuple[Band, ...]
+    channels: tuple[ChannelFound, ...]
+    excitation: tuple[BandFound, ...]
     delay: tuple[float, float] | None
     reversals: tuple[int | None, int]
     sufficiency: Sufficiency
-    effects: tuple[tuple[str, float, str], ...]
+    effects: tuple[EffectShown, ...]
     assumed: tuple[str, ...]
     starter: str
     two_angles: Estimate | None = None
@@ -103,36 +102,9 @@ class InspectResult(PlottedResult):
         read = [*doubts_of([r]), *([f"{r.source}: {'; '.join(r.notes)}"] if r.notes else [])]
         timing = "" if r.timing is None else f"; {r.timing.describe()}"
         read.append(f"{r.size} rows, {r.duration:g} s{timing}; {r.n_missing} rows with missing samples")
-        channels = table(
-            "Channels",
-            ("channel", "unit", "least", "most", "rounded to", "noise", "at an end [%]", "missing"),
-            [
-                (c.name, c.unit, f"{c.least:.5g}", f"{c.most:.5g}", f"{c.count:.4g}" if c.count else "no",
-                 f"{c.noise:.2g}", f"{100.0 * c.saturated:.2g}", str(c.missing))
-                for c in self.channels
-            ],
-        )  # fmt: skip
-        bands = table(
-            "Excitation",
-            ("band [Hz]", "share of the torque's power [%]", "motor follows (coherence)"),
-            [(f"{b.low:g} to {b.high:g}", f"{100.0 * b.share:.1f}", f"{b.coherence:.2f}") for b in self.excitation],
-        )
-        gaps = table(
-            "Half-gaps that would show",
-            ("half-gap [rad]", "bound [rad]", "seen"),
-            [
-                (f"{size:g}", f"{bound:.2g}" if bound < 1.0 else "none", "yes" if bound < SEEN * size else "no")
-                for size, bound in self.sufficiency.bounds
-            ],
-        )
-        effects = table(
-            "Effects that would show",
-            ("effect", "clearly from"),
-            [(name, f"{size:.2g} {unit}") for name, size, unit in self.effects],
-        )
         assumed = [f"Assumed: {'; '.join(self.assumed)}."] if self.assumed else []
-        shown = [t for t in (bands, gaps, effects) if t.rows]
-        return [*read, channels, *self._between(), *shown, *assumed, *self.verdict()]
+        channels, *others = inspect_tables(self.results())
+        return [*read, text_table(channels), *self._between(), *map(text_table, others), *assumed, *self.verdict()]
 
     def _between(self) -> list[str]:
         torque, speed = self.reversals
@@ -151,8 +123,8 @@ class InspectResult(PlottedResult):
         r, found, angles = self.record, self.sufficiency, self.two_angles
         return InspectFound(
             record=describe_record(r),
-            channels=tuple(ChannelFound(**vars(c)) for c in self.channels),
-            excitation=tuple(BandFound(**vars(b)) for b in self.excitation),
+            channels=self.channels,
+            excitation=self.excitation,
             reversals=ReversalsFound(*self.reversals),
             delay=None if self.delay is None else LagFound(*self.delay),
             smallest_gap=found.smallest if math.isfinite(found.smallest) else None,
@@ -160,7 +132,7 @@ class InspectResult(PlottedResult):
                 GapShown(size, bound if math.isfinite(bound) else None, bound < SEEN * size)
                 for size, bound in found.bounds
             ),
-            effects=tuple(EffectShown(*effect) for effect in self.effects),
+            effects=self.effects,
             better_experiments=tuple(
                 ExcitationFound(c.name, c.bound, c.torque, c.speed) for c in found.better[:SHOWN_EXPERIMENTS]
             ),

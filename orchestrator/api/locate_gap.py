@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,13 +11,13 @@ from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
-from orchestrator.api.shown import Block, doubts_of, table
+from orchestrator.api.shown import Block, doubts_of, text_table
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.estimation.effort import Stop, never
 from orchestrator.estimation.protocol import LEVEL
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.estimation.stages.locating import locate_gap as find_gap
-from orchestrator.estimation.stages.location import BOTH, Location, StageGap
+from orchestrator.estimation.stages.location import Location, StageGap
 from orchestrator.estimation.stages.problem import GAPS
 from orchestrator.estimation.trust import trust_of_location
 from orchestrator.plants.known.two_stage_train import TRAIN
@@ -27,13 +27,11 @@ from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results import GapFound
-from orchestrator.shared.results.estimate import EstimateFound, LocationFound
+from orchestrator.shared.results.estimate import EstimateFound, LocationFound, location_tables
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Trust
 
 METHOD = "two_stages"
-HEAD = ("gap", "half-gap [rad]", "95 % interval [rad]")
-BEHIND = ("answer", "log-likelihood behind the best")
 
 
 @dataclass(frozen=True, repr=False)
@@ -98,17 +96,23 @@ class LocationResult(PlottedResult):
         """Return the answer, the sizes and by how much each answer falls behind."""
         r = self.record
         title = f"{r.source}: {r.duration:g} s at {1.0 / r.step:g} Hz, two encoders"
-        rows = [_row(f"stage {n}, at its gear's output", gap) for n, gap in enumerate(self.stages, start=1)]
-        rows.append(_row("both, seen from the load", self.total))
-        ways = [(_words(name), f"{behind:.1f}") for name, behind in self.location.behind.items()]
+        sizes, ways = location_tables(self._describe())
         doubts = [f"The answer is {self.trust.level.word}: {reason}" for reason in self.trust.reasons]
-        return [
-            *doubts_of([r]),
-            table(title, HEAD, rows),
-            table("Where the gap can be", BEHIND, ways),
-            self.message,
-            *doubts,
-        ]
+        shown = text_table(replace(sizes, title=title))
+        return [*doubts_of([r]), shown, text_table(ways), self.message, *doubts]
+
+    def _describe(self) -> LocationFound:
+        found = self.location
+        return LocationFound(
+            answers=found.answers,
+            answer=found.answer,
+            total=_gap_found(found.total),
+            stages={str(n): _gap_found(gap) for n, gap in enumerate(found.stages, start=1)},
+            behind=found.behind,
+            traversals=found.traversals,
+            autocorrelation=found.autocorrelation,
+            parameters=found.parameters,
+        )
 
     def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says, which names nothing of the result's folder."""
@@ -126,16 +130,7 @@ class LocationResult(PlottedResult):
             trust=self.trust.to_result(),
             record=describe_record(self.record),
             method=METHOD,
-            location=LocationFound(
-                answers=found.answers,
-                answer=found.answer,
-                total=_gap_found(found.total),
-                stages={str(n): _gap_found(gap) for n, gap in enumerate(found.stages, start=1)},
-                behind=found.behind,
-                traversals=found.traversals,
-                autocorrelation=found.autocorrelation,
-                parameters=found.parameters,
-            ),
+            location=self._describe(),
             settings=as_tables(self.settings),
         )
 
@@ -210,15 +205,6 @@ def require_train(model: Model) -> None:
                 f"itself, but is {entry.value:g}",
                 name,
             )
-
-
-def _row(name: str, gap: StageGap) -> list[str]:
-    low, high = gap.interval
-    return [name, f"{gap.alpha:.5g}" if math.isfinite(gap.alpha) else "open", f"{low:.5g} to {high:.5g}"]
-
-
-def _words(answer: str) -> str:
-    return "both stages" if answer == BOTH else f"stage {answer} alone"
 
 
 def _gap_found(gap: StageGap) -> GapFound:

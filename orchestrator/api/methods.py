@@ -1,4 +1,4 @@
-"""What one method says of a record, and the rows and entries that show it."""
+"""What one method says of a record, and the entries that show it."""
 
 import math
 from dataclasses import dataclass
@@ -7,8 +7,6 @@ from orchestrator.estimation.protocol import LEVEL, Estimate
 from orchestrator.records.record import Record
 from orchestrator.shared.results.estimate import MethodFound, RecordFound
 from orchestrator.shared.trust import Trust
-
-HEAD = ("method", "half-gap [rad]", "trust", "95 % interval", "standard error", "Cramer-Rao")
 
 
 @dataclass(frozen=True)
@@ -36,22 +34,6 @@ def describe_record(record: Record) -> RecordFound:
     return RecordFound(
         record.size, record.step, record.source, record.n_missing, (*record.doubts, *record.notes), record.angle_unit
     )
-
-
-def method_row(result: MethodResult) -> list[str]:
-    """Return the row of a method that applies, under ``HEAD``."""
-    estimate = result.estimate
-    assert estimate is not None
-    low, high = estimate.interval
-    name = estimate.method.replace("_", " ")
-    if not estimate.visible:
-        return [name, "not seen", _word(result), f"below {high:.6g}" if math.isfinite(high) else "", "", ""]
-    errors = [f"{estimate.standard_error:.2g}", f"{result.bound:.2g}" if math.isfinite(result.bound) else ""]
-    return [name, f"{estimate.alpha:.6g}", _word(result), f"{low:.6g} to {high:.6g}", *errors]
-
-
-def _word(result: MethodResult) -> str:
-    return "" if result.trust is None else result.trust.level.word
 
 
 def _number(value: float) -> float | None:

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
-from orchestrator.api.at_rest import LARGEST_WEIGHT, five, margins_text, rest_forecast, rest_text
+from orchestrator.api.at_rest import LARGEST_WEIGHT, five, margins_text, rest_text
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, table
 from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, TORQUE_WEIGHT
-from orchestrator.control.standstill import loop_response
+from orchestrator.control.standstill import forecast_rest, loop_response
 from orchestrator.errors import ScenarioError
 from orchestrator.plants import design
 from orchestrator.plants.design import GAIN_UNITS, REGULATOR_STATES, DrivetrainValues, five_state_model
@@ -148,5 +148,5 @@ def design_regulator(
             raise ScenarioError("`state_weights` must weigh an angle, but has 0 for both", "state_weights")
         given["state_weights"] = weights
         chosen = design.design_regulator(five_state_model(values), np.diag(weights), torque_weight, sample_time).gains
-    forecast = rest_forecast(values, chosen, sample_time, delay)
+    forecast = forecast_rest(values, chosen, sample_time, delay)
     return RegulatorResult(chosen, values, sample_time, delay, forecast, given)

@@ -8,7 +8,9 @@ from typing import Any, ClassVar
 
 from orchestrator.plain_text import plain_text
 from orchestrator.records.arrays import Record
+from orchestrator.shared.numbers import cell_text
 from orchestrator.shared.output import stage_output, write_result
+from orchestrator.shared.results.fields import ReportTable
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,12 @@ def write_page(folder: Path, command: str, pictures: bool = False) -> None:
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:
     """Make a table from any sequences of texts."""
     return TextTable(title, tuple(columns), tuple(tuple(row) for row in rows))
+
+
+def text_table(shown: ReportTable) -> TextTable:
+    """Return a table of a page as text, its note apart."""
+    rows = [[cell_text(v, c.digits) for v, c in zip(row, shown.columns, strict=True)] for row in shown.rows]
+    return table(shown.title, [column.heading for column in shown.columns], rows)
 
 
 def plain_block(block: Block) -> Block:

@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.api.arguments import choose_experiment
 from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, table, text_table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
 from orchestrator.engine import DesignCases, Row, Status, Sweep
 from orchestrator.engine.work import file_hash
@@ -24,6 +24,7 @@ from orchestrator.scenarios.sweep import check_parameters
 from orchestrator.shared.numbers import exact_text
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import CalibrationFound, ErrorsFound, SweepFound
+from orchestrator.shared.results.fields import fields_table
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Trust
 
@@ -85,34 +86,19 @@ class SweepResult(AnySweepResult):
             title += f", the first {len(shown)}; all of them are in sweep.csv"
         extra = [name for name in self.cases.names if name not in OWN_PARAMETERS]
         found = ("S [rad]", "estimate [rad]", "interval [rad]", "error [rad]", "error [%]")
-        rows = [
-            [
-                f"{level:g}",
-                str(s.count),
-                f"{s.mean_percent:.4f}",
-                f"{s.worst_percent:.4f}",
-                f"{s.mse:.3e}",
-                f"{100.0 * s.coverage:.1f}",
-            ]
-            for level, s in self.statistics.items()
-        ]
         total = len(self.cases)
         errors = f"Errors by noise level ({total - self.failed} of {total} cases done, {self.failed} failed)"
-        head = (
-            "noise [rad]",
-            "cases",
-            "mean error [%]",
-            "worst [%]",
-            "MSE [rad^2]",
-            "intervals that hold the size [%]",
-        )
-        tables = [table(title, ("actual [rad]", "noise [rad]", *extra, *found), shown), table(errors, head, rows)]
+        shown_errors = text_table(fields_table(errors, self._errors(), of=ErrorsFound))
+        tables = [table(title, ("actual [rad]", "noise [rad]", *extra, *found), shown), shown_errors]
         plays = self._plays()
         if len(set(plays.values())) == 1:
             sizes = [f"Size: {plays['smallest']}"]
         else:
             sizes = [f"{word.capitalize()} size: {play}" for word, play in plays.items()]
         return [*tables, *sizes, f"FMUs: {self.fmu_kind}", f"Trust: {self.trust}"]
+
+    def _errors(self) -> list[ErrorsFound]:
+        return [ErrorsFound(noise=level, **asdict(s)) for level, s in self.statistics.items()]
 
     def _plays(self) -> dict[str, Play]:
         """Return the smallest and the largest size of the finished cases."""
@@ -128,7 +114,7 @@ class SweepResult(AnySweepResult):
             failed=self.failed,
             columns=self.columns(),
             play={word: play.to_result() for word, play in self._plays().items()},
-            statistics=[ErrorsFound(noise=level, **asdict(s)) for level, s in self.statistics.items()],
+            statistics=self._errors(),
             trust=self.trust.to_result(),
             experiment=asdict(self.plan.experiment),
             calibrations={f"{level:g}": _provenance(c) for level, c in self.calibrations.items()},

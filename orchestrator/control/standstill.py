@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.errors import ScenarioError
 from orchestrator.plants.design import DrivetrainValues, five_state_model, rank_report, six_state_model
+from orchestrator.shared.results.regulator import ForecastFound
 
 if TYPE_CHECKING:
     from control import StateSpace
@@ -54,32 +55,9 @@ class Margins:
     delay: float
 
 
-@dataclass(frozen=True)
-class RestForecast:
-    """What a loop with a gap will do at rest, without friction and load.
-
-    Attributes:
-        cycles: whether it oscillates for ever.
-        twist: amplitude of the twist, over the half-gap; 0 where it is still.
-        load: amplitude of the load's angle, over the half-gap; 0 where it is still.
-        frequency: [Hz]; 0 where it is still.
-        settled: whether the motion repeated itself, or came to rest, within the time that it was followed.
-        margins: of the loop without a gap.
-        rank: of the model with the load torque as a sixth state: how many an input moves.
-    """
-
-    cycles: bool
-    twist: float
-    load: float
-    frequency: float
-    settled: bool
-    margins: Margins
-    rank: int
-
-
 def forecast_rest(
     values: DrivetrainValues, gains: tuple[float, ...], sample_time: float, delay: int = 0
-) -> RestForecast:
+) -> ForecastFound:
     """Return what the loop ``u = -K x`` does at rest.
 
     Args:
@@ -111,12 +89,19 @@ def forecast_rest(
         before = size
     largest = int(np.argmax(size))
     margins = loop_margins(five_state_model(values), gains, sample_time, delay)
-    rank = rank_report(six_state_model(values)).controllable
-    if size[largest] < STILL:
-        return RestForecast(False, 0.0, 0.0, 0.0, bool(settled.all()), margins, rank)
-    frequency = _frequency(load[largest], sample_time)
-    amplitude = 0.5 * float(np.ptp(twist[largest]))
-    return RestForecast(True, amplitude, float(size[largest]), frequency, bool(settled.all()), margins, rank)
+    cycles = bool(size[largest] >= STILL)
+    return ForecastFound(
+        cycles=cycles,
+        twist=0.5 * float(np.ptp(twist[largest])) if cycles else 0.0,
+        load=float(size[largest]) if cycles else 0.0,
+        frequency=_frequency(load[largest], sample_time) if cycles else 0.0,
+        phase_margin=margins.phase,
+        delay_margin=margins.delay if math.isfinite(margins.delay) else None,
+        rank=rank_report(six_state_model(values)).controllable,
+        settled=bool(settled.all()),
+        lower_gain=margins.lower or None,
+        upper_gain=margins.upper if math.isfinite(margins.upper) else None,
+    )
 
 
 def loop_margins(model: StateSpace, gains: tuple[float, ...], sample_time: float, delay: int = 0) -> Margins:

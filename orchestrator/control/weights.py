@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.control.machine import Machine
-from orchestrator.control.standstill import RestForecast, forecast_rest, loop_margins
+from orchestrator.control.standstill import forecast_rest, loop_margins
 from orchestrator.errors import DesignError, ScenarioError
 from orchestrator.plants.design import design_regulator, five_state_model
+from orchestrator.shared.results.regulator import ForecastFound
 
 BANDWIDTHS = 2.0 * 0.7 ** np.arange(9)  # over the load's own frequency
 DAMPINGS = (5.0, 3.0, 1.5)
@@ -34,7 +35,7 @@ class ChosenWeights:
     """
 
     weights: tuple[float, ...]
-    forecast: RestForecast
+    forecast: ForecastFound
     tried: int
 
 

@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Cell = float | int | str | bool | None
+from orchestrator.shared.results.fields import Cell, ReportTable
+
 Numbers = Sequence[float | None] | NDArray[np.float64]
 Badge = Literal["good", "warn", "bad", "neutral"]
 Kind = Literal["line", "steps", "points", "bars"]
 Severity = Literal["error", "warning", "info"]
 
-ROW_LIMIT = 500
 POINT_LIMIT = 4000
 
 
@@ -32,30 +32,6 @@ class Facts:
 
     title: str
     items: tuple[tuple[str, Cell], ...]
-
-
-@dataclass(frozen=True)
-class TableColumn:
-    """A table's column; ``digits`` are significant ones, of numbers."""
-
-    name: str
-    unit: str = ""
-    digits: int = 4
-
-
-@dataclass(frozen=True)
-class ReportTable:
-    """A table that the reader can sort. Only the first ``limit`` rows are shown, and the table says so.
-
-    ``total`` is the number of rows that there are, where ``rows`` are not all of them.
-    """
-
-    title: str
-    columns: tuple[TableColumn, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    note: str = ""
-    limit: int = ROW_LIMIT
-    total: int = 0
 
 
 @dataclass(frozen=True)

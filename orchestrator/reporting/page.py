@@ -8,21 +8,11 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from orchestrator.reporting.model import (
-    Bars,
-    Cell,
-    Facts,
-    Findings,
-    Fold,
-    Plot,
-    Report,
-    ReportTable,
-    Section,
-    Text,
-)
-from orchestrator.reporting.numbers import in_words
+from orchestrator.reporting.model import Bars, Facts, Findings, Fold, Plot, Report, Section, Text
 from orchestrator.reporting.plots import asset, in_script, plot_data, plot_script, plot_style, rows_of_a_curve
 from orchestrator.reporting.quantities import angle_attributes, mark_prose, mark_unit
+from orchestrator.shared.numbers import cell_text
+from orchestrator.shared.results.fields import Cell, ReportTable
 
 EMBED_LIMIT = 1_000_000
 LONG_TEXT = 40
@@ -66,7 +56,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {
-        "words": in_words,
+        "words": cell_text,
         "plot_data": lambda plot, rows: in_script(plot_data(plot, rows)),
         "prose": mark_prose,
         "unit_marked": mark_unit,

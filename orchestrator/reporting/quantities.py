@@ -4,7 +4,7 @@ import re
 
 from markupsafe import Markup, escape
 
-from orchestrator.reporting.model import Cell
+from orchestrator.shared.results.fields import Cell
 
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _RANGE = rf"{_NUMBER}(?: (?:to|and|or|±|->|instead of) {_NUMBER})*"

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import ScenarioError
-from orchestrator.reporting.model import Cell, ReportTable, TableColumn
 from orchestrator.shared.results import as_plain
+from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn
 
 Array = NDArray[np.float64]
 DATA_SUFFIXES = (".csv", ".json", ".npz", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")

@@ -76,8 +76,8 @@ def test_the_chosen_weights_rest_and_have_margins(machine, tau, scale):
     parameters["tau"] = replace(parameters["tau"], value=tau)
     found = choose_weights(replace(machine, parameters=parameters, torque_limit=scale * 250.0), 1e-3)
     assert not found.forecast.cycles
-    assert found.forecast.margins.phase > 0.6
-    assert found.forecast.margins.delay > 2e-3
+    assert found.forecast.phase_margin > 0.6
+    assert found.forecast.delay_margin > 2e-3
 
 
 def test_a_model_without_a_gap_a_record_or_an_encoder_is_refused(tmp_path):

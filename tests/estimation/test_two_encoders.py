@@ -130,7 +130,7 @@ def test_no_number_stands_beside_a_gap_that_cannot_be_seen(held, tmp_path: Path,
     assert main(["estimate", str(log), "--method", "all", "--out", str(tmp_path / "gap")]) == 0
     out = capsys.readouterr().out
     row = next(line for line in out.splitlines() if "two encoders" in line and "│" in line)
-    assert "not seen" in row
+    assert [cell.strip() for cell in row.split("│")][1:4] == ["two encoders", "–", "no"]
     assert not any(character.isdigit() for character in row)
     assert "maximum_likelihood does not apply: needs the torque" in " ".join(out.split())
     result = json.loads((tmp_path / "gap" / "estimate.json").read_text())["results"]

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from orchestrator.reporting import Facts, Findings, Plot, Remark, Report, ReportTable, Series, TableColumn, Text, render
-from orchestrator.reporting.numbers import in_words
 from orchestrator.reporting.plots import (
     CURVE_LIMIT,
     PAGE_LIMIT,
@@ -21,6 +20,7 @@ from orchestrator.reporting.plots import (
     thin_series,
 )
 from orchestrator.reporting.quantities import mark_prose
+from orchestrator.shared.numbers import cell_text
 from tests.support.report import example
 
 
@@ -131,7 +131,7 @@ def test_large_files_are_linked_and_small_ones_embedded(tmp_path):
     ],
 )
 def test_numbers_in_words(value, digits, text):
-    assert in_words(value, digits) == text
+    assert cell_text(value, digits) == text
 
 
 def test_a_thinned_curve_keeps_its_peaks_its_gaps_and_its_ends():

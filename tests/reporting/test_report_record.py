@@ -107,7 +107,7 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     assert tables["Misfit on test data of record.csv"].rows[0][-1] == 0.99
     assert tables["Torque that is left"].rows[0] == ("record.csv", 20.0, 10.0, 4.0)
     assert tables["What the rest follows"].rows[0][:3] == ("motor", "position", pytest.approx(33.0))
-    assert tables["Parameters"].rows[0][6] == pytest.approx(5.0)
+    assert tables["Parameters"].rows[0][-1] == pytest.approx(5.0)
     assert tables["What was tried"].rows[0][2] == "input delay in the drive"
     plots = {p.title: p for p in sections(report, Plot)}
     worth = plots["What the corrected model is worth on test data"]
@@ -232,7 +232,7 @@ def test_the_page_of_a_calibration_says_whether_the_parameters_suffice(tmp_path)
     assert report_from_directory(tmp_path).badge == ("warn", "amber: the parameters do not explain the record")
     rows = {t.title: t.rows for t in sections(report, ReportTable)}
     assert rows["Parameters"] == (("J", 1.0, 1.05, 0.01, 1.03, 1.07, "kg.m2", 80.0),)
-    assert rows["Misfit on test data"] == (("a.csv", "theta", 40.0, 5.0, 1e-4, "rad"),)
+    assert rows["Misfit on test data of a.csv"] == (("theta", 40.0, 5.0, 5.0, 1e-4, "rad"),)
 
 
 def test_the_page_of_an_ssp_file_says_what_ran(tmp_path):

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from orchestrator.records.arrays import runs_of
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import robust_noise
+from orchestrator.shared.results.inspect import BandFound, ChannelFound
 
 Array = NDArray[np.float64]
 
@@ -18,39 +18,7 @@ LONGEST_LAG = 0.1  # s, of one encoder behind the other
 PARTS = 4  # of a record, whose spread tells a standard error
 
 
-@dataclass(frozen=True)
-class Channel:
-    """What one column of a record is like.
-
-    Attributes:
-        name: of the record's columns.
-        count: step that the values are rounded to; 0.0: none.
-        noise: standard deviation of what changes from sample to sample without motion.
-        saturated: share of the samples at the very ends of the range, in runs of three or more.
-        missing: samples that are missing.
-    """
-
-    name: str
-    unit: str
-    least: float
-    most: float
-    count: float
-    noise: float
-    saturated: float
-    missing: int
-
-
-@dataclass(frozen=True)
-class Band:
-    """Share of the torque's power between two frequencies [Hz], and the mean coherence of motor angle with torque."""
-
-    low: float
-    high: float
-    share: float
-    coherence: float
-
-
-def channels_of(record: Record) -> list[Channel]:
+def channels_of(record: Record) -> list[ChannelFound]:
     """Return the facts of torque and angles."""
     missing_u = 0 if record.u_deviation is None else int(np.count_nonzero(record.u_deviation))
     found = [_channel("u", "N.m", record.u, missing_u)] if record.has_torque else []
@@ -61,11 +29,11 @@ def channels_of(record: Record) -> list[Channel]:
     return found
 
 
-def _channel(name: str, unit: str, values: Array, missing: int) -> Channel:
+def _channel(name: str, unit: str, values: Array, missing: int) -> ChannelFound:
     good = values[np.isfinite(values)]
     noise = robust_noise(good)
     count = quantisation_step(good)
-    return Channel(
+    return ChannelFound(
         name,
         unit,
         float(good.min()),
@@ -89,7 +57,7 @@ def _saturation_share(values: Array) -> float:
     return share / values.size
 
 
-def excitation_of(record: Record) -> list[Band]:
+def excitation_of(record: Record) -> list[BandFound]:
     """Return the torque's power by frequency, and how much of the motor's motion follows it."""
     from scipy.signal import coherence, welch
 
@@ -106,7 +74,7 @@ def excitation_of(record: Record) -> list[Band]:
         inside = (frequency >= low) & (frequency < high)
         if inside.any() and low < 0.5 * rate:
             share = float(power[inside].sum()) / max(total, 1e-300)
-            bands.append(Band(low, min(high, 0.5 * rate), share, float(np.mean(common[inside]))))
+            bands.append(BandFound(low, min(high, 0.5 * rate), share, float(np.mean(common[inside]))))
     return bands
 
 

@@ -12,6 +12,7 @@ from orchestrator.records.model_file import Model, ModelParameter
 from orchestrator.records.plausibility import check_plausible, momentum_balance, smooth
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.inverse import pseudo_inverse
+from orchestrator.shared.results.inspect import EffectShown
 
 LAGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # s, tried for the drive
 LEAST_LAG = 1e-9  # s, of a drive that has none
@@ -123,7 +124,7 @@ def _shaft_frequency(record: Record, ratio: float) -> float:
     return float(frequency[inside][np.argmax(power[inside])])
 
 
-def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]]:
+def visible_effects(record: Record, model: Model) -> list[EffectShown]:
     """Return the smallest size of each effect that would show in the motor's momentum (three standard errors).
 
     The balance of impulses over windows of a tenth of a second is fitted with inertia, viscous friction and a constant
@@ -158,5 +159,6 @@ def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]
         solution, *_ = np.linalg.lstsq(scaled, target, rcond=None)
         spread = float(np.std(target - scaled @ solution))
         inverse = pseudo_inverse(scaled.T @ scaled)
-        found.append((name, 3.0 * spread * math.sqrt(max(float(inverse[0, 0]), 0.0)) / float(scale[0]), unit))
+        smallest = 3.0 * spread * math.sqrt(max(float(inverse[0, 0]), 0.0)) / float(scale[0])
+        found.append(EffectShown(name, smallest, unit))
     return found

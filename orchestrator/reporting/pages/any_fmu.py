@@ -1,6 +1,6 @@
 """The page of a diagnosis of any FMU: what is missing around it, how far the misfit shrinks, what is left."""
 
-from orchestrator.reporting.model import Cell, Facts, Fold, Plot, Report, Section, Series, Span, Text
+from orchestrator.reporting.model import Facts, Fold, Plot, Report, Section, Series, Span, Text
 from orchestrator.reporting.pages.diagnosis_answer import (
     answer_table,
     headline,
@@ -12,8 +12,6 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     VERDICTS,
     candidate_table,
     evidence_table,
-    leave_out_empty,
-    misfit_table,
     parameter_table,
 )
 from orchestrator.reporting.pages.generic import sections_of
@@ -21,6 +19,8 @@ from orchestrator.reporting.source import Array, ResultDocument, table_of
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
+from orchestrator.shared.results.diagnose import misfit_tables
+from orchestrator.shared.results.fields import Cell
 
 STAGES = {"nominal": "model as given", "refitted": "with re-fitted parameters", "corrected": "with the effects"}
 KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
@@ -37,8 +37,10 @@ def build(source: ResultDocument) -> Report:
     folds: dict[str, list[Section]] = {
         "Take note": [Text("Notes", notes)] if notes else [],
         "In words": in_words([text for text in found.summary if text not in reasons]),
-        "Evidence for each effect": [leave_out_empty(one) for one in evidence_table(found.effects, "outputs' misfit")],
-        "Test data": [*_misfits(found), *_output_plots(found, table)],
+        "Evidence for each effect": [
+            one.without_empty_columns() for one in evidence_table(found.effects, "outputs' misfit")
+        ],
+        "Test data": [*misfit_tables(found.test, found.validation), *_output_plots(found, table)],
         "What is left": _residual_sections(found.remaining),
         "Values and search": [
             *([parameter_table(found.parameters)] if found.parameters else []),
@@ -69,14 +71,6 @@ def _test_part(results: FmuDiagnosisFound, table: dict[str, Array]) -> dict[str,
         return table
     rows = table["time"] >= results.test_start
     return {name: values[rows] for name, values in table.items()}
-
-
-def _misfits(results: FmuDiagnosisFound) -> list[Section]:
-    """Return the misfit on test data, and on another record."""
-    made: list[Section] = [leave_out_empty(misfit_table(f"Misfit on test data of {t.source}", t)) for t in results.test]
-    if (other := results.validation) is not None:
-        made.append(leave_out_empty(misfit_table(f"Misfit on the other record, {other.source}", other)))
-    return made
 
 
 def _output_plots(results: FmuDiagnosisFound, table: dict[str, Array]) -> list[Section]:

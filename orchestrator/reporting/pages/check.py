@@ -1,8 +1,9 @@
 """The page of ``check``: each FMU, and what was found in it."""
 
-from orchestrator.reporting.model import Findings, Remark, Report, ReportTable, Section, Severity, TableColumn
+from orchestrator.reporting.model import Findings, Remark, Report, Section, Severity
 from orchestrator.reporting.source import ResultDocument, plain, words
 from orchestrator.shared.results import CheckedFmu, CheckFound, FindingFound, read
+from orchestrator.shared.results.fields import ReportTable, TableColumn
 
 
 def build(source: ResultDocument) -> Report:

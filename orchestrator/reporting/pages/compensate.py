@@ -2,11 +2,11 @@
 
 from statistics import median
 
-from orchestrator.reporting.model import Facts, Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.model import Facts, Plot, Report, Series
 from orchestrator.reporting.pages.regulator import rest_facts
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
-from orchestrator.shared.results.compensate import CompensateFound
+from orchestrator.shared.results.compensate import CompensateFound, laws_tables
 
 
 def build(source: ResultDocument) -> Report:
@@ -26,7 +26,7 @@ def build(source: ResultDocument) -> Report:
             f"that of the {results.laws[0].law} {results.laws[0].impact:.3g} rad/s."
         ),
         sections=(
-            _table(results),
+            *laws_tables("Medians over plants", results.laws),
             *([Facts("Doubts", tuple(("", doubt) for doubt in results.doubts))] if results.doubts else []),
             *rest_facts(results.forecast, "The plain LQR"),
             Plot(
@@ -48,34 +48,3 @@ def build(source: ResultDocument) -> Report:
         origin=source.origin(),
         downloads=source.downloads(),
     )
-
-
-def _table(results: CompensateFound) -> ReportTable:
-    columns = (
-        TableColumn("law"),
-        TableColumn("traversal", "s", 3),
-        TableColumn("its impact", "rad/s", 3),
-        TableColumn("largest impact", "rad/s", 3),
-        TableColumn("rms error", "rad", 3),
-        TableColumn("rest, peak to peak", "counts", 3),
-        TableColumn("contacts at rest", "1/s", 3),
-        TableColumn("impact, 95 %", "rad/s", 3),
-        TableColumn("rms error, 95 %", "rad", 3),
-        TableColumn("unstable"),
-    )
-    rows = tuple(
-        (
-            law.law,
-            median(law.times) if law.times else None,
-            median(law.impacts) if law.impacts else None,
-            law.impact,
-            law.error,
-            law.rest,
-            law.contacts,
-            law.upper.get("landing"),
-            law.upper.get("error"),
-            law.unstable,
-        )
-        for law in results.laws
-    )
-    return ReportTable("Medians over plants", columns, rows)

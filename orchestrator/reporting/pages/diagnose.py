@@ -9,19 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.effects.words import place_words
-from orchestrator.reporting.model import (
-    Bar,
-    Bars,
-    Facts,
-    Fold,
-    Plot,
-    Report,
-    ReportTable,
-    Section,
-    Series,
-    TableColumn,
-    Text,
-)
+from orchestrator.reporting.model import Bar, Bars, Facts, Fold, Plot, Report, Section, Series, Text
 from orchestrator.reporting.pages import any_fmu
 from orchestrator.reporting.pages.diagnosis_answer import (
     SIGNALS,
@@ -38,7 +26,6 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     VERDICTS,
     candidate_table,
     evidence_table,
-    misfit_table,
     parameter_table,
     percent,
 )
@@ -54,7 +41,9 @@ from orchestrator.shared.results.diagnose import (
     LearnedFound,
     RemainingFound,
     TestFound,
+    misfit_tables,
 )
+from orchestrator.shared.results.fields import ReportTable, TableColumn
 
 KNOWN = frozenset(DiagnoseFound.__struct_fields__)
 MISSING = "The torque that the model misses without the effect, and how much of that its law accounts for."
@@ -123,11 +112,11 @@ def _on_the_corrected_model(results: DiagnoseFound) -> str:
 
 def _tests(results: DiagnoseFound) -> list[Section]:
     """Return how the models do on test data and on another record."""
+    tables = misfit_tables(results.test, results.validation, SIGNALS)
     made: list[Section] = []
-    for test in results.test:
-        made += [*_misfit_sections(test), misfit_table(f"Misfit on test data of {test.source}", test)]
-    if results.validation is not None:
-        made.append(misfit_table(f"Misfit on the other record, {results.validation.source}", results.validation))
+    for test, table in zip(results.test, tables, strict=False):  # that of the other record comes last
+        made += [*_misfit_sections(test), table]
+    made += tables[len(results.test) :]
     return made + _torque_left([*results.test, *([results.validation] if results.validation else [])])
 
 

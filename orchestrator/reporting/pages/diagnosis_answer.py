@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 from orchestrator.effects.words import place_words
-from orchestrator.reporting.model import Plot, ReportTable, Section, Series, Span, TableColumn, Text
+from orchestrator.reporting.model import Plot, Section, Series, Span, Text
 from orchestrator.reporting.source import Array, words
 from orchestrator.shared.results.diagnose import EffectFound, NuisanceFound, SignalMisfitFound, TestFound, ValueFound
+from orchestrator.shared.results.fields import ReportTable, TableColumn
 
 SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
 SIZES = {"alpha": "half-gap"}

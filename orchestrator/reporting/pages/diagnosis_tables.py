@@ -1,12 +1,11 @@
 """Tables that pages of a diagnosis share, of a plant or of any FMU: how sure, misfit, parameters, what was tried."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from orchestrator.effects.words import place_words
-from orchestrator.reporting.model import Badge, Cell, ReportTable, TableColumn
-from orchestrator.reporting.pages.diagnosis_answer import SIGNALS
-from orchestrator.shared.results.diagnose import EffectFound, ParameterFound, StepFound, TestFound
+from orchestrator.reporting.model import Badge
+from orchestrator.shared.results.diagnose import EffectFound, ParameterFound, StepFound
+from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn, fields_table
 
 MODELS = {"nominal": "model as given", "parameters": "with re-fitted parameters", "final": "with the effects"}
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
@@ -16,14 +15,6 @@ VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "unknown": ("bad", "unexplained", "Something is missing in the model, and no effect of the library is likely."),
 }
 TAKES = "error on blocks left out that it removes [%]"
-TEST = "Root mean square of free runs minus measured, on data that nothing was fitted to and nothing was chosen by."
-
-
-def leave_out_empty(table: ReportTable) -> ReportTable:
-    """Return a table without the columns in which no row says anything."""
-    used = [n for n in range(len(table.columns)) if any(row[n] is not None for row in table.rows)]
-    rows = tuple(tuple(row[n] for n in used) for row in table.rows)
-    return replace(table, columns=tuple(table.columns[n] for n in used), rows=rows)
 
 
 def evidence_table(effects: Sequence[EffectFound], of: str = "missing torque") -> list[ReportTable]:
@@ -52,27 +43,12 @@ def label_words(label: str) -> str:
     return place_words(name, site)
 
 
-def misfit_table(title: str, test: TestFound) -> ReportTable:
-    """Return the misfit of each signal on test data, from model to model."""
-    columns = tuple(TableColumn(n) for n in ("signal", *MODELS.values(), "noise", "unit", "R² of the free runs"))
-    rows = tuple(
-        (SIGNALS.get(s, s), g.nominal, g.parameters, g.final, g.noise, g.unit, test.r_squared.get(s))
-        for s, g in test.misfit.items()
-    )
-    worse = " The final model does worse than re-fitted parameters." if test.worse else ""
-    return ReportTable(title, columns, rows, f"{TEST} {test.rows} rows.{worse}")
-
-
 def parameter_table(parameters: Mapping[str, ParameterFound]) -> ReportTable:
     """Return the model's own parameters beside their nominal values."""
-    columns = ("parameter", "nominal", "value", "standard error", "lower", "upper", "change [%]", "unit")
-    rows = tuple(
-        (name, p.nominal, p.value, p.standard_error, *(p.interval or (None, None)), _change(p), p.unit)
-        for name, p in parameters.items()
+    changes = [_change(p) for p in parameters.values()]
+    return fields_table("Parameters", parameters, names="parameter", of=ParameterFound).with_column(
+        TableColumn("change", "%", 3), changes
     )
-    note = "Lower and upper: ends of the 95 % interval."
-    shown = tuple(TableColumn(c, "", 3 if c in ("standard error", "change [%]") else 6) for c in columns)
-    return ReportTable("Parameters", shown, rows, note)
 
 
 def _change(p: ParameterFound) -> float | None:

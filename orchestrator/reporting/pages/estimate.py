@@ -6,25 +6,21 @@ from typing import Any
 import numpy as np
 
 from orchestrator.effects.words import list_words, place_words
-from orchestrator.reporting.model import (
-    Badge,
-    Cell,
-    Facts,
-    Plot,
-    Report,
-    ReportTable,
-    Section,
-    Series,
-    TableColumn,
-    Text,
-)
+from orchestrator.reporting.model import Badge, Facts, Plot, Report, Section, Series, Text
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.location import build_location
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument, numbers, words
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import TrustFound, read
-from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound, MethodFound
+from orchestrator.shared.results.estimate import (
+    EstimateFound,
+    ExcitationFound,
+    MethodFound,
+    methods_table,
+    parameters_table,
+)
+from orchestrator.shared.results.fields import ReportTable, TableColumn, fields_table
 
 Json = Mapping[str, Any]
 Methods = Mapping[str, MethodFound]
@@ -44,7 +40,7 @@ def build(source: ResultDocument) -> Report:
     sections: list[Section] = trust_section(results.trust)
     sections += [*_diagnosis_sections(results), *_repeats(results)]
     if results.estimates:
-        sections += [_methods(found), *_remarks(results.estimates), *_comparison(found)]
+        sections += [methods_table("Estimates", found), *_remarks(results.estimates), *_comparison(found)]
     limit = (results.diagnostics or {}).get("profile_limit") or CHI_SQUARE_95
     sections += [
         *_flanks(source),
@@ -55,7 +51,7 @@ def build(source: ResultDocument) -> Report:
     ]
     parameters = (results.diagnostics or {}).get("parameters")
     if parameters:
-        sections.append(_parameters(parameters))
+        sections.append(parameters_table("Parameters fitted with the gap", parameters))
     sections += _design(source, results.design or ())
     sections += _diagnostics(found)
     badge, summary = _answer(results)
@@ -114,26 +110,6 @@ def _answer(results: EstimateFound) -> tuple[tuple[Badge, str] | None, str]:
 
 def _number(value: float | None) -> str:
     return "any size" if value is None else f"{value:.6g}"
-
-
-def _methods(results: Methods) -> ReportTable:
-    columns = (
-        TableColumn("method"),
-        TableColumn("half-gap", "rad", 6),
-        TableColumn("trust"),
-        TableColumn("lower", "rad", 6),
-        TableColumn("upper", "rad", 6),
-        TableColumn("standard error", "rad", 3),
-        TableColumn("Cramér-Rao", "rad", 3),
-    )
-    rows = []
-    for name, e in results.items():
-        level = None if e.trust is None else e.trust.level
-        low, high = e.interval or (None, None)
-        sizes = (e.alpha, level, low, high) if e.visible else (None, level, None, high)
-        rows.append((words(name), *sizes, e.standard_error, e.cramer_rao))
-    note = "Lower and upper: ends of the 95 % interval. Cramér-Rao: the least standard error that the record allows."
-    return ReportTable("Estimates", columns, tuple(rows), note)
 
 
 def _remarks(estimates: Methods) -> list[Section]:
@@ -223,27 +199,12 @@ def _errors(source: ResultDocument) -> list[Section]:
     return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)]
 
 
-def _parameters(parameters: Json) -> ReportTable:
-    columns = ("parameter", "nominal", "fitted", "standard error")
-    rows: list[tuple[Cell, ...]] = [
-        (name, p.get("nominal"), p.get("value"), p.get("standard_error")) for name, p in parameters.items()
-    ]
-    return ReportTable("Parameters fitted with the gap", tuple(TableColumn(c, "", 6) for c in columns), tuple(rows))
-
-
 def _design(source: ResultDocument, candidates: Sequence[ExcitationFound]) -> list[Section]:
     if not candidates:
         return []
-    columns = (
-        TableColumn("excitation"),
-        TableColumn("bound on the half-gap", "rad", 3),
-        TableColumn("peak torque", "N.m"),
-        TableColumn("peak motor speed", "rad/s"),
-    )
-    rows = tuple((c.name, c.bound, c.peak_torque, c.peak_motor_speed) for c in candidates)
     note = "Best first: the smallest standard error of the half-gap that any estimator can have."
     table = source.signals("design.csv")
-    made: list[Section] = [ReportTable("Proposed excitations", columns, rows, note)]
+    made: list[Section] = [fields_table("Proposed excitations", candidates, note)]
     if {"time", "u"} <= set(table):
         torque = Series("requested torque", table["time"], table["u"], "steps")
         made.append(Plot("The best excitation", "time [s]", "u [N.m]", (torque,)))

@@ -2,11 +2,12 @@
 
 from typing import Any
 
-from orchestrator.reporting.model import Badge, Facts, Plot, Report, ReportTable, Section, Series, TableColumn, Text
+from orchestrator.reporting.model import Badge, Facts, Plot, Report, Section, Series, Text
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
-from orchestrator.shared.results.inspect import InspectFound
+from orchestrator.shared.results.fields import fields_table
+from orchestrator.shared.results.inspect import InspectFound, inspect_tables
 
 RECORD = "inspect_record.npz"
 
@@ -20,8 +21,7 @@ def build(source: ResultDocument) -> Report:
     sections.append(Text("How the file was read", results.record.notes))
     sections += record_plots(source, RECORD)
     sections += _spectrum(results)
-    tables = (_excitation(results), _gaps(results), _effects(results))
-    sections += [_facts(results), _channels(results), *(t for t in tables if t.rows)]
+    sections += [_facts(results), *inspect_tables(results)]
     sections += _better(results)
     return Report(
         "Inspection of a record",
@@ -62,27 +62,6 @@ def _facts(results: InspectFound) -> Facts:
     return Facts("The record in numbers", tuple(facts))
 
 
-def _channels(results: InspectFound) -> ReportTable:
-    names = ("channel", "unit", "least", "most", "rounded to", "noise", "at an end [%]", "missing")
-    rows = tuple(
-        (c.name, c.unit, c.least, c.most, c.count or None, c.noise, 100.0 * c.saturated, c.missing)
-        for c in results.channels
-    )
-    return ReportTable("Channels", tuple(TableColumn(name) for name in names), rows)
-
-
-def _excitation(results: InspectFound) -> ReportTable:
-    columns = (
-        TableColumn("band", "Hz"),
-        TableColumn("share of the torque's power", "%", 3),
-        TableColumn("coherence of the motor"),
-    )
-    rows = tuple((f"{b.low:g} to {b.high:g}", round(100.0 * b.share, 2), b.coherence) for b in results.excitation)
-    return ReportTable(
-        "Excitation", columns, rows, "Coherence: how far the motor's motion follows the torque in the band."
-    )
-
-
 def _spectrum(results: InspectFound) -> list[Section]:
     """Return the torque's power by frequency."""
     bands = results.excitation
@@ -93,27 +72,6 @@ def _spectrum(results: InspectFound) -> list[Section]:
     return [Plot("Excitation by frequency", "band [Hz]", "share of the power [%]", (shares,), categories=names)]
 
 
-def _gaps(results: InspectFound) -> ReportTable:
-    columns = (TableColumn("half-gap", "rad"), TableColumn("bound", "rad", 3), TableColumn("seen"))
-    rows = tuple((g.half_gap, g.bound, g.seen) for g in results.gaps)
-    return ReportTable("Half-gaps that would show", columns, rows, "Bound: the least standard error of any estimator.")
-
-
-def _effects(results: InspectFound) -> ReportTable:
-    rows = tuple((e.name, e.smallest, e.unit) for e in results.effects)
-    return ReportTable(
-        "Effects that would show",
-        (TableColumn("effect"), TableColumn("clearly from", "", 2), TableColumn("unit")),
-        rows,
-    )
-
-
 def _better(results: InspectFound) -> list[Section]:
-    columns = (
-        TableColumn("experiment"),
-        TableColumn("bound on the half-gap", "rad", 3),
-        TableColumn("peak torque", "N.m"),
-        TableColumn("peak motor speed", "rad/s"),
-    )
-    rows = tuple((b.name, b.bound, b.peak_torque, b.peak_motor_speed) for b in results.better_experiments)
-    return [ReportTable("Experiments of the same length, torque and speed", columns, rows)] if rows else []
+    title = "Experiments of the same length, torque and speed"
+    return [fields_table(title, results.better_experiments)] if results.better_experiments else []

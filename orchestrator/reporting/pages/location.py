@@ -1,25 +1,23 @@
 """The page of ``estimate`` for a train of two stages: where the gap is, and the motion that says so."""
 
-from orchestrator.reporting.model import Plot, Report, ReportTable, Section, Series, TableColumn
+from orchestrator.reporting.model import Plot, Report, Section, Series
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
-from orchestrator.shared.results.estimate import EstimateFound, LocationFound
+from orchestrator.shared.results.estimate import EstimateFound, LocationFound, location_tables, parameters_table
 
 STAGES = {"1": "stage 1", "2": "stage 2"}
-ANSWERS = {"1": "stage 1 alone", "2": "stage 2 alone", "both": "both stages"}
 
 
 def build_location(source: ResultDocument, results: EstimateFound, location: LocationFound) -> Report:
     """Return the page."""
     sections: list[Section] = [
         *trust_section(results.trust),
-        _sizes(location),
-        _ways(location),
+        *location_tables(location),
         *_twists(source, location),
         *record_plots(source, "stages.csv"),
         *_errors(source),
-        _parameters(location),
+        parameters_table("Parameters fitted with the gaps", location.parameters),
     ]
     said = f"in {location.answer}" if location.answers else "nowhere seen"
     badge = trust_badge(results.trust, said, "good" if len(location.answers) == 1 else "warn")
@@ -27,27 +25,6 @@ def build_location(source: ResultDocument, results: EstimateFound, location: Loc
     return Report(
         "Where the gap is", results.message or "", tuple(sections), badge, source.origin(), source.downloads(), unit
     )
-
-
-def _sizes(location: LocationFound) -> ReportTable:
-    columns = (TableColumn("gap"), *(TableColumn(name, "rad", 5) for name in ("half-gap", "lower", "upper")))
-    rows = [
-        (f"{STAGES[name]}, at its gear's output", gap.alpha, gap.lower, gap.upper)
-        for name, gap in location.stages.items()
-    ]
-    rows.append(("both, seen from the load", location.total.alpha, location.total.lower, location.total.upper))
-    note = "Lower and upper: ends of the 95 % interval. Where several answers are left, it holds the half-gaps of all."
-    return ReportTable("Half-gaps", columns, tuple(rows), note)
-
-
-def _ways(location: LocationFound) -> ReportTable:
-    columns = (TableColumn("answer"), TableColumn("log-likelihood behind the best", "", 4), TableColumn("left"))
-    rows = tuple(
-        (ANSWERS[name], round(behind, 1), "yes" if name in location.answers else "no")
-        for name, behind in location.behind.items()
-    )
-    note = "How far the best fit with the gap in that place falls behind the best of all; far behind means excluded."
-    return ReportTable("Where the gap can be", columns, rows, note)
 
 
 def _twists(source: ResultDocument, location: LocationFound) -> list[Section]:
@@ -73,12 +50,3 @@ def _errors(source: ResultDocument) -> list[Section]:
     curves = tuple(Series(label, table["time"], table[name]) for name, label in names.items() if name in table)
     note = "Measured minus predicted one sample ahead: noise when the model is right."
     return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)] if curves else []
-
-
-def _parameters(location: LocationFound) -> ReportTable:
-    columns = tuple(TableColumn(name, "", 6) for name in ("parameter", "nominal", "fitted", "standard error"))
-    rows = tuple(
-        (name, entry.get("nominal"), entry.get("value"), entry.get("standard_error"))
-        for name, entry in location.parameters.items()
-    )
-    return ReportTable("Parameters fitted with the gaps", columns, rows)

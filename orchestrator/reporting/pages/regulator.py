@@ -1,9 +1,10 @@
 """The page of ``regulator``: gains, what the loop does at rest, and its response at the request."""
 
 from orchestrator.plants.design import GAIN_UNITS, REGULATOR_STATES
-from orchestrator.reporting.model import Facts, Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.model import Facts, Plot, Report, Series
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
+from orchestrator.shared.results.fields import ReportTable, TableColumn, fields_facts
 from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound
 
 
@@ -49,15 +50,4 @@ def rest_facts(f: ForecastFound | None, loop: str) -> tuple[Facts, ...]:
     """Return what a loop does by its gains alone; nothing where the file does not say it."""
     if f is None:
         return ()
-    items = (
-        ("without friction and load", "cycles" if f.cycles else "still"),
-        ("amplitude of the load [half-gaps]", f.load),
-        ("amplitude of the twist [half-gaps]", f.twist),
-        ("frequency [Hz]", f.frequency),
-        ("phase margin without a gap [rad]", f.phase_margin),
-        ("delay margin without a gap [ms]", None if f.delay_margin is None else 1e3 * f.delay_margin),
-        ("smallest factor of the gain without a gap", f.lower_gain or 0.0),
-        ("largest factor of the gain without a gap", f.upper_gain),
-        ("states of six that the request moves", f.rank),
-    )
-    return (Facts(f"{loop} at rest, by its gains", items),)
+    return (Facts(f"{loop} at rest, by its gains", fields_facts(f)),)

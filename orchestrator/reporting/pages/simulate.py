@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.reporting.model import Cell, Facts, Plot, Report, Section, Series, Span
+from orchestrator.reporting.model import Facts, Plot, Report, Section, Series, Span
 from orchestrator.reporting.pages import generic
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.record import out_of_contact
 from orchestrator.reporting.source import Array, ResultDocument
 from orchestrator.shared.results import PairFound, SignalsFound, as_plain, read
+from orchestrator.shared.results.fields import Cell
 
 SIGNALS_PER_PLOT = 6
 Columns = Mapping[str, Array]

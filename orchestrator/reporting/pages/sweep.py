@@ -5,22 +5,12 @@ from typing import Any
 
 from orchestrator.errors import ScenarioError
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
-from orchestrator.reporting.model import (
-    POINT_LIMIT,
-    ROW_LIMIT,
-    Badge,
-    Cell,
-    Plot,
-    Report,
-    ReportTable,
-    Section,
-    Series,
-    TableColumn,
-)
+from orchestrator.reporting.model import POINT_LIMIT, Badge, Plot, Report, Section, Series
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import ResultDocument, by_column, numbers, plain, table_of, words
 from orchestrator.reporting.trust import trust_badge, trust_section
-from orchestrator.shared.results import SweepFound, TrustFound, as_plain, read
+from orchestrator.shared.results import ErrorsFound, SweepFound, TrustFound, as_plain, read
+from orchestrator.shared.results.fields import ROW_LIMIT, Cell, ReportTable, TableColumn, fields_table
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
@@ -32,14 +22,6 @@ MOST_PLOTS = 12
 OWN = frozenset({"alpha", "noise", "repetition"})
 SUMMARIES = frozenset({"last", "min", "max", "mean", "rms"})
 FIRST = ("case", "alpha", "estimate", "lower", "upper", "error_percent", "noise")
-STATISTICS = {
-    "noise": ("noise", "rad"),
-    "count": ("cases", ""),
-    "mean_percent": ("mean error", "%"),
-    "worst_percent": ("worst error", "%"),
-    "mse": ("mean squared error", "rad²"),
-    "coverage": ("coverage of intervals", "%"),
-}
 
 
 def build(source: ResultDocument) -> Report:
@@ -47,13 +29,13 @@ def build(source: ResultDocument) -> Report:
     results = read(source.results, SweepFound)
     failed, total = results.failed, results.cases
     first, failures, table = _excerpts(source, total)
-    statistics: list[Mapping[str, Any]] = [as_plain(s) for s in results.statistics]
+    statistics = results.statistics
     name = results.scenario.name if results.scenario is not None else ""
     units = {c.name: c.unit for c in results.columns}
     sections: list[Section] = trust_section(results.trust)
     sections += [_cases("Failed cases", failures, UNITS | units, failed)] if failed else []
     if statistics:
-        sections.append(_statistics(statistics))
+        sections.append(fields_table("Errors by noise level", statistics))
     if {"alpha", "noise", "estimate", "lower", "upper", "error_percent"} <= set(table):
         sections += [*_plots(table), *_influences(table, units)]
     else:
@@ -85,20 +67,13 @@ def _count(document: Mapping[str, Any], results: SweepFound) -> str:
     return f"{total - failed} of {total} cases are done" + (f", over {varied}." if varied else ".") + remarks
 
 
-def _summary(statistics: Sequence[Mapping[str, Any]], total: int, failed: int) -> str:
+def _summary(statistics: Sequence[ErrorsFound], total: int, failed: int) -> str:
     parts = []
     for s in statistics:
-        where = f"With encoder noise of {s['noise']:g} rad" if s["noise"] else "Without noise"
-        error = f"{s['mean_percent']:.3g} % in the mean and {s['worst_percent']:.3g} % at worst"
+        where = f"With encoder noise of {s.noise:g} rad" if s.noise else "Without noise"
+        error = f"{s.mean_percent:.3g} % in the mean and {s.worst_percent:.3g} % at worst"
         parts.append(f"{where} the error is {error}.")
     return " ".join([f"The half-gap was estimated in {total - failed} of {total} cases.", *parts])
-
-
-def _statistics(statistics: Sequence[Mapping[str, Any]]) -> ReportTable:
-    names = [name for name in STATISTICS if name in statistics[0]]
-    columns = tuple(TableColumn(*STATISTICS[name]) for name in names)
-    rows = [{**s, "coverage": 100.0 * s["coverage"]} for s in statistics]
-    return ReportTable("Errors by noise level", columns, tuple(tuple(row[name] for name in names) for row in rows))
 
 
 def _plots(table: Columns) -> list[Section]:

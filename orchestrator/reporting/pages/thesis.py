@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
-from orchestrator.reporting.model import Plot, Report, ReportTable, Section, Series, TableColumn
+from orchestrator.reporting.model import Plot, Report, Section, Series
 from orchestrator.reporting.source import ResultDocument, table_of
 from orchestrator.shared.results import read
+from orchestrator.shared.results.fields import ReportTable, TableColumn
 from orchestrator.shared.results.thesis import TableRow, ThesisFound
 
 

@@ -5,9 +5,11 @@ passed over. ``schema_version`` goes up when a field changes its meaning or goes
 """
 
 from collections.abc import Mapping
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import msgspec
+
+from orchestrator.shared.results.fields import Display
 
 F = TypeVar("F", bound=msgspec.Struct)
 
@@ -34,13 +36,16 @@ class TrustFound(msgspec.Struct, frozen=True):
     level: str
     reasons: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        return self.level
+
 
 class GapFound(msgspec.Struct, frozen=True):
-    """A half-gap with its interval [rad]; None where it is not finite."""
+    """A half-gap with its 95 % interval; None where it is not finite."""
 
-    alpha: float | None
-    lower: float | None
-    upper: float | None
+    alpha: Annotated[float | None, Display("half-gap", "rad", 6)]
+    lower: Annotated[float | None, Display("95 % from", "rad", 6)]
+    upper: Annotated[float | None, Display("to", "rad", 6)]
 
 
 class BuildFound(ResultData, frozen=True, kw_only=True):
@@ -132,14 +137,14 @@ class ColumnFound(msgspec.Struct, frozen=True):
 
 
 class ErrorsFound(msgspec.Struct, frozen=True):
-    """Errors of the estimates at one noise level [rad]: shares in percent, ``mse`` in rad^2, ``coverage`` of 1."""
+    """Errors of the estimates at one noise level; ``coverage`` is the share of intervals that hold the actual size."""
 
-    noise: float
-    count: int
-    mean_percent: float | None
-    worst_percent: float | None
-    mse: float | None
-    coverage: float | None
+    noise: Annotated[float, Display("noise", "rad")]
+    count: Annotated[int, Display("cases")]
+    mean_percent: Annotated[float | None, Display("mean error", "%")]
+    worst_percent: Annotated[float | None, Display("worst error", "%")]
+    mse: Annotated[float | None, Display("mean squared error (MSE)", "rad²")]
+    coverage: Annotated[float | None, Display("intervals that hold the size", "%", factor=100.0)]
 
 
 class CalibrationFound(msgspec.Struct, frozen=True):

@@ -1,6 +1,6 @@
 """What ``diagnose.json`` and ``calibrate.json`` hold of any FMU; docs/any-fmu.md says what each word means."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -12,7 +12,9 @@ from orchestrator.shared.results.diagnose import (
     ParameterFound,
     StepFound,
     TestFound,
+    misfit_tables,
 )
+from orchestrator.shared.results.fields import Display, ReportTable, fields_table
 
 
 class FmuRemainingFound(msgspec.Struct, frozen=True):
@@ -71,7 +73,7 @@ class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):
 class LearnedParameterFound(ParameterFound, frozen=True):
     """A calibrated parameter; ``learned`` is the share of its stated uncertainty that the records remove."""
 
-    learned: float | None = None
+    learned: Annotated[float | None, Display("learned", "%", 3, factor=100.0)] = None
 
 
 class FmuCalibrationFound(ResultData, frozen=True, kw_only=True):
@@ -87,3 +89,10 @@ class FmuCalibrationFound(ResultData, frozen=True, kw_only=True):
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
     seconds: float | None = None
     walls: str = ""
+
+
+def calibration_tables(results: FmuCalibrationFound) -> list[ReportTable]:
+    """Return the tables of the parameters and of the misfit on each record's test data."""
+    note = "Learned: how much of its stated uncertainty the record removes."
+    parameters = fields_table("Parameters", results.parameters, note, "parameter", LearnedParameterFound)
+    return [parameters, *misfit_tables(results.test)]

@@ -1,31 +1,52 @@
 """What ``compensate.json`` holds: the same plants under each law."""
 
+from collections.abc import Sequence
+from statistics import median
+from typing import Annotated
+
 import msgspec
 
 from orchestrator.shared.results import ResultData
+from orchestrator.shared.results.fields import Display, ReportTable, TableColumn, fields_table
 from orchestrator.shared.results.regulator import ForecastFound
 
 
 class LawFound(msgspec.Struct, frozen=True):
     """One law on all plants: medians, 95 % quantiles in ``upper``, and every traversal.
 
-    ``impact`` is the largest of a run [rad/s], ``error`` that of the load during the move, root mean square [rad],
-    ``rest`` the motion at the end, peak to peak [counts of the load's encoder], ``contacts`` then [1/s].
+    ``error`` is that of the load during the move, ``rest`` its motion at the end, in counts of its encoder.
     ``unstable`` plants leave the end of the move; they are in no other number. ``times`` [s] and ``impacts`` [rad/s]
     are of all traversals; ``path_times`` [s] and ``path`` [rad] of one.
     """
 
-    law: str
-    impact: float
-    error: float
-    rest: float
-    contacts: float
-    unstable: int = 0
+    law: Annotated[str, Display("law")]
+    impact: Annotated[float, Display("largest impact", "rad/s", 3)]
+    error: Annotated[float, Display("rms error", "rad", 3)]
+    rest: Annotated[float, Display("rest, peak to peak", "counts", 3)]
+    contacts: Annotated[float, Display("contacts at rest", "1/s", 3)]
+    unstable: Annotated[int, Display("unstable plants")] = 0
     upper: dict[str, float] = {}
     times: tuple[float, ...] = ()
     impacts: tuple[float, ...] = ()
     path_times: tuple[float, ...] = ()
     path: tuple[float, ...] = ()
+
+
+UPPER = {
+    "time": TableColumn("traversal", "s", 3), "landing": TableColumn("its impact", "rad/s", 3),
+    "impact": TableColumn("largest impact", "rad/s", 3), "error": TableColumn("rms error", "rad", 3),
+    "rest": TableColumn("rest, peak to peak", "counts", 3),
+}  # fmt: skip
+
+
+def laws_tables(title: str, laws: Sequence[LawFound]) -> tuple[ReportTable, ReportTable]:
+    """Return medians over plants, and what 95 % of the plants stay below."""
+    medians = fields_table(title, laws)
+    for name, values in (("time", "times"), ("landing", "impacts")):
+        found = [median(every) if (every := getattr(law, values)) else None for law in laws]
+        medians = medians.with_column(UPPER[name], found)
+    rows = tuple((law.law, *map(law.upper.get, UPPER)) for law in laws)
+    return medians, ReportTable("Below which 95 % of the plants are", (TableColumn("law"), *UPPER.values()), rows)
 
 
 class CompensateFound(ResultData, frozen=True, kw_only=True):

@@ -1,10 +1,12 @@
 """What ``diagnose.json`` holds of a model of ours; section "JSON" of docs/diagnosis.md says what each word means."""
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
 
 import msgspec
 
 from orchestrator.shared.results import Interval, LiveFound, ResultData, Sizes, TrustFound
+from orchestrator.shared.results.fields import Display, ReportTable, TableColumn, fields_table
 
 
 class ValueFound(msgspec.Struct, frozen=True):
@@ -19,11 +21,11 @@ class ValueFound(msgspec.Struct, frozen=True):
 class ParameterFound(msgspec.Struct, frozen=True):
     """The same of a parameter of the model, beside its nominal value."""
 
-    nominal: float | None = None
-    value: float | None = None
-    standard_error: float | None = None
-    interval: Interval | None = None
-    unit: str | None = None
+    nominal: Annotated[float | None, Display("nominal", digits=6)] = None
+    value: Annotated[float | None, Display("value", digits=6)] = None
+    standard_error: Annotated[float | None, Display("standard error", digits=3)] = None
+    interval: Annotated[Interval | None, Display("95 % from", digits=6, to="to")] = None
+    unit: Annotated[str | None, Display("unit")] = None
 
 
 class ExplainedFound(msgspec.Struct, frozen=True):
@@ -82,11 +84,11 @@ class NuisanceFound(msgspec.Struct, frozen=True):
 class SignalMisfitFound(msgspec.Struct, frozen=True):
     """Rms of free runs against one signal: of the model as given, re-fitted, and with its effects."""
 
-    nominal: float | None
-    parameters: float | None
-    final: float | None
-    noise: float | None
-    unit: str
+    nominal: Annotated[float | None, Display("model as given")]
+    parameters: Annotated[float | None, Display("with re-fitted parameters")]
+    final: Annotated[float | None, Display("with the effects")]
+    noise: Annotated[float | None, Display("noise")]
+    unit: Annotated[str, Display("unit")]
 
 
 class TestFound(msgspec.Struct, frozen=True):
@@ -104,6 +106,26 @@ class TestFound(msgspec.Struct, frozen=True):
     worse: bool
     r_squared: dict[str, float | None] = {}
     torque_left: dict[str, float | None] = {}
+
+
+TEST = "Root mean square of free runs minus measured, on data that nothing was fitted to and nothing was chosen by."
+
+
+def misfit_table(title: str, test: TestFound, signals: Mapping[str, str] | None = None) -> ReportTable:
+    """Return the misfit of each signal on test data, from model to model. ``signals``: words for their names."""
+    worse = " The final model does worse than re-fitted parameters." if test.worse else ""
+    named = {(signals or {}).get(name, name): misfit for name, misfit in test.misfit.items()}
+    table = fields_table(title, named, f"{TEST} {test.rows} rows.{worse}", "signal", SignalMisfitFound)
+    return table.with_column(TableColumn("R² of the free runs"), [test.r_squared.get(name) for name in test.misfit])
+
+
+def misfit_tables(
+    tests: Sequence[TestFound], other: TestFound | None = None, signals: Mapping[str, str] | None = None
+) -> list[ReportTable]:
+    """Return the misfit of each test and on another record, without what no signal has."""
+    titled = [(f"Misfit on test data of {test.source}", test) for test in tests]
+    titled += [] if other is None else [(f"Misfit on the other record, {other.source}", other)]
+    return [misfit_table(title, test, signals).without_empty_columns() for title, test in titled]
 
 
 class DependenceFound(msgspec.Struct, frozen=True):

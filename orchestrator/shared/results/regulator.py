@@ -1,28 +1,30 @@
 """What ``regulator.json`` holds: gains of an LQR, and what its loop does."""
 
+from typing import Annotated
+
 import msgspec
 
 from orchestrator.shared.results import ResultData
+from orchestrator.shared.results.fields import Display
 
 
 class ForecastFound(msgspec.Struct, frozen=True):
-    """A loop at rest, without friction and load, by its gains alone.
+    """A loop with a gap at rest, without friction and load, by its gains alone; margins are those without a gap.
 
-    ``twist`` and ``load`` are amplitudes over the half-gap, ``frequency`` [Hz]; ``settled``: the motion was followed
-    until it repeated itself or came to rest. Margins are those without a gap [rad], [s],
-    as factors of the gain; None: there is none. ``rank`` of six states.
+    ``settled``: the motion was followed until it repeated itself or came to rest. Amplitudes and frequency are 0 where
+    it is still. None: there is no such margin.
     """
 
-    cycles: bool
-    twist: float
-    load: float
-    frequency: float
-    phase_margin: float
-    delay_margin: float | None
-    rank: int
+    cycles: Annotated[bool, Display("cycles without friction and load")]
+    twist: Annotated[float, Display("amplitude of the twist", "half-gaps")]
+    load: Annotated[float, Display("amplitude of the load", "half-gaps")]
+    frequency: Annotated[float, Display("frequency", "Hz")]
+    phase_margin: Annotated[float, Display("phase margin without a gap", "rad")]
+    delay_margin: Annotated[float | None, Display("delay margin without a gap", "s")]
+    rank: Annotated[int, Display("states of six that the request moves")]
     settled: bool = True
-    lower_gain: float | None = None
-    upper_gain: float | None = None
+    lower_gain: Annotated[float | None, Display("smallest factor of the gain without a gap")] = None
+    upper_gain: Annotated[float | None, Display("largest factor of the gain without a gap")] = None
 
 
 class RegulatorFound(ResultData, frozen=True, kw_only=True):
