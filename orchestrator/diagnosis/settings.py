@@ -5,7 +5,7 @@
 
 from typing import Annotated
 
-from orchestrator.shared.settings import Settings, note, setting, share
+from orchestrator.shared.settings import Settings, setting, share
 
 
 class BandSettings(Settings, frozen=True):
@@ -53,12 +53,6 @@ class FitSettings(Settings, frozen=True):
         int, setting("of a fit at most: Gauss and Newton's steps converge at once or not at all", ge=1)
     ] = 4
     most_overdispersion: Annotated[float, setting("by which blocks may widen the variance of errors", ge=1)] = 300.0
-    measurement_levels: Annotated[
-        tuple[float, ...], note("tried, in shares of the encoder's flat noise: a count is no white noise")
-    ] = (1.0, 2.0, 4.0, 10.0, 30.0)
-    process_levels: Annotated[tuple[float, ...], note("tried, in shares of the power of the residual")] = (
-        1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5,
-    )  # fmt: skip
 
 
 class SelectionSettings(Settings, frozen=True):
@@ -78,18 +72,19 @@ class GradeSettings(Settings, frozen=True):
     """What makes a name certain, likely or possible."""
 
     certain_t: Annotated[float, setting("paired errors of a certain effect")] = 5.0
-    likely_t: Annotated[float, setting("paired errors of a likely one")] = 3.0
+    likely_t: Annotated[float, setting("paired errors of a likely one, and its sizes over theirs")] = 3.0
     certain_share: Annotated[
-        float, share("of the missing torque that a certain effect explains; most that a curve may still take of it")
+        float,
+        share(
+            "of the missing torque that a certain effect or a likely wave explains; most that a curve still takes of it"
+        ),
     ] = 0.08
     likely_share: Annotated[float, share("of the missing torque that a likely one explains")] = 0.03
-    likely_gain: Annotated[float, share("or of what is left without it; a learned law takes as much")] = 0.2
-    certain_size_t: Annotated[float, setting("sizes over their errors of a certain effect")] = 4.0
-    likely_size_t: Annotated[float, setting("sizes over their errors of a likely one")] = 3.0
-    wave_share: Annotated[float, share("likely_share of waves, whose scanned cycles follow anything")] = 0.08
-    follower_share: Annotated[
-        float, share("likely_share of limits, of constants and of what is late: each follows what another law leaves")
+    likely_gain: Annotated[
+        float,
+        share("or of what is left without it; a learned law takes as much, and what follows others of the torque"),
     ] = 0.2
+    certain_size_t: Annotated[float, setting("sizes over their errors of a certain effect")] = 4.0
     most_gain: Annotated[
         float,
         share(

@@ -33,11 +33,6 @@ def share(why: str, le: float = 1.0) -> msgspec.Meta:
     return msgspec.Meta(description=why, ge=0.0, le=le)
 
 
-def note(why: str) -> msgspec.Meta:
-    """Return the meaning of a setting that has no bounds of its own."""
-    return msgspec.Meta(description=why)
-
-
 def read_settings(path: Path, kind: type[S]) -> S:
     """Return settings with the values of a TOML file; what it does not name keeps its default."""
     return settings_of(read_toml(path, MAXIMUM_BYTES), kind, str(path))

@@ -24,7 +24,8 @@ from orchestrator.diagnosis.settings import FitSettings
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-QUIET = 1e-4  # of the unknown torques that residuals show, where weights take hardly any for granted
+MEASUREMENT_LEVELS = (1.0, 2.0, 4.0, 10.0, 30.0)  # tried, in shares of the encoder's flat noise: a count is not white
+PROCESS_LEVELS = (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5)  # tried, in shares of the residual's power
 RIDGE = 1e-12  # of the diagonal of a spectral matrix: encoders that move as one leave it singular
 
 
@@ -109,7 +110,7 @@ def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
     return Whitening(weights, rows, _taper(model), model.active[:, rows] * np.sqrt(independent)[:, None], length)
 
 
-def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings, quiet: bool = False) -> Whitening:
+def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings) -> Whitening:
     """Return the weights that residuals (channels, n) of a model ask for."""
     plain = band_only(model, settings)
     segment = min(model.size // 4, 1024)
@@ -119,9 +120,7 @@ def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSett
         for column, right in enumerate(residuals):  # scipy's cross-spectrum conjugates its first signal
             measured[:, row, column] = csd(right, left, 1.0 / model.step, nperseg=segment, detrend=False)[1]
     inside = np.array([(frequencies > 0) & (frequencies < max(c, 3 * frequencies[1])) for c in model.cutoffs])
-    measurement, process = _most_likely_levels(model, frequencies, measured, inside, settings)
-    if quiet:
-        measurement, process = model.noise_sources(frequencies).levels, QUIET * process
+    measurement, process = _most_likely_levels(model, frequencies, measured, inside)
     fine = rfftfreq(plain.length, model.step)[: len(plain.weights)]
     matrix = spectral_matrix(model, fine, measurement, process)
     within = np.array([fine < cutoff for cutoff in model.cutoffs])
@@ -152,7 +151,7 @@ def _matrix(transfer: Any, levels: Array, ridge: float = 0.0) -> Any:
 
 
 def _most_likely_levels(
-    model: ResidualModel, frequencies: Array, measured: Complex, inside: NDArray[np.bool_], settings: FitSettings
+    model: ResidualModel, frequencies: Array, measured: Complex, inside: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
     """Return levels of both kinds of noise by Whittle's likelihood over the band that all channels share."""
     sources = model.noise_sources(frequencies)
@@ -172,9 +171,9 @@ def _most_likely_levels(
             return np.inf
         return float(np.sum(determinant + np.einsum("fcd,fdc->f", np.linalg.inv(matrix), spectra).real))
 
-    shares = settings.process_levels
+    shares = PROCESS_LEVELS
     ones = np.ones(scale.size)
-    pairs = [(share, part) for share in settings.measurement_levels for part in shares]
+    pairs = [(share, part) for share in MEASUREMENT_LEVELS for part in shares]
     measurement, common = min(pairs, key=lambda pair: cost(pair[0], pair[1] * ones))
     process = common * ones
     for n in range(scale.size if scale.size > 1 else 0):  # torques at one body need not be those at another

@@ -83,7 +83,7 @@ def gap_effects(gap: HiddenGap, test: SignalMisfit, grades: GradeSettings) -> tu
     lowered: tuple[str, ...]
     if size >= grades.certain_size_t:
         grade, lowered = Grade.CERTAIN, ()
-    elif size >= grades.likely_size_t:
+    elif size >= grades.likely_t:
         grade, lowered = Grade.LIKELY, ("sure size",)
     else:
         grade, lowered = Grade.POSSIBLE, ("size",)

@@ -32,7 +32,7 @@ class GradeRule:
 def _explains_enough(effect: EffectEvidence, s: GradeSettings) -> bool:
     share = s.likely_share
     if effect.kind in FOLLOWING:
-        share = s.wave_share if effect.kind == "wave" else s.follower_share
+        share = s.certain_share if effect.kind == "wave" else s.likely_gain
     gain = s.most_gain if effect.kind in FOLLOWING else s.likely_gain
     return effect.share >= share or (effect.share > 0.0 and effect.gain > gain)
 
@@ -96,8 +96,8 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "grades.certain_size_t", "its size differs between blocks of the record",
     ),
     GradeRule(
-        "size", Grade.POSSIBLE, lambda e, r, s: e.size_t >= s.grades.likely_size_t, "size over its error",
-        "grades.likely_size_t", "its size may be zero, or changes along the record so that none holds for all of it",
+        "size", Grade.POSSIBLE, lambda e, r, s: e.size_t >= s.grades.likely_t, "size over its error",
+        "grades.likely_t", "its size may be zero, or changes along the record so that none holds for all of it",
     ),
     GradeRule(
         "inertia seen", Grade.LIKELY, lambda e, r, s: r.inertia_error < s.grades.inertia_error,
