@@ -158,7 +158,7 @@ def _of_an_fmu(
 
 def comparable_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
     """Return a record that the model can be compared with."""
-    record = set_zeros(as_record(given, model, **reading), model)
+    record = set_zeros(as_record(given, model, holes=True, **reading), model)
     check_record(record)
-    check_plausible(record, model)
+    check_plausible(max(record.parts_between_holes(), key=lambda part: part.size), model)
     return record

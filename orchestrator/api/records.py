@@ -21,6 +21,7 @@ def read_record(
     rate: float | None = None,
     torque_needed: bool = True,
     header: int | None = None,
+    holes: bool = False,
 ) -> Record:
     """Read a measured record.
 
@@ -36,6 +37,8 @@ def read_record(
         torque_needed: refuse a log of two angles without a torque; else its ``u`` is NaN.
         header: line of a text that holds the names, from 1; 0: there are none (default: the last line before the
             longest run of rows of numbers).
+        holes: keep holes of any length; `diagnose` then fits the parts between them together (default: refuse a record
+            of which more than a fifth is missing).
 
     Returns:
         The record in SI units; its arrays have shape (n,).
@@ -48,7 +51,9 @@ def read_record(
         >>> record.size, round(record.duration, 2)
         (4000, 20.0)
     """
-    return record.read_record(Path(path), columns or {}, reading=Reading(part, resample, rate, torque_needed, header))
+    return record.read_record(
+        Path(path), columns or {}, reading=Reading(part, resample, rate, torque_needed, header, holes)
+    )
 
 
 def read_model(path: Path | str | None = None) -> Model:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from orchestrator.diagnosis.data.records import check_model, check_record, check_resolved, split_records
+from orchestrator.diagnosis.data.records import check_model, check_record, check_resolved, check_whole, split_records
 from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import Values
 from orchestrator.diagnosis.model.law_arguments import law_arguments
@@ -67,7 +67,8 @@ def diagnose(
     Returns:
         Graded effects, the corrected model, and what is left.
     """
-    whole = [records] if isinstance(records, Record) else list(records)
+    given = [records] if isinstance(records, Record) else list(records)
+    whole = [part for record in given for part in record.parts_between_holes()]
     left_out: list[str] = []
     if effects is not None:
         left_out = [label for label in effects_of(model) if label not in effects]
@@ -75,6 +76,7 @@ def diagnose(
     check_model(model)
     for record in whole:
         check_record(record)
+        check_whole(record)
         check_resolved(model.plant, model, record)
     fitted, test_data = split_records(whole, settings.test_share, test)
     models = [balance_of(record, model, settings) for record in fitted]
@@ -98,6 +100,8 @@ def diagnose(
         return _report_hidden_gap(replace(workings, final=values), gap, model, settings)
     found = _report(workings, model, settings)
     notes = [f"left out of the model file, as asked: {list_effects(left_out)}"] if left_out else []
+    if len(whole) > len(given):
+        notes.append(f"holes divide what was logged into {len(whole)} parts, which are fitted together")
     return replace(found, notes=(*found.notes, *notes))
 
 

@@ -10,6 +10,7 @@ from orchestrator.records.columns import Array
 from orchestrator.records.timing import Timing
 
 MINIMUM_ROWS = 200
+LONGEST_LINE = 20  # rows: over a longer hole no line stands for the motion
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,22 @@ class Record:
             u_deviation=None if self.u_deviation is None else self.u_deviation[rows],
             u_sampled=None if self.u_sampled is None else self.u_sampled[rows],
         )
+
+    def parts_between_holes(self) -> list["Record"]:
+        """Return the parts between holes that are too long for lines over them, each with enough rows to be a record.
+
+        Returns:
+            The parts, or this record itself where no hole divides it.
+        """
+        parts, first = [], 0
+        for start, stop in zip(*runs_of(self.is_missing), strict=True):
+            if stop - start > LONGEST_LINE and start - first >= MINIMUM_ROWS and self.size - stop >= MINIMUM_ROWS:
+                parts.append(self.part(first, int(start)))
+                first = int(stop)
+        if not parts:
+            return [self]
+        parts.append(self.part(first, self.size))
+        return [replace(one, source=f"{self.source}, part {n + 1}") for n, one in enumerate(parts)]
 
     def without_load_encoder(self) -> "Record":
         """Return the same record with ``theta_l`` dropped.

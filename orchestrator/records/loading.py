@@ -48,6 +48,7 @@ class Reading:
         resample: "uniform" (only the stamps jitter), "linear" or "cubic"; None: the motion decides.
         rate: samples per second to come down to; None: as in the file.
         torque_needed: whether a file of two angles without a torque is refused.
+        holes: whether long holes may stay, for who takes the parts between them.
         header: line of the names in a text, from 1; 0: it has none; None: found.
     """
 
@@ -56,6 +57,7 @@ class Reading:
     rate: float | None = None
     torque_needed: bool = True
     header: int | None = None
+    holes: bool = False
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ def read_record(
         loaded = load(source, path, columns or {}, further, reading)
     if "u" in loaded.table:
         check_driven(loaded.table["u"], loaded.labels["u"], path.name)
-    record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
+    record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform", reading.holes)
     record = replace(record, u_raster=loaded.torque_raster, angle_unit=loaded.angle_unit)
     span = motion_span(interpolate_missing(record.theta_m), record.time)
     if span is not None:
@@ -74,7 +74,11 @@ def read_record(
 
 
 def record_from_columns(
-    table: Mapping[str, Array], source: str, shown: Mapping[str, str] | None = None, trust_rows: bool = False
+    table: Mapping[str, Array],
+    source: str,
+    shown: Mapping[str, str] | None = None,
+    trust_rows: bool = False,
+    holes: bool = False,
 ) -> Record:
     """Check columns that are already numbers (any mapping of name to (n,) array) and return the record."""
     arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in table.items()}
@@ -94,7 +98,7 @@ def record_from_columns(
     else:
         cure = "say `[columns.time] rate = {rate}` in the model file (`model`), or `resample` uniform"
         check_clock(arrays["time"], angles, f"{source}: column `{label['time']}`", cure)
-    grid = grid_of(arrays["time"], label["time"], source, trust_rows, arrays["theta_m"])
+    grid = grid_of(arrays["time"], label["time"], source, trust_rows, arrays["theta_m"], holes)
     if not grid.uniform:
         arrays, more = make_uniform(arrays, UNEVEN)
         notes = [*notes, *(f"the stamps keep to no clock: {text}" for text in more)]

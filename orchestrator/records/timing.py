@@ -20,6 +20,7 @@ LARGEST_STEP = 0.5  # s
 NO_JITTER = 1e-6  # of a step: what is left of the arithmetic
 LARGEST_JITTER = 0.1  # of a step: stamps this close to the grid are on it
 LARGEST_MISSING = 0.2  # of the rows: with more, what is assumed in between decides
+LARGEST_HOLES = 0.95  # of the rows, where the parts between holes are taken
 GAP = 5.0  # median steps: a longer one is a gap, whose samples are missing
 LEAST_FALLS, LEAST_FALL = 2, 0.2  # s: of 0.9 to 0.1, 0.95 to 0.1 and 0.5 to 0.1, which fractions without zeros make
 
@@ -75,13 +76,16 @@ class Grid:
     note: str = ""
 
 
-def grid_of(time: Array, label: str, source: str, trust_rows: bool = False, angle: Array | None = None) -> Grid:
+def grid_of(
+    time: Array, label: str, source: str, trust_rows: bool = False, angle: Array | None = None, holes: bool = False
+) -> Grid:
     """Return the uniform grid of time stamps (n,) [s].
 
     Args:
         trust_rows: whether the rows are uniform whatever their stamps say.
         angle: (n,) what moved; with it, stamps that jitter about a uniform clock are found and their rows trusted, and
             samples at uneven times are no grid; without it they are refused.
+        holes: whether most rows may be missing.
     """
     where = f"{source}: column `{label}`"
     _check_increasing(time, label, source)
@@ -112,7 +116,7 @@ def grid_of(time: Array, label: str, source: str, trust_rows: bool = False, angl
     gaps = tuple((int(place[n]) + 1, int(place[n + 1] - place[n]) - 1) for n in jumps)
     size = int(place[-1]) + 1
     missing = size - time.size
-    if missing > LARGEST_MISSING * size:
+    if missing > (LARGEST_HOLES if holes else LARGEST_MISSING) * size:
         first = int(jumps[0]) if jumps.size else 0
         longest = max(gaps, key=lambda gap: gap[1])
         raise RecordError(

@@ -13,6 +13,7 @@ import numpy as np
 
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.plants.description import STEP, Plant
+from orchestrator.records.checks import LARGEST_SHARE_MISSING
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import residual_noise
@@ -87,6 +88,16 @@ def check_record(record: Record) -> None:
                 f"{record.source}: column `{name}` must move by at least {LEAST_TRAVEL:g} standard deviations of its "
                 f"noise, but moves by {travel / noise:.2g}: nothing moves, so there is nothing to diagnose"
             )
+
+
+def check_whole(record: Record) -> None:
+    """Refuse a record that holes leave too little of, though no part between them is long enough."""
+    share = record.n_missing / record.size
+    if share > LARGEST_SHARE_MISSING:
+        raise RecordError(
+            f"{record.source}: column `time` must have at most {100.0 * LARGEST_SHARE_MISSING:g} % of its rows missing "
+            f"between holes, but {100.0 * share:.3g} % are: keep a part without them by `part` START:END"
+        )
 
 
 def check_resolved(plant: Plant, model: Model, record: Record) -> None:
