@@ -36,7 +36,7 @@ def test_the_outcome_of_a_run(root, monkeypatch, what):
     if what.startswith("waits"):
         monkeypatch.setattr(mutants, "CLOCK_LIMIT", 5.0)
     (root / "test_one.py").write_text(text)
-    assert mutants.outcome(root, ("test_one.py",)) == tuple(expected)
+    assert mutants.outcome(root, ("test_one.py",)) == (expected[0], [name for name in expected[1:] if name])
 
 
 def test_tests_of_the_changed_function_come_first(root):
@@ -46,10 +46,21 @@ def test_tests_of_the_changed_function_come_first(root):
         "from orchestrator.sums import add\ndef test_other(): pass\ndef test_sum(): assert add(1, 1) == 2\n"
         "def test_last(): pass\n"
     )
-    assert mutants.outcome(root, ("test_one.py",)) == ("survived", "")
+    assert mutants.outcome(root, ("test_one.py",)) == ("survived", [])
     (root / "orchestrator" / "sums.py").write_text("def add(a, b):\n    return a - b\n")
     (root / "test_one.py").write_text((root / "test_one.py").read_text().replace("pass", "assert False"))
     assert mutants.outcome(root, ("test_one.py",), place="orchestrator/sums.py:2") == (
         "caught",
-        "test_one.py::test_sum",
+        ["test_one.py::test_sum"],
     )
+
+
+def test_all_tests_that_catch_a_mutant_are_noted(root, capsys):
+    (root / "test_one.py").write_text("def test_a(): pass\ndef test_b(): assert False\ndef test_c(): assert False\n")
+    names = ["test_one.py::test_b", "test_one.py::test_c"]
+    assert mutants.outcome(root, ("test_one.py",), every=True) == ("caught", names)
+    caught = [{"outcome": "caught", "by": names}, {"outcome": "caught", "by": names[1:]}, {"outcome": "survived"}]
+    mutants.print_tests([{"by": []} | entry for entry in caught])
+    assert [line.split() for line in capsys.readouterr().out.splitlines()] == [
+        ["2", "1", names[1]], ["1", "0", names[0]],
+    ]  # fmt: skip

@@ -3,8 +3,9 @@
     python -m tools.mutants --count 60 --room records --out mutants.json
 
 Each mutant changes one operator, comparison, constant, branch or statement of one module in a copy of the project and
-runs the fast tests of its room there. A mutant that passes them all has survived; one whose run has to be ended counts
-as neither caught nor survived. Slices of one seed share one sample of mutants; results are merged into the file, so
+runs the fast tests of its room there, up to the first that fails; with ``--every`` all of them, and a table says which
+tests catch what no other does. A mutant that passes them all has survived; one whose run has to be ended counts as
+neither caught nor survived. Slices of one seed share one sample of mutants; results are merged into the file, so
 that the slices may run at different times. A mutant that was not caught is tried again by a later run.
 """
 
@@ -210,7 +211,7 @@ def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
     return [(m, changed((root / m.module).read_text(encoding="utf-8"), node, number)) for m, node, number in chosen]
 
 
-def outcome(root: Path, tests: tuple[str, ...], place: str = "") -> tuple[str, str]:
+def outcome(root: Path, tests: tuple[str, ...], place: str = "", every: bool = False) -> tuple[str, list[str]]:
     """Run tests in a copy of the project.
 
     The limit of processor time holds for the tests' process alone: a child that it ended would be a failed test.
@@ -219,10 +220,11 @@ def outcome(root: Path, tests: tuple[str, ...], place: str = "") -> tuple[str, s
         root: of the copy.
         tests: files or folders, from there.
         place: of the change, as ``module:line``; empty: there is none, and what the tests call is noted.
+        every: go on after the first test that fails.
 
     Returns:
         ``"survived"``; ``"caught"`` where a test fails or a module cannot be imported; ``"no end"`` where the run was
-        ended by its limit of time or by another signal: nothing is known then. And the test that failed.
+        ended by its limit of time or by another signal: nothing is known then. And the tests that failed.
     """
     environment = os.environ | {
         "PYTHONPATH": str(root),
@@ -231,7 +233,8 @@ def outcome(root: Path, tests: tuple[str, ...], place: str = "") -> tuple[str, s
         NOTES: str(root.parent / f"notes-{Path(tests[0]).stem}.json"),
     }
     environment |= {PLACE: place} if place else {}
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-m", "not slow", "-p", "no:cacheprovider"]
+    first = [] if every else ["-x"]
+    command = [sys.executable, "-m", "pytest", *first, "-q", "--no-header", "-m", "not slow", "-p", "no:cacheprovider"]
     with tempfile.TemporaryFile() as output:
         run = subprocess.Popen(
             [*command, "-p", mutant_order.__name__, *tests], cwd=root, env=environment, stdout=output, stderr=output,
@@ -246,10 +249,21 @@ def outcome(root: Path, tests: tuple[str, ...], place: str = "") -> tuple[str, s
                 os.killpg(run.pid, signal.SIGKILL)
             run.wait()
         output.seek(0)
-        failed = re.search(rb"^(?:FAILED|ERROR) (\S+)", output.read(), re.MULTILINE)
+        failed = re.findall(rb"^(?:FAILED|ERROR) (\S+)", output.read(), re.MULTILINE)
     # pytest: 0 all passed, 1 tests failed, 2 stopped by an error while collecting.
     found = {0: "survived", 1: "caught", 2: "caught"}.get(code, "no end")
-    return found, failed[1].decode() if failed else ""
+    return found, list(dict.fromkeys(name.decode() for name in failed))
+
+
+def print_tests(results: list[dict[str, Any]]) -> None:
+    """Print for each test how many mutants it catches, and how many of them no other does.
+
+    A test that is never alone says nothing that the others do not say, as far as this sample goes.
+    """
+    caught = [result["by"] for result in results if result["outcome"] == "caught"]
+    counts, alone = Counter(name for by in caught for name in by), Counter(by[0] for by in caught if len(by) == 1)
+    for name, count in sorted(counts.items(), key=lambda item: (-alone[item[0]], -item[1])):
+        print(f"{count:5} {alone[name]:5} {name}")
 
 
 def main() -> int:
@@ -260,6 +274,7 @@ def main() -> int:
     parser.add_argument("--slice", default="1/1", help="which part of the sample: 3/8 is the third of eight")
     parser.add_argument("--room", help="one room alone")
     parser.add_argument("--out", type=Path, default=Path("mutants.json"))
+    parser.add_argument("--every", action="store_true", help="note all tests that catch a mutant, not the first alone")
     parser.add_argument("--seconds", type=float, default=1e9, help="start no mutant after this time")
     options = parser.parse_args()
     part, parts = (int(word) for word in options.slice.split("/"))
@@ -283,13 +298,15 @@ def main() -> int:
             original = (root / mutant.module).read_text(encoding="utf-8")
             (root / mutant.module).write_text(source, encoding="utf-8")
             room, place = rooms[mutant.room], f"{mutant.module}:{mutant.line}"
-            found, by = outcome(root, room.tests, place)
+            found, by = outcome(root, room.tests, place, options.every)
             (root / mutant.module).write_text(original, encoding="utf-8")
             results.append(asdict(mutant) | {"outcome": found, "by": by})
             options.out.write_text(json.dumps(results, indent=1))
             if found != "caught":
                 print(f"{found}: {mutant.module}:{mutant.line} {mutant.change}: {mutant.text}", flush=True)
     counts = Counter(result["outcome"] for result in results)
+    if options.every:
+        print_tests(results)
     print(f"{counts['caught']} of {len(results)} mutants caught, {counts['no end']} of unknown outcome")
     return 0
 
