@@ -21,10 +21,13 @@ from orchestrator.reporting.model import POINT_LIMIT, Numbers, Plot, Series
 
 SCRIPTS = ("scale.js", "units.js", "svg.js", "columns.js", "marks.js", "plot.js")
 TIME = "time [s]"
-CURVE_LIMIT = 1_000_000
-"""Rows of a curve that a page holds: more keep the smallest and the largest value of each stretch."""
-PAGE_LIMIT = 6_000_000
-"""Rows of all curves of a page together: 32 MB."""
+CURVE_LIMIT = 500_000
+"""Rows of all curves of a page together that it holds as they are: 2.7 MB."""
+PAGE_LIMIT = 180_000
+"""Rows of all curves, where there are more: 2.9 MB, for what is left of a curve has times of its own.
+
+Of the longest curves the smallest and the largest value of each stretch are left.
+"""
 PLAIN = 50
 """Columns of at most so many numbers stay readable in the page."""
 FAR = 100.0
@@ -60,7 +63,9 @@ def plot_style() -> str:
 
 def rows_of_a_curve(plots: Sequence[Plot]) -> int:
     """Return how many rows of each curve a page with these plots has room for."""
-    counts = sorted(min(len(s.y), CURVE_LIMIT) for plot in plots for s in plot.series)
+    counts = sorted(len(s.y) for plot in plots for s in plot.series)
+    if sum(counts) <= CURVE_LIMIT:
+        return CURVE_LIMIT
     room = PAGE_LIMIT
     for done, count in enumerate(counts):
         if count * (len(counts) - done) > room:

@@ -195,9 +195,23 @@ def test_a_page_shares_its_room_between_long_curves():
     def plots(*counts):
         return [Plot("p", "x", "y", tuple(Series("a", range(n), range(n)) for n in counts))]
 
-    assert rows_of_a_curve(plots(1000, 1_000_000)) == CURVE_LIMIT
+    assert rows_of_a_curve(plots(1000, CURVE_LIMIT - 1000)) == CURVE_LIMIT
     limit = rows_of_a_curve(plots(*[2_000_000] * 10, 1000))
     assert limit == (PAGE_LIMIT - 1000) // 10
+
+
+@pytest.mark.parametrize("rows", [124_000, 300_000])
+def test_a_page_has_at_most_three_megabytes_and_no_peak_is_lost(rows):
+    rng = np.random.default_rng(0)
+    time, curves = np.arange(rows) * 1e-3, rng.standard_normal((4, rows))
+    curves[2, 77_777] = 99.0
+    plots = [Plot(f"{n}", "time [s]", "y", (Series("a", time, y),)) for n, y in enumerate(curves)]
+    data = [plot_data(plot, rows_of_a_curve(plots)) for plot in plots]
+    assert len(json.dumps(data)) < 3_000_000
+    series = data[2]["series"][0]
+    assert (rows == 124_000) == ("step" in series["x"])
+    at = np.argmax(unpack(series["y"]))
+    assert unpack(series["x"])[at] == pytest.approx(77.777, abs=1e-6)
 
 
 @pytest.mark.parametrize(
