@@ -5,7 +5,7 @@ a jump follows. ``x``: state; ``mode``: what stays as it is between two events; 
 and saturated already; ``T_l``: load torque [N.m]; all are those of the plant.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 COUNT = 4
 """Number of states."""
@@ -13,7 +13,7 @@ DRIVE, REQUEST = 2, 3
 """Places in the state of the drive's torque behind its lag, and of the request that it follows."""
 GUARDS = 1
 """Number of guards."""
-State = tuple[float, float, float, float]
+State = Annotated[tuple[float, ...], COUNT]
 Mode = tuple[int]
 
 
