@@ -208,7 +208,13 @@ def compensate(
         >>> found.laws[2].law
         'compensator'
     """
-    given = {"alpha": alpha, "tau": tau, "impact_speed": impact_speed, "friction": friction, "plants": plants}
+    given: dict[str, Any] = {
+        "alpha": alpha,
+        "tau": tau,
+        "impact_speed": impact_speed,
+        "friction": friction,
+        "plants": plants,
+    }
     if model is None:
         given |= {name: value for name, value in BENCHMARK.items() if given[name] is None}
     elif tau is not None or friction is not None:

@@ -72,7 +72,7 @@ def ensure_native(
 
 def build_native(recipe: Recipe, directory: Path, fmi: int = 2) -> Path:
     """Return the native FMU of a recipe of one's own, for this platform; its sources are in it."""
-    return _ensure(recipe, directory, False, True, fmi, False)
+    return _ensure(recipe, directory, force=False, here=True, fmi=fmi, real_outputs=False, versions=False)
 
 
 def native_remark() -> str | None:

@@ -118,7 +118,7 @@ def loop_margins(model: StateSpace, gains: tuple[float, ...], sample_time: float
     L = loop(angles)
     phase, size = np.unwrap(np.angle(L)), np.abs(L)
 
-    def crossings(at: Array, value: Callable[[complex], float]) -> Array:
+    def crossings(at: NDArray[np.intp], value: Callable[[complex], float]) -> Array:
         found = [brentq(lambda a: value(complex(loop(np.array([a]))[0])), angles[n], angles[n + 1]) for n in at]
         return np.array(found)
 

@@ -39,8 +39,8 @@ def model_text(model: Model, values: Mapping[str, tuple[float, float]], record: 
         for name, said in entries.items():
             lines += ["", f"[{table}.{name}]", *(f"{key} = {text}" for key, text in entry_texts(said).items())]
     if record is not None:
-        entries = msgspec.structs.asdict(record).items()
-        lines += ["", "[record]", *(f"{name} = {toml_text(value)}" for name, value in entries)]
+        found = msgspec.structs.asdict(record)
+        lines += ["", "[record]", *(f"{name} = {toml_text(found[name])}" for name in found)]
     return "\n".join(lines) + "\n"
 
 
