@@ -99,16 +99,20 @@ class SimulationResult(PlottedResult):
         return f", {len(took.times)} events{ticks}" if took.instants else ""
 
     def _rows(self) -> list[list[str]]:
-        rows = []
+        cells = [(s, (s.first, s.last, s.smallest, s.largest)) for s in self._signals()]
+        return [[s.signal, s.unit, *(f"{value:.6g}" for value in values)] for s, values in cells]
+
+    def _signals(self) -> list[SignalFound]:
+        found = []
         for name in self.names:
-            values = self[name]
-            numbers = (values[0], values[-1], values.min(), values.max())
-            rows.append([name, self.units.get(name) or "", *(f"{v:.6g}" for v in numbers)])
-        return rows
+            values = np.asarray(self[name], dtype=float)
+            numbers = (values[0], values[-1], values.min(), values.max(), np.sqrt(np.mean(values**2)))
+            found.append(SignalFound(name, self.units.get(name) or "", *map(float, numbers)))
+        return found
 
     def results(self, place: Path | None = None) -> SignalsFound:
         """Return what the JSON file says of the run."""
-        signals = [SignalFound(*row) for row in self._rows()]
+        signals = self._signals()
         remarks = [RemarkFound(r.instance, r.text, r.count) for r in self.run.remarks]
         took = self.run.statistics.events
         events = EventsFound(list(took.times), took.instants, took.ticks, list(took.late)) if took.instants else None

@@ -57,7 +57,9 @@ def check_range(values: Array, name: str, source: str) -> None:
 
 
 def check_driven(u: Array, label: str, source: str) -> None:
-    """Refuse a torque ``u`` (n,) that is zero throughout."""
+    """Refuse a torque ``u`` (n,) that is empty or zero throughout."""
+    if not np.isfinite(u).any():
+        raise RecordError(f"{source}: column `{label}` must hold numbers, but is empty in all {u.size} rows")
     if not np.any(u[np.isfinite(u)]):
         raise RecordError(
             f"{source}: column `{label}` must drive the machine, but is 0 in all {u.size} rows: name the right one by "

@@ -184,14 +184,21 @@ def _convert(
     ranged = []
     for one in taken:
         values = loaded.table.get(one.column)
-        if one.needs or values is None or not np.isfinite(values).any():
+        if one.needs or values is None or not _has_numbers(values):
             ranged.append(one)
             continue
         kind = KINDS[one.column][0]
         kind = "force" if one.kind == "force" else "length" if one.kind in ("length", "velocity") else kind
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
         ranged.append(msgspec.structs.replace(one, si=SI[kind], least=low, most=high))
+    empty = [name for name in ("time", "u", "theta_m") if name in loaded.table and not _has_numbers(loaded.table[name])]
+    if empty and not problem and loaded.table["time"].size < RANGED_ROWS:
+        problem = f"column `{loaded.labels[empty[0]]}` must hold numbers, but is empty in all rows"
     return ranged, () if problem else loaded.notes, problem
+
+
+def _has_numbers(values: NDArray[np.float64]) -> bool:
+    return bool(np.isfinite(values).any())
 
 
 def _channels(source: RecordSource, used: Mapping[int, str]) -> list[ChannelShown]:

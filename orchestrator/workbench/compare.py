@@ -4,7 +4,7 @@ import csv
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,19 @@ from orchestrator.reporting import Facts, Plot, Report, ReportTable, Series, Tab
 from orchestrator.workbench.session import is_name
 
 MOST_CURVES = 8  # of one file: with more nobody reads them
+MOST_NAMED = 4  # in a sentence
+APART = 1e-6  # of a curve's own size: what two curves differ by that is no rounding
 MOST_BYTES = 50_000_000  # of a result file that is compared
 SAME = 1e-9  # relative difference of numbers without an interval that is rounding
 # What says how a result was made, and nothing of the machine.
 _BESIDE = ("settings", "schema_version", "seconds", "block_values", "candidates", "live", "arcmin")
 # Numbers that are in the unit beside them: of misfits and of channels.
-_IN_ITS_UNIT = ("nominal", "parameters", "final", "noise", "least", "most")
+_IN_ITS_UNIT = (
+    "nominal", "parameters", "final", "noise", "least", "most", "first", "last", "smallest", "largest", "rms",
+)  # fmt: skip
+_NAMES = ("name", "source", "signal")  # of an entry of a list
+
+Columns = dict[str, list[float | None]]
 
 
 @dataclass(frozen=True)
@@ -67,12 +74,19 @@ def compare_results(first: Path, second: Path) -> Report:
         _table("In one of the two alone", names, sorted(left.keys() ^ right.keys()), left, right),
         _texts(names, documents),
     ]  # fmt: skip
-    plots = tuple(_curves(first, second))
+    curves = list(_curves(first, second))
+    plots = tuple(plot for curve in curves for plot in curve.plots)
+    apart = [curve for curve in curves if curve.apart]
+    compared = [n for n in both if left[n].interval and right[n].interval]
+    others = [_spaced(name) for name in beyond if name not in sure]
+    changed = _changed(documents)
     summary = (
-        f"{len(sure)} of {len([n for n in both if left[n].interval])} numbers with an interval differ by more than "
-        f"their intervals; {len(beyond) - len(sure)} others differ."
+        f"{len(sure)} of {len(compared)} numbers with an interval differ by more than their intervals; of the others "
+        f"{len(others)} differ{_named(others)}. {len(apart)} of {len(curves)} curves differ"
+        f"{_named([f'{c.name} by {c.rms:.3g} (rms)' for c in apart])}."
     )
-    badge = ("warn", "they differ") if sure else ("good", "no difference beyond the intervals")
+    summary = f"Changed: {changed}. {summary}" if changed else summary
+    badge = _badge(bool(sure), bool(compared), [curve.name for curve in apart])
     how = tuple((name, _how(document)) for name, document in zip(names, documents, strict=True))
     facts = Facts("What is compared", how)
     return Report(
@@ -82,6 +96,30 @@ def compare_results(first: Path, second: Path) -> Report:
         badge,  # type: ignore[arg-type]
         angle_unit=_angle_unit(documents[0].get("results")),
     )
+
+
+def _badge(differ: bool, compared: bool, apart: list[str]) -> tuple[str, str]:
+    """Return colour and word: green only where intervals were compared and nothing stands against them."""
+    if differ:
+        return "warn", "they differ"
+    if apart:
+        return "warn", "their curves differ"
+    return ("good", "no difference beyond the intervals") if compared else ("neutral", "nothing has an interval")
+
+
+def _changed(documents: list[dict[str, Any]]) -> str:
+    """Return which arguments of two commands differ, in words."""
+    first, second = (document.get("arguments") or {} for document in documents)
+    return ", ".join(
+        f"{name} {first.get(name)} -> {second.get(name)}"
+        for name in dict.fromkeys([*first, *second])
+        if name != "out" and first.get(name) != second.get(name)
+    )
+
+
+def _named(names: list[str]) -> str:
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return f": {', '.join(names[:MOST_NAMED])}{more}" if names else ""
 
 
 def quantities(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber]]:
@@ -101,7 +139,7 @@ def quantities(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber
                 yield from quantities(entry, f"{path} {name}")
     elif isinstance(results, list):
         for place, entry in enumerate(results):
-            named = entry.get("name") or entry.get("source") if isinstance(entry, Mapping) else None
+            named = next((entry[key] for key in _NAMES if entry.get(key)), None) if isinstance(entry, Mapping) else None
             if named is not None:
                 yield from quantities(entry, f"{path} {named}")
             elif isinstance(entry, Mapping):
@@ -187,7 +225,7 @@ def _words(results: Any, path: str = "") -> Iterator[tuple[str, str]]:
                 yield from _words(entry, f"{path} {name}")
     elif isinstance(results, list):
         for place, entry in enumerate(results):
-            named = entry.get("name") if isinstance(entry, Mapping) else None
+            named = next((entry[key] for key in _NAMES if entry.get(key)), None) if isinstance(entry, Mapping) else None
             yield from _words(entry, f"{path} {named or place + 1}")
     elif isinstance(results, (str, bool)):
         yield path.removeprefix(" results").removeprefix(" arguments").strip(), str(results)[:200]
@@ -199,8 +237,18 @@ def _how(document: Mapping[str, Any]) -> str:
     return f"{document.get('command')} {document.get('version')}; {given}"
 
 
-def _curves(first: Path, second: Path) -> Iterator[Plot]:
-    """Yield a plot for each column that two files of the same name have in common, over their first column."""
+@dataclass(frozen=True)
+class ComparedCurve:
+    """A column of both results: its plots, and the rms of the difference over the rows in which both have a value."""
+
+    name: str
+    plots: tuple[Plot, ...]
+    rms: float
+    apart: bool
+
+
+def _curves(first: Path, second: Path) -> Iterator[ComparedCurve]:
+    """Yield each column that two files of the same name have in common, over their first column."""
     for path in sorted(first.glob("*.csv")):
         tables = [_columns(folder / path.name) for folder in (first, second)]
         if not all(tables):
@@ -209,13 +257,33 @@ def _curves(first: Path, second: Path) -> Iterator[Plot]:
         across = next(iter(left))
         shared = [name for name in left if name in right and name != across]
         for name in shared[:MOST_CURVES] if across in right else ():
-            series = tuple(
-                Series(folder.name, table[across], table[name]) for folder, table in ((first, left), (second, right))
-            )
-            yield Plot(f"{path.stem}: {name}", across, name, series)
+            yield _compare_curve(f"{path.stem}: {name}", across, name, (first.name, left), (second.name, right))
 
 
-def _columns(path: Path) -> dict[str, list[float | None]]:
+def _compare_curve(
+    title: str, across: str, name: str, first: tuple[str, Columns], second: tuple[str, Columns]
+) -> ComparedCurve:
+    (_, left), (_, right) = first, second
+    series = tuple(Series(folder, table[across], table[name]) for folder, table in (first, second))
+    plots = [Plot(title, across, name, series)]
+    if left[across] != right[across]:  # other rows: nothing to subtract
+        return ComparedCurve(name, tuple(plots), math.nan, True)
+    gone = [None if a is None or b is None else b - a for a, b in zip(left[name], right[name], strict=True)]
+    rms, size = _rms(gone), max(_rms(left[name]), _rms(right[name]))
+    holes = any((a is None) != (b is None) for a, b in zip(left[name], right[name], strict=True))
+    apart = holes or rms > APART * size
+    if apart:
+        difference = (Series(f"{second[0]} minus {first[0]}", left[across], gone),)
+        plots.append(Plot(f"{title}, difference", across, name, difference, note=f"rms {rms:.4g}"))
+    return ComparedCurve(name, tuple(plots), rms, apart)
+
+
+def _rms(values: Sequence[float | None]) -> float:
+    known = [value for value in values if value is not None]
+    return math.sqrt(sum(value * value for value in known) / len(known)) if known else 0.0
+
+
+def _columns(path: Path) -> Columns:
     """Return the columns of numbers of a result's table; none where it has others, or is very large."""
     if not path.is_file() or path.stat().st_size > MOST_BYTES:
         return {}
@@ -223,7 +291,7 @@ def _columns(path: Path) -> dict[str, list[float | None]]:
         names, *rows = list(csv.reader(stream)) or [[]]
     if not rows or any(len(row) != len(names) for row in rows):
         return {}
-    columns: dict[str, list[float | None]] = {}
+    columns: Columns = {}
     for place, name in enumerate(names):
         try:
             columns[name] = [_cell(row[place]) for row in rows]

@@ -124,3 +124,10 @@ def test_the_lines_of_a_text_are_shown_though_no_table_was_found(log: Path, tmp_
     (tmp_path / "empty.csv").write_text("\n")
     with pytest.raises(RecordError, match="empty"):
         preview_log(tmp_path / "empty.csv", {})
+
+
+def test_a_log_without_any_number_cannot_be_read(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    for row, column in (("nan,nan,nan,nan", "time"), ("{n},nan,1,1", "u"), ("{n},1,nan,1", "theta_m")):
+        path.write_text("time,u,theta_m,theta_l\n" + "".join(f"{row.format(n=0.01 * n)}\n" for n in range(300)))
+        assert preview_log(path, {}).problem == f"column `{column}` must hold numbers, but is empty in all rows"

@@ -41,8 +41,9 @@ def test_what_differs_beyond_the_intervals(tmp_path: Path) -> None:
     assert found["Differ by more than their intervals"].rows[0][3] == pytest.approx(2.0)
     assert [row[0] for row in found["Agree within their intervals"].rows] == ["parameters J_m"]
     assert report.badge == ("warn", "they differ")
-    (plot,) = [section for section in report.sections if isinstance(section, Plot)]
+    plot, difference = [section for section in report.sections if isinstance(section, Plot)]
     assert [series.name for series in plot.series] == ["diagnose-1", "diagnose-2"]
+    assert list(difference.series[0].y) == pytest.approx([0.01 * n for n in range(5)])
     assert "diagnose-2" in render(report)
 
 
@@ -61,14 +62,48 @@ def test_angles_are_shown_in_the_unit_of_the_log(tmp_path: Path) -> None:
 
 
 def test_values_within_their_intervals_do_not_differ(tmp_path: Path) -> None:
-    report = compare_results(
-        result(tmp_path / "diagnose-1", 0.01, 0.001), result(tmp_path / "diagnose-2", 0.0115, 0.001, 250.0, "none")
-    )
+    first = result(tmp_path / "diagnose-1", 0.01, 0.001)
+    second = result(tmp_path / "diagnose-2", 0.0115, 0.001, 250.0, "none")
+    report = compare_results(first, second)
     found = tables(report)
     assert "Differ by more than their intervals" not in found
     assert [row[0] for row in found["Numbers without an interval that differ"].rows] == ["analysis a.csv rate"]
     assert ("verdict", "effects", "none") in found["Words that differ"].rows
-    assert report.badge == ("good", "no difference beyond the intervals")
+    assert report.badge == ("warn", "their curves differ")
+    (second / "diagnose.csv").write_text((first / "diagnose.csv").read_text())
+    assert compare_results(first, second).badge == ("good", "no difference beyond the intervals")
+
+
+def run(folder: Path, alpha: float, peak: float) -> Path:
+    """Write the result of a simulation: no number of it has an interval."""
+    folder.mkdir()
+    signals = [{"signal": f"plant.{n}", "unit": "N.m", "first": 0.0, "last": peak * n, "rms": peak} for n in (1, 2)]
+    document = {"command": "simulate", "arguments": {"alpha": alpha}, "results": {"signals": signals, "steps": 4}}
+    (folder / "simulate.json").write_text(json.dumps(document))
+    rows = "".join(f"{n},{peak * n},1.0\n" for n in range(5))
+    (folder / "simulate.csv").write_text(f"time,plant.1,plant.2\n{rows}")
+    return folder
+
+
+def test_runs_are_compared_by_their_curves_and_never_green(tmp_path: Path) -> None:
+    same = [run(tmp_path / f"simulate-{n}", 0.0, 28.0) for n in (1, 2)]
+    report = compare_results(*same)
+    assert report.badge == ("neutral", "nothing has an interval")
+    assert "0 of 2 curves differ." in report.summary
+    other = run(tmp_path / "simulate-3", 0.05, 145.0)
+    report = compare_results(same[0], other)
+    assert report.badge == ("warn", "their curves differ")
+    assert report.summary.startswith("Changed: alpha 0.0 -> 0.05. 0 of 0 numbers with an interval")
+    rms = 117.0 * (30.0 / 5.0) ** 0.5
+    assert f"1 of 2 curves differ: plant.1 by {rms:.3g} (rms)." in report.summary
+    rows = tables(report)["Numbers without an interval that differ"].rows
+    assert ("signals plant.1 last", "28 N.m", "145 N.m") in [row[:3] for row in rows]
+    plots = [section for section in report.sections if isinstance(section, Plot)]
+    assert [plot.title for plot in plots] == [
+        "simulate: plant.1", "simulate: plant.1, difference", "simulate: plant.2",
+    ]  # fmt: skip
+    assert list(plots[1].series[0].y) == [117.0 * n for n in range(5)]
+    assert "simulate-3 minus simulate-1" in render(report)
 
 
 def test_symbols_stay_whole_and_plain_numbers_have_no_unit(tmp_path: Path) -> None:

@@ -92,14 +92,15 @@ class WallsFound(msgspec.Struct, frozen=True):
 
 
 class SignalFound(msgspec.Struct, frozen=True):
-    """A recorded signal: its values as a reader sees them, in ``unit``."""
+    """A recorded signal: values of it in ``unit``, with its root mean square; files of before had them as texts."""
 
     signal: str
     unit: str = ""
-    first: str = ""
-    last: str = ""
-    smallest: str = ""
-    largest: str = ""
+    first: float | str | None = None
+    last: float | str | None = None
+    smallest: float | str | None = None
+    largest: float | str | None = None
+    rms: float | None = None
 
 
 class RemarkFound(msgspec.Struct, frozen=True):
