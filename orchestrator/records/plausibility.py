@@ -22,6 +22,9 @@ LARGE_TRAVEL = 0.5  # rad of the load, beyond which twist no longer disturbs the
 LONGEST_STEP = 1.5  # rad of the shaft's oscillation
 SMOOTHING_TIME = 0.05  # s
 NEEDED_FIT = 0.8
+NEARLY_STILL = 0.05  # of the rms speed, within which dry friction changes its sign
+LEAST_TRAVEL = 0.02  # rad of load and motor, from which slow motion tells a sign
+OPPOSITE = -0.9  # correlation of slow motion from which one angle counts the other way
 NEAR_DEGREES = 0.3  # of a logarithm: an inertia this near to 1/57 of the model's may be an angle in degrees
 
 
@@ -32,6 +35,7 @@ def check_plausible(record: Record, model: Model) -> None:
     record = record.fill_missing()
     parameters = _of_one_stage({name: entry.value for name, entry in model.parameters.items()})
     if record.theta_l is not None:
+        _check_directions(record, record.theta_l, parameters)
         _check_slope(record, record.theta_l, parameters["i"], "i" if "i" in model.parameters else "i_1")
     _check_rate(record, _frequency(parameters))
     _check_inertia(record, parameters)
@@ -65,6 +69,23 @@ def _check_rate(record: Record, frequency: float) -> None:
         )
 
 
+def _check_directions(record: Record, theta_l: Array, p: Mapping[str, float]) -> None:
+    """Refuse angles of which one counts the other way: motion slower than the load's swing on a held motor tells."""
+    width = max(1, round(2.0 * math.pi * math.sqrt(p["J_l"] / p["k"]) / record.step))
+    if 4 * width > record.size:
+        return
+    kernel = np.ones(width) / width
+    kernel = np.convolve(np.convolve(kernel, kernel), kernel)  # leaves 1 % of what swings faster
+    motor, load = (np.convolve(angle, kernel, "valid") for angle in (record.theta_m, theta_l))
+    if min(np.ptp(motor), np.ptp(load)) < LEAST_TRAVEL:
+        return
+    if float(np.corrcoef(motor, load)[0, 1]) < OPPOSITE:
+        raise RecordError(
+            f"{record.source}: column `theta_l` must grow with `theta_m`, but falls: one of them has the wrong "
+            "sign; say `[columns.theta_l] factor = -1` (or that of theta_m and u) in the model file"
+        )
+
+
 def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float, name: str = "i") -> None:
     """Compare the slope of load over motor angle with 1/i, where the parameter ``name`` would mend ``i``."""
     motor = record.theta_m - record.theta_m.mean()
@@ -78,11 +99,6 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float, nam
             f"{correlation:.2f}: name the right column by `[columns.theta_l] name = ...` in the model file"
         )
     relative = float(np.std(load) / np.std(motor)) * ratio
-    if correlation < 0.0:
-        raise RecordError(
-            f"{record.source}: column `theta_l` must grow with `theta_m`, but falls: one of them has the wrong "
-            "sign; say `[columns.theta_l] factor = -1` (or that of theta_m and u) in the model file"
-        )
     in_degrees = 'say `[columns.{}] unit = "deg"` (`model`)'
     suspects = (
         (DEGREES, "column `theta_l` must be in radians, but seems to be in degrees", in_degrees.format("theta_l")),
@@ -134,7 +150,10 @@ def _smooth_width(record: Record) -> int:
 
 
 def momentum_balance(impulse: Array, speed: Array, angle: Array) -> tuple[float, float, float]:
-    """Return what a torque's impulse moves, a constant torque apart.
+    """Return what a torque's impulse moves, a constant torque and dry friction apart.
+
+    Without dry friction a position loop with much of it, whose torque follows the angle, seems to move an inertia of
+    any size and sign.
 
     Args:
         impulse: (n,) of the torque [N.m.s].
@@ -146,7 +165,8 @@ def momentum_balance(impulse: Array, speed: Array, angle: Array) -> tuple[float,
     """
     time = np.linspace(-1.0, 1.0, speed.size)
     trend = np.column_stack([np.ones_like(time), time])
-    table = np.column_stack([speed, angle, trend])
+    dry = np.cumsum(np.tanh(speed / max(NEARLY_STILL * float(np.sqrt(np.mean(speed**2))), 1e-300))) / speed.size
+    table = np.column_stack([speed, angle, trend, dry])
     solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
     plain, *_ = np.linalg.lstsq(trend, impulse, rcond=None)
     share = 1.0 - float(np.var(impulse - table @ solution)) / max(float(np.var(impulse - trend @ plain)), 1e-300)
