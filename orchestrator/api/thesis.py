@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import msgspec
 
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block, text_table
 from orchestrator.paired.calibration import estimate_gap, load_or_calibrate
 from orchestrator.paired.compiled_loop import make_loop
 from orchestrator.paired.experiment import thesis_experiment
@@ -16,12 +16,14 @@ from orchestrator.paired.metric import difference_sum
 from orchestrator.paired.thesis import published
 from orchestrator.paired.thesis.errata import errata
 from orchestrator.paired.thesis.recompute import gain_comparisons, table_comparison
-from orchestrator.shared.results.thesis import Comparison, Erratum, TableComparison, ThesisFound, ThesisTable
-
-TABLE_HEAD = (
-    "alpha [rad]", "S", "estimate", "by the quadratic", "error [%]", "recomputed [%]", "our estimate",
-    "our error [%]",
-)  # fmt: skip
+from orchestrator.shared.results.thesis import (
+    Comparison,
+    Erratum,
+    TableComparison,
+    ThesisFound,
+    ThesisTable,
+    thesis_tables,
+)
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,51 +57,8 @@ class ThesisResult(PlottedResult):
             f"MSE {published.MSE_100_TESTS:.5e}; its simulations cannot be repeated, for its filter is told the size "
             '(erratum 6). A sweep of the experiment "thesis" runs our own on the same sizes.'
         )
-        errors = [(str(e.number), e.where, e.printed, e.right, e.shown_by) for e in self.errata]
-        others = [(o.who, o.method, o.figure) for o in published.OTHERS]
-        return [
-            self._gains(),
-            self._sizes(),
-            note,
-            tests,
-            table("Errata", ("", "where", "printed", "right", "shown by"), errors),
-            table(
-                "Results of others that the thesis compares itself with (as it quotes them)",
-                ("who", "method", "figure"),
-                others,
-            ),
-        ]
-
-    def _gains(self) -> Block:
-        rows = [
-            (
-                f"{c.what} ({c.where})",
-                _numbers(c.published),
-                _numbers(c.recomputed),
-                f"{c.deviation:.1e}",
-                "agrees" if c.agrees else c.note,
-            )
-            for c in self.gains
-        ]
-        head = ("what", "published", "recomputed", "largest deviation", "")
-        return table("Model and gains, recomputed with the A that the thesis used", head, rows)
-
-    def _sizes(self) -> Block:
-        columns = (published.TABLE_4_1, self.table.estimates, self.table.errors_percent, self.estimates)
-        rows = [
-            (
-                f"{row.alpha:.4f}",
-                f"{row.S:.3e}",
-                f"{row.estimate:.3f}",
-                f"{again:.3f}",
-                f"{row.error_percent:.2f}",
-                f"{error:.2f}",
-                f"{own:.4f}",
-                f"{100.0 * abs(own - row.alpha) / row.alpha:.4f}",
-            )
-            for row, again, error, own in zip(*columns, strict=True)
-        ]
-        return table("Table 4.1", TABLE_HEAD, rows)
+        gains, sizes, *others = map(text_table, thesis_tables(self.results()))
+        return [gains, sizes, note, tests, *others]
 
     def results(self, place: Path | None = None) -> ThesisFound:
         """Return what ``thesis.json`` says."""
@@ -130,7 +89,3 @@ def _our_estimates() -> tuple[float, ...]:
     twin = loop.run(0.0, errors)[:, 2]
     sums = [difference_sum(loop.run(row.alpha, errors)[:, 2], twin) for row in published.TABLE_4_1]
     return tuple(estimate_gap(calibration, total).alpha for total in sums)
-
-
-def _numbers(values: tuple[float, ...]) -> str:
-    return " ".join(f"{v:.5g}" for v in values)

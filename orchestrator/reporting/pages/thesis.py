@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 
 from orchestrator.reporting.model import Plot, Report, Section, Series
-from orchestrator.reporting.source import ResultDocument, table_of
+from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
-from orchestrator.shared.results.fields import ReportTable, TableColumn
-from orchestrator.shared.results.thesis import TableRow, ThesisFound
+from orchestrator.shared.results.thesis import TableRow, ThesisFound, thesis_tables
 
 
 def build(source: ResultDocument) -> Report:
@@ -14,13 +13,8 @@ def build(source: ResultDocument) -> Report:
     results = read(source.results, ThesisFound)
     agree, compared = sum(one.agrees for one in results.gains), len(results.gains)
     table = results.table
-    sections: list[Section] = [
-        table_of("Model and gains", results.gains),
-        _table_4_1(table.rows, table.our_estimates),
-        _errors(table.rows, table.our_estimates),
-        table_of("Errata", results.errata),
-        table_of("Results of others, as the thesis quotes them", results.others),
-    ]
+    gains, sizes, *others = thesis_tables(results)
+    sections: list[Section] = [gains, sizes, _errors(table.rows, table.our_estimates), *others]
     return Report(
         title="The thesis, recomputed",
         summary=(
@@ -32,22 +26,6 @@ def build(source: ResultDocument) -> Report:
         origin=source.origin(),
         downloads=source.downloads(),
     )
-
-
-def _table_4_1(published: Sequence[TableRow], ours: Sequence[float]) -> ReportTable:
-    columns = (
-        TableColumn("alpha", "rad", 5),
-        TableColumn("S", "", 5),
-        TableColumn("published estimate", "rad", 5),
-        TableColumn("published error", "%"),
-        TableColumn("our estimate", "rad", 6),
-        TableColumn("our error", "%"),
-    )
-    rows = tuple(
-        (*(row.alpha, row.S, row.estimate, row.error_percent), own, 100.0 * abs(own - row.alpha) / row.alpha)
-        for row, own in zip(published, ours, strict=True)
-    )
-    return ReportTable("Table 4.1", columns, rows)
 
 
 def _errors(published: Sequence[TableRow], ours: Sequence[float]) -> Plot:

@@ -47,7 +47,7 @@ class Display:
         if isinstance(value, float):
             return self.factor * value if math.isfinite(value) else None
         if isinstance(value, (tuple, list)):
-            value = ", ".join(map(str, value))
+            value = ", ".join(f"{v:.{self.digits}g}" if isinstance(v, float) else str(v) for v in value)
         return value if isinstance(value, (int, bool)) or value is None else str(value) or None
 
 

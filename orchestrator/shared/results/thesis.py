@@ -1,8 +1,11 @@
 """What ``thesis.json`` holds: published numbers beside recomputed ones."""
 
+from typing import Annotated
+
 import msgspec
 
 from orchestrator.shared.results import ResultData
+from orchestrator.shared.results.fields import Display, ReportTable, TableColumn, fields_table
 
 
 class Comparison(msgspec.Struct, frozen=True):
@@ -12,22 +15,22 @@ class Comparison(msgspec.Struct, frozen=True):
     within the rounding of the printed figures.
     """
 
-    what: str
-    where: str
-    published: tuple[float, ...]
-    recomputed: tuple[float, ...]
-    deviation: float
-    agrees: bool
-    note: str = ""
+    what: Annotated[str, Display("what")]
+    where: Annotated[str, Display("where")]
+    published: Annotated[tuple[float, ...], Display("published", digits=5)]
+    recomputed: Annotated[tuple[float, ...], Display("recomputed", digits=5)]
+    deviation: Annotated[float, Display("largest deviation", digits=2)]
+    agrees: Annotated[bool, Display("agrees")]
+    note: Annotated[str, Display("note")] = ""
 
 
 class TableRow(msgspec.Struct, frozen=True):
-    """One row of Table 4.1: actual and estimated half-gap [rad], S [rad], error [%]."""
+    """One row of Table 4.1: actual and estimated half-gap."""
 
-    alpha: float
-    S: float
-    estimate: float
-    error_percent: float
+    alpha: Annotated[float, Display("alpha", "rad", 5)]
+    S: Annotated[float, Display("S", "rad", 5)]
+    estimate: Annotated[float, Display("published estimate", "rad", 5)]
+    error_percent: Annotated[float, Display("published error", "%")]
 
 
 class TableComparison(msgspec.Struct, frozen=True):
@@ -50,19 +53,19 @@ class ThesisTable(TableComparison, frozen=True):
 class Erratum(msgspec.Struct, frozen=True):
     """What is printed, what is right, and the numbers that show it."""
 
-    number: int
-    where: str
-    printed: str
-    right: str
-    shown_by: str
+    number: Annotated[int, Display("number")]
+    where: Annotated[str, Display("where")]
+    printed: Annotated[str, Display("printed")]
+    right: Annotated[str, Display("right")]
+    shown_by: Annotated[str, Display("shown by")]
 
 
 class OtherResult(msgspec.Struct, frozen=True):
     """A result of others that the thesis compares itself with."""
 
-    who: str
-    method: str
-    figure: str
+    who: Annotated[str, Display("who")]
+    method: Annotated[str, Display("method")]
+    figure: Annotated[str, Display("figure")]
 
 
 class ThesisFound(ResultData, frozen=True, kw_only=True):
@@ -72,3 +75,18 @@ class ThesisFound(ResultData, frozen=True, kw_only=True):
     table: ThesisTable
     errata: tuple[Erratum, ...]
     others: tuple[OtherResult, ...] = ()
+
+
+def thesis_tables(results: ThesisFound) -> tuple[ReportTable, ReportTable, ReportTable, ReportTable]:
+    """Return model and gains, Table 4.1, errata, and results of others."""
+    table = results.table
+    ours = [100.0 * abs(own - row.alpha) / row.alpha for row, own in zip(table.rows, table.our_estimates, strict=True)]
+    sizes = fields_table("Table 4.1", table.rows)
+    for label, unit, digits, cells in (
+        ("by the quadratic", "rad", 5, table.estimates), ("its error", "%", 4, table.errors_percent),
+        ("our estimate", "rad", 6, table.our_estimates), ("our error", "%", 4, ours),
+    ):  # fmt: skip
+        sizes = sizes.with_column(TableColumn(label, unit, digits), cells)
+    gains = fields_table("Model and gains, recomputed with the A that the thesis used", results.gains)
+    others = fields_table("Results of others, as the thesis quotes them", results.others)
+    return gains, sizes, fields_table("Errata", results.errata), others
