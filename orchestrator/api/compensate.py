@@ -53,7 +53,6 @@ RANGES = {
 # Where no machine is given.
 BENCHMARK = {"alpha": 0.02, "tau": 5e-3, "impact_speed": 0.1, "friction": 2.0, "plants": 5}
 PLANTS = 100  # that a machine's controller is judged on
-MEASURES = ("time", "landing", "impact", "error", "rest")
 NOTABLE = 1.5  # standard deviations, by which unstable plants lie off in what makes them so
 _BOUND_SPEEDS = np.geomspace(0.02, 2.0, 30)  # of the curve beside the traversals [rad/s]
 

@@ -162,11 +162,6 @@ class CandidateEffect:
     of_log: bool = False
 
     @property
-    def law_values(self) -> int:
-        """Return the number of values that the law has."""
-        return len(self.fitted) - self.unreported
-
-    @property
     def name(self) -> str:
         """Return the name without the site."""
         return self.label.partition("@")[0]
