@@ -188,7 +188,7 @@ def compensate(
         seed: of plants and noise.
         mpc: runs a model predictive controller too; needs the extra ``mpc``.
         native: FMUs that are written need no Python; they need a C compiler when they are made.
-        fmi: version of FMI of these, 2, or 3 with ``native``.
+        fmi: version of FMI of these, 2 or 3; FMUs of FMI 3.0 are native.
         force: go on with a model that cannot be trusted, or with a half-gap that the record excludes.
         progress: called with (runs done, in all).
 
@@ -225,8 +225,9 @@ def compensate(
     for name, value in given.items():
         if value is not None:
             within(name, value, *RANGES[name])
-    if fmi not in (2, 3) or (fmi == 3 and not native):
-        raise ScenarioError("`fmi` must be 2, or 3 with `native`", "fmi", "native")
+    if fmi not in (2, 3):
+        raise ScenarioError(f"`fmi` must be 2 or 3, but is {fmi!r}", "fmi")
+    native = native or fmi == 3
     said = None if model is None else model if isinstance(model, Model) else read_fitted_model(Path(model))
     doubts: tuple[str, ...] = ()
     if said is None:

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mpc", action="store_true", help="a model predictive controller too (extra `mpc`)")
     parser.add_argument("--native", action="store_true", help="write FMUs that need no Python at run time")
     parser.add_argument(
-        "--fmi", type=int, choices=(2, 3), default=2, help="of these FMUs (default: 2; 3 with --native)"
+        "--fmi", type=int, choices=(2, 3), default=2, help="of these FMUs (default: 2); those of 3 are native"
     )
     parser.add_argument("--force", action="store_true", help="go on with a model that cannot be trusted")
 
