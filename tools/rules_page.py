@@ -5,7 +5,8 @@ python -m tools.rules_page
 
 from pathlib import Path
 
-from orchestrator.checking.rules import RULES, VERSIONS, Rule, Version
+from orchestrator.checking.catalogue import RULES
+from orchestrator.checking.rules import VERSIONS, Rule, Version
 from tools import refuse_arguments
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "rules.md"

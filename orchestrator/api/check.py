@@ -92,6 +92,7 @@ def check(
     memory_limit: float = Limits().memory / MEBIBYTE,
     size_limit: float = ArchiveLimits().total / MEBIBYTE,
     progress: Callable[[Verdict], None] = lambda verdict: None,
+    tell: Callable[[str, float], None] = lambda stage, share: None,
 ) -> CheckResult:
     """Check FMUs for compliance with FMI; an FMU is run in a process of its own.
 
@@ -105,6 +106,7 @@ def check(
         memory_limit: memory that the running FMU may take [MiB].
         size_limit: size that the unpacked FMU may have [MiB].
         progress: called with the verdict on each FMU as it is ready.
+        tell: called with what is done now, and the share of the present FMU's checks that are done (0 to 1).
 
     Returns:
         All findings; ``ok`` when none is an error.
@@ -122,6 +124,7 @@ def check(
         trust=trust,
         archive=ArchiveLimits(total=int(size_limit * MEBIBYTE)),
         limits=Limits(time=time_limit, memory=int(memory_limit * MEBIBYTE), total=total_limit),
+        tell=tell,
     )
     given = {
         "fmus": [str(p) for p in paths],

@@ -9,8 +9,31 @@ from pathlib import Path, PurePosixPath
 from typing import Protocol
 
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.rules import declare
 from orchestrator.shared.isolation.archives import ArchiveLimits, is_folder, is_repeated, list_members, plain_path
 from orchestrator.shared.isolation.limits import MEBIBYTE
+
+declare("""
+[archive]
+archive.not-a-zip | E | * | * | the FMU is a ZIP archive | export the FMU again; the file was cut or is something else
+archive.corrupt | E | * | * | every entry unpacks, with the right checksum | export or download the FMU again
+archive.no-model-description | E | 2.3 | 2.5.1 | modelDescription.xml is at the top of the archive | zip the contents of the folder, not the folder
+archive.traversal | E | * | * | no path leaves the FMU | do not unpack this archive; write it with plain relative paths
+archive.absolute | E | * | * | all paths are relative | do not unpack this archive; write it with plain relative paths
+archive.backslash | E | 2.3 | 2.5.1 | folders are separated by `/` | write the archive with forward slashes
+archive.odd-name | W | * | * | file names work on every platform | rename the file
+archive.long-name | E | * | * | names are short enough to be unpacked | shorten the names
+archive.symlink | E | * | * | there are only files and folders | store the file that the link means
+archive.duplicate | E | * | * | every path is that of one file or folder | write the archive anew; tools differ in which copy they take
+archive.repeated | W | * | * | no file is stored twice | write the archive anew, each file once
+archive.case-clash | W | * | * | paths differ by more than upper and lower case | rename one; Windows and macOS keep only one of them
+archive.encrypted | E | 2.3 | 2.5.1 | no entry is encrypted | store the entry without a password
+archive.compression | E | 2.3 | 2.5.1 | entries are stored or deflated | pack with deflate
+archive.bomb-ratio | E | * | * | no file unpacks to absurdly more than its packed size | if you trust the file, repack it without compression
+archive.too-large | E | * | * | the files stay within the size limit | if you trust the file, raise the size limit
+archive.too-many-files | E | * | * | the number of files stays within the limit | pack resources into fewer files
+archive.overlap | E | * | * | entries do not share bytes | do not unpack this archive; it is built as a bomb
+""")  # noqa: E501
 
 _RESERVED = re.compile(r"^(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?$", re.IGNORECASE)
 _CHUNK = 1 << 18

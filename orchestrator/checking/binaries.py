@@ -11,9 +11,23 @@ from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, Interface
 from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.library_headers import LibraryHeader, inspect
-from orchestrator.checking.rules import Version
+from orchestrator.checking.rules import Version, declare
 from orchestrator.checking.rules_model import C_NAME
 from orchestrator.checking.xml_reading import xpath
+
+declare("""
+[files]
+file.source-missing | W | 2.3 | - | source files named are in sources/ | add the file, or remove it from SourceFiles
+[binaries]
+binary.none | E | 2.3 | 2.5.1 | there are binaries or sources | export for a platform
+binary.not-here | W | * | * | there is a binary for this machine | export for this platform, or check on another one
+binary.folder | W | 2.3 | 2.5.1.4.1 | folders of binaries have the names of the standard | rename the folder
+binary.missing | E | 2.3 | 2.5.1.4 | the library is named after modelIdentifier | rename the library or the modelIdentifier
+binary.format | E | 2.3 | 2.5.1.4 | the library has the platform's format | put the right file into the folder
+binary.architecture | E | 2.3 | 2.5.1.4 | the library has the platform's architecture | put the right file into the folder
+binary.exports | E | 2.1.1 | 2.2.1 | all functions are exported | define the functions (they may return an error) and export them
+binary.python-symbols | W | * | * | a library that uses Python names libpython as needed | link against libpython, or it loads in Python programs only
+""")  # noqa: E501
 
 MAXIMUM_BYTES = 512 << 20
 _SUFFIXES = {"ELF": ".so", "PE": ".dll", "Mach-O": ".dylib"}

@@ -1,5 +1,6 @@
 """The check of one FMU: static first, then dynamic, unless the FMU cannot be read or has nothing that runs here."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -7,6 +8,7 @@ from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.dynamic import check_dynamic, obstacle
 from orchestrator.checking.findings import Execution, Finding, FmuFindings, has_errors, order_findings
 from orchestrator.checking.places import locate_findings
+from orchestrator.checking.sources import check_sources
 from orchestrator.checking.static import StaticResult, check_static
 from orchestrator.checking.xml_reading import MAXIMUM_BYTES
 from orchestrator.shared.isolation.limits import Limits
@@ -24,6 +26,7 @@ class CheckOptions:
         archive, limits: what the archive and the running FMU may use.
         trust: run the FMU without the kernel's walls around it; limits remain.
         probes: names of the dynamic checks to carry out (default: all).
+        tell: called with what is done now, and the share of the FMU's checks that are done (0 to 1).
     """
 
     static: bool = False
@@ -31,6 +34,7 @@ class CheckOptions:
     limits: Limits = field(default_factory=lambda: Limits(total=TOTAL))
     trust: bool = False
     probes: tuple[str, ...] = ()
+    tell: Callable[[str, float], None] = lambda stage, share: None
 
 
 def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
@@ -45,12 +49,17 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     executions: tuple[Execution, ...] = ()
     reason = "nothing is executed, as was asked" if options.static else _obstacle(result)
     try:
+        if not options.static and result.description is not None and result.files is not None:
+            options.tell("sources", 0.0)
+            found, result.stages["sources"] = check_sources(result.description, result.files)
+            findings += found
         if not reason:
             assert result.description is not None
             assert result.files is not None
             probed, executions = check_dynamic(
-                result.description, result.files, result.references, options.limits, not options.trust, options.probes
-            )
+                result.description, result.files, result.references, options.limits, not options.trust, options.probes,
+                options.tell,
+            )  # fmt: skip
             findings += probed
         elif not options.static and not has_errors(findings):
             findings.append(Finding("run.not-executed", "", f"the FMU must be executed to pass, but is not: {reason}"))

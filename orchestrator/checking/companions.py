@@ -10,7 +10,24 @@ from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, number
 from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.grammar import check_grammar
+from orchestrator.checking.rules import declare
 from orchestrator.checking.xml_reading import xpath
+
+declare("""
+[files]
+file.icon | W | 2.3 | 2.4.9.1 | model.png is a PNG image | convert it
+file.version | E | - | 2.4.9 | files beside modelDescription.xml are of its version of FMI | write the same fmiVersion
+terminals.name | E | - | 2.4.9.2 | names of terminals are unique | rename one
+terminals.variable | E | - | 2.4.9.2 | members of terminals are variables of the FMU | write the name of a variable
+terminals.member | E | - | 2.4.9.2 | members of plugs and buses have a memberName of their own | add memberName
+terminals.stream | E | - | 2.4.9.2 | a terminal with a stream has one inflow or outflow | correct the kinds of its variables
+terminals.icon | W | - | 2.4.9.1 | icons that are named exist, as PNG | add the image
+terminals.coordinates | W | - | 2.4.9.1 | the coordinate system is one of the first quadrant | exchange the corners
+build.missing | E | - | 2.5.1.3 | sources come with a build description | add sources/buildDescription.xml
+build.identifier | W | - | 2.4.10 | build configurations are those of an interface | write its modelIdentifier
+build.file | E | - | 2.4.10 | source files that are named are in sources/ | add the file, or remove the entry
+build.include | W | - | 2.4.10 | folders of headers that are named are in sources/ | add the folder, or remove the entry
+""")  # noqa: E501
 
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 BUILD = "sources/buildDescription.xml"

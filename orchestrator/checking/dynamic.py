@@ -4,7 +4,9 @@ import contextlib
 import os
 import re
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.binaries import MAXIMUM_BYTES, PLATFORMS, here, inspect, library_name, loadable, misfit
@@ -14,7 +16,6 @@ from orchestrator.checking.layered import ReferenceResult
 from orchestrator.checking.probing import (
     probes,
     probes_3,
-    probes_compare,
     probes_dependencies,
     probes_derivatives,
     probes_driven,
@@ -26,6 +27,7 @@ from orchestrator.checking.probing import (
     probes_states,
     probes_steps,
     probes_values,
+    relations,
     trajectory,
 )
 from orchestrator.checking.probing.binding import Library
@@ -34,7 +36,7 @@ from orchestrator.checking.probing.interfaces import InterfaceRun, compare_inter
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import PENDING, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.process import Process
-from orchestrator.checking.rules import Version
+from orchestrator.checking.rules import RULES, Version, declare
 from orchestrator.errors import ChildError, OutputError
 from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.shared.isolation.jail import Jail
@@ -42,13 +44,37 @@ from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.stopwatch import Stopwatch
 
+declare("""
+[run]
+limits.time | E | * | * | no call takes longer than the time limit | look for an endless loop; raise the limit for a slow model
+limits.total | I | * | * | all probes are done within the total time | raise the total limit, or make DefaultExperiment shorter
+limits.memory | E | * | * | memory stays below the memory limit | look for a leak; raise the limit for a large model
+limits.output | E | * | * | printed text and files stay small | print only when logging is on
+run.crash | E | * | * | no call ends the process | run the call named under a debugger
+run.failed | E | * | * | the checks can be carried out | report this with the FMU
+run.not-executed | W | * | * | the FMU is executed, unless that is not asked for | check it where its binaries run, or ask for the static checks only
+run.skipped | I | * | * | all checks can be carried out | mend the other findings first
+[load]
+load.library | E | 2.3 | 2.5.1.4 | the library loads | see the loader's message; link what is missing
+[life cycle]
+run.instantiate | E | 2.1.5 | 2.3.1 | instantiation succeeds | see the messages of the FMU
+run.status | E | 4.2.4 | 2.3 | every call of a normal life cycle returns OK or Warning | see the messages of the FMU
+run.pending | E | 4.2.2 | - | fmi2Pending only with canRunAsynchronuously | return when the step is done, or set the flag
+[misuse]
+misuse.crash | W | * | * | misuse neither ends the process nor hangs it | check the arguments and the state of the instance
+[afterwards]
+files.written | W | * | * | the FMU writes no files of its own | write only where a parameter says so
+files.changed | W | * | * | the FMU leaves its own files alone | write to a temporary folder
+process.left | W | * | * | no process outlives the FMU | end child processes when the instance is freed
+""")  # noqa: E501
+
 _PROBES: dict[str, probes.Probe] = {
     "life cycle": probes.life_cycle,
     "inputs": probes_driven.inputs,
-    "determinism": probes_compare.determinism,
+    "determinism": relations.determinism,
     "setting": probes_driven.setting,
     "values": probes_values.values,
-    "instances": probes_compare.instances,
+    "instances": relations.instances,
     "reset": probes_restore.reset,
     "state": probes_restore.state,
     "variable steps": probes_steps.variable_steps,
@@ -68,12 +94,14 @@ _PROBES: dict[str, probes.Probe] = {
     "silence": probes_life.silence,
     "another start": probes_life.another_start,
     "misuse": probes_misuse.misuse,
+    "path": relations.path,
 }
+_OF_3 = ("early return", "intermediate update", "clocks", "configuration")
 _AT_POINTS = ("states", "dependencies", "derivatives")
 """Probes that look at points of a driven run: far from the values of the file too, where the others stay near them."""
 PROBES: dict[Version, tuple[str, ...]] = {
-    "2.0": tuple(n for n in _PROBES if n not in ("early return", "intermediate update", "clocks", "configuration")),
-    "3.0": tuple(_PROBES),
+    "2.0": tuple(n for n in _PROBES if n not in (*_OF_3, "path")),
+    "3.0": tuple(n for n in _PROBES if n != "path"),
 }
 _MOST_FINDINGS = 10_000
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,16}\b")
@@ -98,7 +126,7 @@ def _obstacle(d: Description, interface: Interface, files: FmuFiles) -> str:
 
 def check_dynamic(
     d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits, walls: bool = True,
-    chosen: tuple[str, ...] = (),
+    chosen: tuple[str, ...] = (), tell: Callable[[str, float], None] = lambda stage, share: None,
 ) -> tuple[list[Finding], tuple[Execution, ...]]:  # fmt: skip
     """Run each interface of the FMU in a child process and report what it did.
 
@@ -106,6 +134,7 @@ def check_dynamic(
 
     Args:
         chosen: names of the probes to carry out (default: all).
+        tell: called with each probe, and the share of them that are done.
 
     Returns:
         What it did wrong, and which probes were carried out.
@@ -122,8 +151,8 @@ def check_dynamic(
             files.extract(fmu)
         except OSError as error:
             raise OutputError(f"the FMU must be unpacked to {scratch.path}, but cannot be: {error.strerror}") from None
-        for interface in d.interfaces:
-            names = tuple(name for name in PROBES[d.dialect.version] if not chosen or name in chosen)
+        names = tuple(name for name in PROBES[d.dialect.version] if not chosen or name in chosen)
+        for number, interface in enumerate(d.interfaces):
             reason = _obstacle(d, interface, files)
             if reason:
                 executions.append(Execution(interface.kind, dict.fromkeys(("load", *names), reason)))
@@ -131,6 +160,9 @@ def check_dynamic(
             library = loadable(d, interface, set(files.names()))
             rest = [] if executions or interface.kind == "ScheduledExecution" else references
             first = _Watcher(fmu, limits, clock, walls, interface.kind if several else "")
+            first.tell = lambda probe, share, kind=interface.kind, at=number: tell(  # type: ignore[misc]
+                f"{kind}: {probe}", (at + share) / len(d.interfaces)
+            )
             found = first.run(make_job(d, interface, fmu, library, rest[0] if rest else None, limits), names)
             for reference in rest[1:]:
                 if any(f.severity == "error" for f in found):
@@ -143,8 +175,27 @@ def check_dynamic(
                 first.probe = "interfaces"
                 first.stages["interfaces"] = compare_interfaces(runs[0], runs[1], first.add)
             findings += found
+            if not chosen and number + 1 == len(d.interfaces):
+                findings += _check_path(d, interface, fmu, first, library)
             executions.append(Execution(interface.kind, first.stages))
     return findings, tuple(executions)
+
+
+def _check_path(d: Description, interface: Interface, fmu: Path, seen: "_Watcher", library: str) -> list[Finding]:
+    """Run an FMU that has resources in a folder whose path has a blank and letters beyond ASCII."""
+    resources = fmu / "resources"
+    if seen.run_seen is None or not resources.is_dir() or not any(resources.iterdir()):
+        seen.stages["path"] = "the FMU has no resources, or does not run"
+        return []
+    odd = fmu.with_name("FMU \N{LATIN SMALL LETTER E WITH ACUTE}")
+    fmu.rename(odd)
+    again = _Watcher(odd, seen.limits, seen.clock, seen.walls)
+    again.expected, seen.stages["path"] = seen.run_seen.quiet, ""
+    found = again.run(make_job(d, interface, odd, library, None, seen.limits), ("path",))
+    known = {f.rule for f in seen.findings}
+    wrong = [f for f in found if RULES[f.rule].severity == "error" and f.rule not in known]
+    text = "an FMU must work in a folder whose path has a blank and letters beyond ASCII, but there"
+    return [Finding("path.letters", "resources", f"{text} {wrong[0].message}")] if wrong else []
 
 
 class _Watcher:
@@ -158,6 +209,9 @@ class _Watcher:
         self.probe = "load"
         self.begun = 0.0
         self.stages: dict[str, str] = {}
+        self.tell: Callable[[str, float], None] = lambda probe, share: None
+        self.expected: list[list[Any]] = []
+        """What the life cycle is known to give, where only its beginning is to be done again."""
         self.run_seen: InterfaceRun | None = None
         """The run of the interface, once there is one."""
 
@@ -174,7 +228,7 @@ class _Watcher:
             left = process.jail.finish() or process.left
             self._report_skipped(names)
             self._report_remains(before, process.jail, left)
-            self.stages |= dict.fromkeys(("run", "afterwards"), "")
+            self.stages |= dict.fromkeys(("run", "process", "afterwards"), "")
         return self.findings
 
     def _start(self) -> Jail:
@@ -190,7 +244,9 @@ class _Watcher:
         self.stages["load"] = ""
         single = "canBeInstantiatedOnlyOncePerProcess" in job.flags
         context = probes.Context(trajectory.Bench(job, library, self.add), self.add, single=single)
-        for self.probe in names:
+        context.quiet = self.expected
+        for n, self.probe in enumerate(names):
+            self.tell(self.probe, n / len(names))
             if self.clock.over:
                 self._report_late(names)
                 return
@@ -201,6 +257,7 @@ class _Watcher:
                         probes.carry_out(_PROBES[self.probe], context)
                 if len(self.findings) == told:
                     probes.carry_out(_PROBES[self.probe], context)
+                library.surroundings()
             except (probes.SkippedError, DiscardedError) as reason:
                 self.stages[self.probe] = str(reason)
                 continue

@@ -5,9 +5,15 @@ from collections.abc import Iterator
 from lxml import etree
 
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.rules import declare
 from orchestrator.checking.tables.grammar2 import FMI2
 from orchestrator.checking.tables.grammar3 import FMI3
 from orchestrator.shared import xml_grammar
+
+declare("""
+[schema]
+schema.invalid | E | 2.2 | 2.4 | XML files have the elements and attributes of the schemas of FMI | correct the element or attribute
+""")  # noqa: E501
 
 
 def attributes_of(kind: str, version: str) -> frozenset[str]:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from typing import Any, NamedTuple
 
+from orchestrator.checking.probing.surroundings import Surroundings
 from orchestrator.checking.probing.varargs import LOGGER, fill_in
 
 TYPES: dict[str, Any] = {
@@ -112,6 +113,7 @@ class Host:
         self._updates: list[Update] = []
         self._plan: list[Any] = [0, [], [], [], -1]
         self._locks = 0
+        self._around = Surroundings()
         # Kept here, for the library keeps pointers to them.
         self._logger, self._log3 = LOGGER(self._log), _LOG(self._log_3)
         self._update = _UPDATE(self._intermediate)
@@ -153,7 +155,13 @@ class Host:
         for name in makers:
             getattr(self._handle, name).restype = c_void_p
         getattr(self._handle, freer).restype = None
+        self._around.look("loading the library")
         return ""
+
+    def surroundings(self) -> tuple[list[tuple[str, str, str]], tuple[int, int]]:
+        """What calls have changed in the process since this was asked last, and its threads and open files."""
+        found, self._around.changes = self._around.changes, []
+        return found, self._around.counts()
 
     def text(self, function: str) -> str:
         """Call a function without arguments that returns a text; "null": a null pointer."""
@@ -216,6 +224,8 @@ class Host:
         except SystemError as error:
             self._take(_describe_left(error), _ERRORS[0])
             return None
+        finally:
+            self._around.look(function)
 
     def _status(self, function: str, *arguments: Any) -> int:
         """Call a function that returns a status, and take note of an exception of Python that it leaves behind.
@@ -232,6 +242,7 @@ class Host:
             if not returned:
                 raise
             self._left = _describe_left(error)
+        self._around.look(function)
         return returned[0]
 
     def plan(self, instance: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:

@@ -13,6 +13,18 @@ from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.companions import check_companions, check_icon
 from orchestrator.checking.description import DescribedVariable, Description
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.rules import declare
+
+declare("""
+[files]
+file.documentation | W | 2.3 | 2.5.1.1 | documentation has its entry page | name the first page index.html
+file.license | W | - | 2.5.1.1 | a folder of licenses has its entry | name it license.txt, license.html or license.spdx
+file.external | W | - | 2.5.3 | a tool that is needed is documented | add documentation/externalDependencies.txt
+layered.manifest | W | 2.3 | 2.6 | a layered standard's manifest is complete and in its folder | correct the attributes or the folder
+layered.role | W | 2.3 | * | roles are those of FMI-LS-REF | use "result", "experiment", …
+layered.missing | W | 2.3 | * | related files exist | add the file, or remove the entry
+layered.result | W | 2.3 | * | a reference result is a table of variables over time | write `time` and variable names as header, numbers below
+""")  # noqa: E501
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"

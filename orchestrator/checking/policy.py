@@ -21,7 +21,8 @@ from pathlib import Path
 
 import msgspec
 
-from orchestrator.checking.rules import RULES, Severity
+from orchestrator.checking.catalogue import RULES
+from orchestrator.checking.rules import Severity
 from orchestrator.errors import InputError, ScenarioError
 from orchestrator.shared.toml_files import read_toml
 

@@ -1,20 +1,18 @@
-"""Every rule that a finding can name: where the standard has it, how bad it is, what is expected, and what to do.
+"""Rules that a finding can name: where the standard has them, how bad they are, what is expected, and what to do.
 
-The rules are data: a line each in ``tables``, in groups headed by the stage of the check that judges them. The columns:
+A rule stands in the module that judges it: a line of the text that the module hands to ``declare``, below a heading
+with the stage of the check. The columns:
 
     name | severity | FMI 2.0 | FMI 3.0 | what must hold | advice
 
 The column of a version holds the section of its text (2.0.4 and 3.0.2), `*` for a rule that is not the standard's but
-of use for FMUs of this version, or `-` where the rule does not apply.
-docs/rules.md shows the table; a test compares them.
+of use for FMUs of this version, or `-` where the rule does not apply. ``catalogue`` has them all, in order;
+docs/rules.md shows them.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
-
-from orchestrator.checking.tables.dynamic import DYNAMIC
-from orchestrator.checking.tables.static import STATIC
 
 Severity = Literal["error", "warning", "info"]
 Version = Literal["2.0", "3.0"]
@@ -134,8 +132,12 @@ class Rule:
         return _PLACES[version] + heading
 
 
-def _read(text: str) -> dict[str, Rule]:
-    rules = {}
+RULES: dict[str, Rule] = {}
+"""Those of the modules that have been imported; see ``catalogue``."""
+
+
+def declare(text: str) -> None:
+    """Make rules known."""
     stage = ""
     for line in text.strip().splitlines():
         if line.startswith("["):
@@ -144,10 +146,4 @@ def _read(text: str) -> dict[str, Rule]:
             name, severity, second, third, expects, advice = (part.strip() for part in line.split("|"))
             columns = zip(VERSIONS, (second, third), strict=True)
             anchor = {version: cell.strip("*") for version, cell in columns if cell != "-"}
-            rules[name] = Rule(_SEVERITIES[severity], expects, advice, stage, anchor)
-    return rules
-
-
-RULES: dict[str, Rule] = _read(STATIC) | _read(DYNAMIC)
-STAGES: tuple[str, ...] = tuple(dict.fromkeys(rule.stage for rule in RULES.values()))
-"""The stages of the check, in their order."""
+            RULES[name] = Rule(_SEVERITIES[severity], expects, advice, stage, anchor)

@@ -8,7 +8,26 @@ from collections.abc import Iterator
 
 from orchestrator.checking.description import DescribedVariable, Description, number
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.rules import declare
 from orchestrator.shared.numbers import exact_text
+
+declare("""
+[description]
+variable.dimension | E | - | 2.4.7.2 | a dimension has a positive start, or the value reference of a structural parameter or constant of type UInt64 | correct the dimension
+variable.structural | E | - | 2.4.7.2 | a structural parameter is a scalar | use one structural parameter per dimension
+variable.start-count | E | - | 2.4.7.5 | an array has one start value, or one for each element | correct the list of start values
+variable.max-size | E | - | 2.4.7.5 | start values of Binary variables have at most maxSize bytes | correct maxSize
+variable.intermediate-update | E | - | 2.4.7.4 | only continuous variables have intermediateUpdate | remove the attribute
+variable.clocks | E | - | 2.4.7.4 | clocked variables are discrete or tunable and name clocks | correct clocks or variability
+variable.previous | E | - | 2.4.7.4 | previous names a discrete variable of the same type, for one clocked variable | correct the attribute
+clock.causality | E | - | 2.2.8.2 | clocks are inputs, or triggered ones that are outputs or local | correct causality or intervalVariability
+clock.variability | E | - | 2.4.7.4 | clocks are discrete | write variability="discrete", or leave it out
+clock.interval | E | - | 2.4.4 | constant clocks have a positive interval; changing, countdown and triggered ones have none | correct intervalDecimal
+clock.shift | E | - | 2.4.4 | shifts are not negative and go with an interval | correct shiftDecimal
+clock.fraction | E | - | 2.4.4 | intervalCounter goes with supportsFraction and resolution, and means the same as intervalDecimal | correct the attributes
+clock.priority | E | - | 2.4.4 | input clocks of scheduled execution have a priority, output clocks have none | correct priority
+clock.event-mode | E | - | 4.4 | an FMU for co-simulation with clocks has event mode | set hasEventMode and implement it
+""")  # noqa: E501
 
 _PERIODIC = ("constant", "fixed", "tunable")
 

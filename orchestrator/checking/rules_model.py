@@ -9,6 +9,7 @@ from lxml import etree
 from orchestrator.checking.description import Description, Interface, number
 from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.grammar import attributes_of
+from orchestrator.checking.rules import declare
 from orchestrator.checking.units import (
     EXPONENTS,
     Conversion,
@@ -18,6 +19,28 @@ from orchestrator.checking.units import (
     lacks_angle,
 )
 from orchestrator.checking.xml_reading import xpath
+
+declare("""
+[description]
+model.guid | E | 2.2.1 | 2.4.1 | the guid (FMI 3.0: instantiationToken) is not empty | write the same into the XML and the binary
+model.date | W | 2.2.1 | 2.4.1 | generationDateAndTime is YYYY-MM-DDThh:mm:ssZ | write the time in UTC with a Z
+model.identifier | E | 4.3.1 | 2.4.2 | modelIdentifier is a C identifier | use letters, digits and underscores
+model.interface | E | 2.2.1 | 2.4.1 | there is at least one interface | add CoSimulation, ModelExchange or ScheduledExecution
+model.capability | E | 4.3.1 | 2.4.2 | capability flags fit one another | correct the flag
+model.unknown-flag | W | - | 2.4.2 | flags that the standard does not have are in a namespace | put the flag into a namespace of your own
+model.execution-tool | I | 4.3.1 | 2.5.3 | the FMU runs without its tool | nothing, if the tool is installed; else export a stand-alone FMU
+model.log-category | E | 2.2.4 | 2.4.5 | log categories are unique | remove the repeated one
+model.vendor-annotation | E | 2.2.6 | - | tool names of vendor annotations are unique | merge the annotations of one tool
+model.experiment | E | 2.2.5 | 2.4.6 | DefaultExperiment makes sense | correct the times
+type.name | E | 2.2.3 | 2.4.4 | type names are unique and no variable's | rename one
+type.unit | E | 2.2.3 | 2.4.4 | units of types are defined | add the unit to UnitDefinitions
+type.bounds | E | 2.2.3 | 2.4.4 | min is at most max | swap or correct them
+type.enumeration | E | 2.2.3 | 2.4.4 | names and values of items are unique | give each item its own name and value
+unit.name | E | 2.2.2 | 2.4.3 | units and their display units are unique | remove the repeated one
+unit.factor | E | 2.2.2 | 2.4.3 | no factor is zero | write the factor to SI
+unit.conversion | W | 2.2.2 | 2.4.3 | factors and offsets of units are those of their names | correct them: BaseUnit = factor * value + offset, DisplayUnit likewise from the value
+unit.exponents | W | 2.2.2 | * | the base exponents are those of the unit's name | correct the exponents of BaseUnit
+""")  # noqa: E501
 
 _DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])T([01]\d|2[0-3]):[0-5]\d:([0-5]\d|60)Z")
 _ANY_DATE = re.compile(r"-?\d{4,}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:\d\d)?")  # the schema has the rest

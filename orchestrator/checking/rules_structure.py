@@ -6,7 +6,23 @@ from itertools import pairwise
 from orchestrator.checking.description import DescribedVariable, Description, StructureEntry, number
 from orchestrator.checking.dialects import REAL
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.rules import declare
 from orchestrator.checking.xml_reading import xpath
+
+declare("""
+[description]
+structure.index | E | 2.2.8 | 2.4.8 | entries name variables | correct the index (FMI 3.0: value reference)
+structure.outputs | E | 2.2.8 | 2.4.8 | the list of outputs has all outputs and nothing else | add or remove the entries named
+structure.derivatives | E | 2.2.8 | 2.4.8 | the list of derivatives has derivatives only | set the attribute derivative, or remove the entry
+structure.initial-unknowns | E | 2.2.8 | 2.4.8 | the list of initial unknowns is the exact set | add or remove the entries named
+structure.clocked-states | E | - | 2.4.8 | ClockedState lists the clocked variables that have a previous value | add or remove the entries named
+structure.event-indicators | E | - | 2.4.8 | event indicators are continuous floating point variables | correct the entry
+structure.duplicate | E | 2.2.8 | 2.4.8 | an entry is listed once | remove the repeated one
+structure.order | W | 2.2.8 | - | lists are sorted by index | sort them
+structure.dependencies | E | 2.2.8 | 2.4.8 | dependencies are possible knowns | correct the list
+structure.dependencies-kind | E | 2.2.8 | 2.4.8 | dependenciesKind is as long as dependencies, and of kinds that an initial unknown can have | give one kind per dependency
+structure.dependencies-kind-type | W | - | 2.4.8 | unknowns that are no floating point variables have dependencies of the kind dependent only | write dependent
+""")  # noqa: E501
 
 _FREE = ("approx", "calculated")
 _OF_INITIALISATION = ("dependent", "constant")

@@ -8,7 +8,38 @@ from collections.abc import Collection, Iterator, Mapping
 from orchestrator.checking.description import DescribedVariable, Description, SimpleType, integer, number
 from orchestrator.checking.dialects import NUMERIC, REAL, VARIABILITIES, FmiDialect
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.rules import declare
 from orchestrator.shared.numbers import exact_text
+
+declare("""
+[description]
+variable.name-duplicate | E | 2.2.7 | 2.4.7.5.1 | variable names are unique | rename one
+variable.name-structured | E | 2.2.9 | 2.4.7.5.1 | structured names follow the grammar | quote odd characters with '...' or use the flat convention
+variable.name-flat | E | 2.2.9 | 2.4.7.5.1 | flat names have no control characters | remove them
+variable.causality-variability | E | 2.2.7 | 2.4.7.4 | causality and variability fit | see the table of the standard
+variable.initial | E | 2.2.7 | 2.4.7.5 | initial fits causality and variability | see the table of the standard, or leave it out
+variable.continuous-not-real | E | 2.2.7 | 2.4.7.4 | only floating point variables are continuous | write variability="discrete"
+variable.independent | E | 2.2.7 | 2.4.7.4 | there is one independent variable (FMI 2.0: at most one) of a floating point type | keep one
+variable.start-missing | E | 2.2.7 | 2.4.7.5 | inputs, parameters and initial exact or approx have a start | add start
+variable.start-forbidden | E | 2.2.7 | 2.4.7.5 | calculated and independent variables have no start | remove start, or set initial to exact or approx
+variable.start-range | E | 2.2.7 | 2.4.7.5 | start lies within min and max | correct start or the bounds
+variable.bounds | E | 2.2.7 | 2.4.7.5 | min is at most max | swap or correct them
+variable.bounds-exceed-type | E | 2.2.7 | - | bounds do not exceed those of the declared type | narrow the bounds, or widen those of the type
+variable.nominal | E | 2.2.7 | 2.4.7.5 | nominal is positive | write the magnitude of the variable
+variable.not-finite | E | 2.2.7 | 2.4.7.5 | start and nominal are finite | write a finite number
+variable.declared-type | E | 2.2.7 | 2.4.7.5 | the declared type exists and has the variable's type | define it in TypeDefinitions
+variable.unit | E | 2.2.7 | 2.4.7.5 | the unit is defined | add it to UnitDefinitions
+variable.display-unit | E | 2.2.7 | 2.4.7.5 | the display unit is defined for the unit | add a DisplayUnit to the unit
+variable.derivative | E | 2.2.7 | 2.4.7.5 | a derivative names another continuous floating point variable of its size | write the index (from 1; FMI 3.0: the value reference) of the state
+variable.reinit | E | 2.2.7 | 2.4.7.5 | only continuous states have reinit | remove reinit
+variable.multiple-set | E | 2.2.7 | 2.4.7.4 | only FMUs for model exchange (FMI 3.0: inputs) have canHandleMultipleSetPerTimeInstant | remove the attribute
+variable.reference-duplicate | E | - | 2.4.7.4 | value references are unique | give each variable its own, or write an Alias element
+variable.alias-settable | E | 2.2.7 | - | at most one alias can be set | give the others their own value reference or another causality
+variable.alias-start | E | 2.2.7 | - | at most one alias has a start | remove the other starts
+variable.alias-constant | E | 2.2.7 | - | all aliases are constant, or none | give the constant its own value reference
+variable.alias-unit | E | 2.2.7 | - | aliases have the same unit | use one unit, or own value references
+variable.alias-variability | W | 2.2.7 | - | aliases have the same variability | use one variability
+""")  # noqa: E501
 
 # EBNF of section 2.2.9.
 _Q_CHAR = r"[A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]"

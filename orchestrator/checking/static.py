@@ -13,10 +13,17 @@ from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Facts, Finding
 from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.layered import ReferenceResult, check_files, check_layered
+from orchestrator.checking.rules import declare
 from orchestrator.checking.rules_arrays import check_arrays, check_clocks
 from orchestrator.checking.rules_model import check_model
 from orchestrator.checking.rules_structure import check_structure
 from orchestrator.checking.rules_variables import check_variables
+
+declare("""
+[description]
+model.fmi-version | E | 2.2.1 | 2.4.1 | fmiVersion is 2.0 or 3.0 | write the version of the standard that was used
+model.not-covered | W | - | * | the FMU is one of FMI 2.0 or 3.0 | use the tools of that version for the rest
+""")
 
 STAGES = ("archive", "xml", "schema", "description", "files", "binaries")
 _COVERED = re.compile(r"2\.0|3\.\d+(\.\d+)?")

@@ -5,6 +5,15 @@ from xml.parsers import expat
 from lxml import etree
 
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.rules import declare
+
+declare("""
+[xml]
+xml.too-large | E | * | * | an XML file stays within the size limit | split arrays or shorten descriptions
+xml.doctype | E | * | * | there is no DOCTYPE and no entity | remove the DOCTYPE and write the entities out
+xml.malformed | E | 2.2 | 2.4 | an XML file is well-formed | mend the XML at the place named
+xml.encoding | E | 2.2 | 2.4 | XML is encoded in UTF-8 | save the file as UTF-8
+""")
 
 MAXIMUM_BYTES = 64 << 20
 _FAULTS = {

@@ -117,36 +117,45 @@ def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
     return found
 
 
-@contextmanager
-def verdicts_shown(count: int) -> Iterator[Callable[[Verdict], None]]:
-    """Yield what prints a verdict; on a terminal the number of FMUs that are done stands below."""
-    shows = sys.stderr.isatty() and not is_for_programs()
-    lines = ProgressLines()
-    done = 0
+class _Shown:
+    """Prints verdicts; what is done and its share stand below on a terminal, or go to programs."""
 
-    def progress() -> None:
-        lines.tell(f"checked {done} of {count} FMUs", done / count if count else 1.0, None)
-        if shows and done < count:
-            sys.stderr.write(f"\r{done} of {count} FMUs checked ...")
+    def __init__(self, count: int) -> None:
+        self._count, self._done = count, 0
+        self._shows = sys.stderr.isatty() and not is_for_programs()
+        self._lines = ProgressLines()
+
+    def __call__(self, verdict: Verdict) -> None:
+        self._done += 1
+        self.clear()
+        print("\n".join(as_lines(verdict)), flush=True)
+        self.tell("checked", 0.0)
+
+    def tell(self, stage: str, share: float) -> None:
+        """Say what is done now with the present FMU, and the share of its checks that are done (0 to 1)."""
+        text = f"{self._done} of {self._count} FMUs checked"
+        text += f"; {stage}" if self._done < self._count else ""
+        self._lines.tell(text, (self._done + share) / self._count if self._count else 1.0, None)
+        if self._shows and self._done < self._count:
+            sys.stderr.write(f"\r\x1b[K{text} ...")
             sys.stderr.flush()
 
-    def clear() -> None:
-        if shows:
+    def clear(self) -> None:
+        """Take the line below away."""
+        if self._shows:
             sys.stderr.write("\r\x1b[K")
             sys.stderr.flush()
 
-    def show(verdict: Verdict) -> None:
-        nonlocal done
-        done += 1
-        clear()
-        print("\n".join(as_lines(verdict)), flush=True)
-        progress()
 
-    progress()
+@contextmanager
+def verdicts_shown(count: int) -> Iterator[_Shown]:
+    """Yield what prints a verdict and shows progress."""
+    shown = _Shown(count)
+    shown.tell("", 0.0)
     try:
-        yield show
+        yield shown
     finally:
-        clear()
+        shown.clear()
 
 
 def write_reports(args: argparse.Namespace, verdicts: Sequence[Verdict]) -> None:

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.checking.batch import check_fmus, find_fmus
@@ -34,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not (args.static or args.trust):
             note_missing_walls()
         with verdicts_shown(len(paths)) as progress:
-            verdicts = check_fmus(paths, check_options(args), policy, progress)
+            verdicts = check_fmus(paths, replace(check_options(args), tell=progress.tell), policy, progress)
         write_reports(args, verdicts)
         return 0 if all(verdict.ok for verdict in verdicts) else 1
 

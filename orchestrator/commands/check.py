@@ -37,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
                 memory_limit=args.memory_limit,
                 size_limit=args.size_limit,
                 progress=progress,
+                tell=progress.tell,
             )
         result.write(folder, args.out)
         write_reports(args, result.verdicts)

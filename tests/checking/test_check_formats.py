@@ -9,13 +9,13 @@ import jsonschema
 import pytest
 from lxml import etree
 
+from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.findings import Execution, Finding, FmuFindings
 from orchestrator.checking.formats.code_quality import as_code_quality
 from orchestrator.checking.formats.github import MOST_ANNOTATIONS, as_annotations, as_summary
 from orchestrator.checking.formats.junit import as_junit
 from orchestrator.checking.formats.sarif import FINGERPRINT, MOST_RESULTS, SCHEMA, as_sarif
 from orchestrator.checking.policy import Policy
-from orchestrator.checking.rules import RULES
 from orchestrator.checking.verdict import Verdict, judge
 from tests.support.schemas import CODE_QUALITY, json_schema, junit_schema
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.check import CheckOptions, check_fmu
-from orchestrator.checking.rules import RULES
 from orchestrator.shared.isolation.limits import Limits
 from tests.support.broken_plants import BrokenPlant, broken_plants
 from tests.support.c_fmu import have_compiler

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.findings import Finding, FmuFindings
 from orchestrator.checking.policy import Policy, read_policy
-from orchestrator.checking.rules import RULES
 from orchestrator.checking.verdict import baseline_of, judge, read_baseline
 from orchestrator.cli import main
 from orchestrator.errors import InputError

@@ -6,12 +6,12 @@ from dataclasses import asdict, dataclass
 import msgspec
 import pytest
 
+from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.findings import Execution
 from orchestrator.checking.findings import Finding as CheckFinding
 from orchestrator.checking.findings import FmuFindings as CheckReport
 from orchestrator.checking.formats.text import as_results
 from orchestrator.checking.policy import Policy
-from orchestrator.checking.rules import RULES
 from orchestrator.checking.verdict import judge
 from orchestrator.cli import main
 from orchestrator.errors import OutputError, ScenarioError

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.check import CheckOptions
-from orchestrator.checking.rules import RULES
 from orchestrator.shared.isolation.limits import Limits
 from tests.support.ball3 import XML, ball_files
 from tests.support.c_fmu import write_fmu
@@ -90,7 +90,7 @@ CO_SIMULATION = {
     "update_no_return": "intermediate.early-return",
     "clock_interval": "clock.interval-value",
     "clock_stays": "clock.deactivation",
-    "clock_always": "clock.inactive-change",
+    "clock_always": "event.idle",
     "clock_refused": "run.status",
     "configuration_refused": "configuration.status",
     "configuration_array": "configuration.status",

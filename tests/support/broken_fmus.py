@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from orchestrator.checking.archive import ArchiveLimits
+from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.check import CheckOptions
-from orchestrator.checking.rules import RULES
 from orchestrator.checking.static import STAGES as STATIC_STAGES
 from orchestrator.shared.isolation.limits import Limits
 from tests.support import broken_archives, broken_xml

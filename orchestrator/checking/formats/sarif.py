@@ -10,9 +10,10 @@ from urllib.parse import quote
 
 import msgspec
 
+from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.findings import FmuFindings
 from orchestrator.checking.formats.text import describe_place
-from orchestrator.checking.rules import RULES, TEXTS, VERSIONS, Rule, Severity
+from orchestrator.checking.rules import TEXTS, VERSIONS, Rule, Severity
 from orchestrator.checking.verdict import Issue, Verdict, artifact, describe_file
 from orchestrator.plain_text import plain_text
 from orchestrator.shared.version import __version__

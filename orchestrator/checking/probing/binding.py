@@ -15,11 +15,22 @@ from orchestrator.checking.host import Made, Returned, Update
 from orchestrator.checking.probing.statuses import ERROR, StatusError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.process import Process
-from orchestrator.checking.rules import Version
+from orchestrator.checking.rules import Version, declare
 from orchestrator.errors import ChildError, SimulationError
 from orchestrator.shared.isolation.jail import Answer
 
+declare("""
+[life cycle]
+run.python-exception | W | * | * | no call leaves an exception of Python in the thread | call PyErr_Clear before the function returns; the next call may fail for it
+[process]
+process.settings | E | 2.1.1 | 2.2.1 | rounding mode, traps, working folder and locale are as before when a function returns | restore what was changed before the function returns
+process.signals | W | 2.1.1 | 2.2.1 | handlers of signals are as before when a function returns | leave them to the program, or restore them
+process.environment | W | 2.1.1 | 2.2.1 | environment variables are as before when a function returns | keep what is to be remembered in the instance
+""")  # noqa: E501
+
 _REFERENCE = re.compile(r"#([ribs])(\d+)#")
+_MOST_CHANGES = 20
+_CHANGED = {"environment variable": "process.environment", "handler": "process.signals"}
 _NOTHING = type(None)
 _LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b", "String": "s"}
 
@@ -73,6 +84,7 @@ class Library:
     Attributes:
         current: the function under way; empty when none is.
         ended: whether the child process is gone.
+        epoch: how often another process took its place; instances and states are of one epoch.
         messages: the last few that an instance logged during the present call.
         errors: how many it logged as errors during the present call.
     """
@@ -88,10 +100,12 @@ class Library:
         self.names = NAMES[version]
         self.current = ""
         self.ended = False
+        self.epoch = 0
         self.messages: list[str] = []
         self.errors = 0
         self.logged: list[tuple[list[str], int]] = []
         """Messages and number of errors of each call that was done last in one go."""
+        self._changed: set[str] = set()
         self._path = ""
         self._loaded: tuple[int, ...] | None = None
         self._known = {(_LETTERS.get(v.base, ""), v.reference): v.name for v in reversed(variables)}
@@ -114,6 +128,7 @@ class Library:
     def renew(self) -> None:
         """Load the library anew in another process; its instances and states are gone."""
         self.process.renew()
+        self.epoch += 1
         self.ended = False
         self.current = ""
         self.load(self._path)
@@ -207,6 +222,19 @@ class Library:
     def updates(self) -> tuple[list[Update], int]:
         """The intermediate updates since the last call, and locks of preemption that are open."""
         return self._ask(tuple[list[Update], int], "", "updates")
+
+    def surroundings(self) -> tuple[int, int]:
+        """Report what calls have changed in the process. Return its numbers of threads and open files."""
+        changes, counts = self._ask(tuple[list[tuple[str, str, str]], tuple[int, int]], "", "surroundings")
+        for name, how, function in changes[:_MOST_CHANGES]:
+            if name in self._changed:
+                continue
+            self._changed.add(name)
+            rule = next((rule for word, rule in _CHANGED.items() if word in name), "process.settings")
+            verb = "change" if "handler" not in name else "replace"
+            text = f"functions must not {verb} {name}, but one did {how}".rstrip()
+            self._report(rule, f"{text}, {function} or one shortly before it")
+        return counts
 
     def notes(self) -> tuple[int, str]:
         """Messages that are neither warnings nor errors, since the last call: how many, and the first."""

@@ -10,6 +10,16 @@ from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import DISCARD, OK, WARNING, StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
+
+declare("""
+[life cycle]
+step.last-time | E | - | 4.2.1 | lastSuccessfulTime lies in the step | return the time that was reached
+step.no-progress | E | - | 4.2.1 | a step gets on | return early only after an event that is new
+step.early-return | E | - | 4.1.3 | fmi3DoStep returns early only where the flags and earlyReturnAllowed allow it | set mightReturnEarlyFromDoStep, or go on to the end of the step
+event.not-used | E | - | 4.2.1 | no event is announced where event mode is not used | handle it inside the step
+event.without-cause | W | - | 2.3.5 | an event changes something | refresh event indicators when event mode is left
+""")  # noqa: E501
 
 _MOST_RETURNS = 1000
 _SMALL = 1e-9
@@ -113,6 +123,13 @@ class CoSimulation3(EventDriver):
         super().set_discrete(values, t)
         self.settle(t, when)
         self.call("EnterStepMode", when=when)
+
+    def pause(self, t: float) -> None:
+        if self.habits.idle and self.events and self.next_instant(math.inf) > t + _SMALL * max(abs(t), self.job.step):
+            when = f"in event mode without a cause at t = {t:g}"
+            self.call("EnterEventMode", when=when)
+            self.settle(t, when)
+            self.call("EnterStepMode", when=when)
 
     def _may_return_early(self) -> bool:
         flags = {"mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate"}

@@ -19,8 +19,9 @@ _FLAGS = (
     "canGetAndSetFMUstate", "canSerializeFMUstate", "canGetAndSetFMUState", "canSerializeFMUState",
     "canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess", "canRunAsynchronuously",
     "providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives",
-    "canInterpolateInputs", "providesPerElementDependencies", "providesEvaluateDiscreteStates",
-    "hasEventMode", "mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate",
+    "completedIntegratorStepNotNeeded", "canInterpolateInputs", "providesPerElementDependencies",
+    "providesEvaluateDiscreteStates", "hasEventMode", "mightReturnEarlyFromDoStep",
+    "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate",
 )  # fmt: skip
 
 
@@ -68,9 +69,17 @@ def make_job(
         # Steps beyond the stop time may be refused, so a fraction of one is left out.
         steps=max(1, math.floor(min(_STEPS, length / step + 1e-6))),
         budget=min(_BUDGET, 0.2 * limits.time) / len(d.interfaces),
-        flags=frozenset(f for f in _FLAGS if interface.flag(f)),
+        flags=_flags(interface),
         reference=reference,
     )
+
+
+def _flags(interface: Interface) -> frozenset[str]:
+    """The flags that are set, by their names; that of 2.0 stands for its opposite in 3.0, which is true by default."""
+    found = {f for f in _FLAGS if interface.flag(f)}
+    if interface.element.get("needsCompletedIntegratorStep") in ("false", "0"):
+        found.add("completedIntegratorStepNotNeeded")
+    return frozenset(found)
 
 
 def _probed(d: Description, identity: int | None, by_index: Mapping[int, ProbedVariable]) -> ProbedVariable | None:

@@ -1,6 +1,7 @@
 """An instance with the sequence of calls of its interface: what probes do is the same for all of them."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library
@@ -8,6 +9,34 @@ from orchestrator.checking.probing.instance import FmuInstance
 from orchestrator.checking.probing.job import ProbeJob, references
 from orchestrator.checking.probing.statuses import DiscardedError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
+
+declare("""
+[life cycle]
+step.discarded | W | 4.2.2 | 4.2.1 | steps of the size that is asked for are done | many importers end the run there: do shorter steps inside, or state a stepSize that works
+""")  # noqa: E501
+
+
+@dataclass(frozen=True)
+class Habits:
+    """How an importer goes about what the standard leaves to it; what comes out must not depend on that.
+
+    Attributes:
+        quiet: logging is switched off before the run.
+        alone: variables are set and read one by one, set in reverse order and read twice.
+        idle: event mode is entered after each step, without a cause.
+        again: the discrete states are updated once more than the FMU asks for.
+        completes: completed steps of the integrator are told.
+        judges_first: event indicators are read before the derivatives.
+    """
+
+    quiet: bool = False
+    alone: bool = False
+    idle: bool = False
+    again: bool = False
+    completes: bool = True
+    judges_first: bool = False
+
 
 Report = Callable[..., None]
 _CTYPES = {
@@ -30,9 +59,11 @@ class Driver(FmuInstance):
     Attributes:
         report: called with rule, message, path and the time of the first one in words (``when``).
         driven: whether inputs that are not continuous change in its runs.
+        habits: how its calls are made where the standard leaves that open.
     """
 
     driven = False
+    habits = Habits()
     maker = ""
 
     def __init__(self, library: Library, number: int, job: ProbeJob, report: Report) -> None:
@@ -76,6 +107,12 @@ class Driver(FmuInstance):
         """Write variables of one base type."""
         if not variables:
             return
+        if self.habits.alone and len(variables) > 1:
+            at = len(values)
+            for v in reversed(variables):
+                at -= v.size
+                self.set([v], values[at : at + v.size], when)
+            return
         base = variables[0].base
         head = (("in", "uint32", references(variables)), ("size", len(variables)))
         tail = (("size", len(values)),) if self.job.version == "3.0" and base != "Clock" else ()
@@ -93,6 +130,8 @@ class Driver(FmuInstance):
             for base in dict.fromkeys(v.base for v in variables if not v.clocks)
         ]
         groups = [[(i, v) for i, v in group if not v.clocks] for group in groups]
+        if self.habits.alone:
+            groups = 2 * [[pair] for group in groups for pair in group]
         answers = self.call_many([self._get_call([v for _, v in group]) for group in groups], when)
         for group, (answer,) in zip(groups, answers, strict=True):
             values = self._got([v for _, v in group], answer)
@@ -125,6 +164,15 @@ class Driver(FmuInstance):
     def advance(self, t: float, size: float, when: str = "") -> None:
         """Go from the communication point ``t`` [s] to the next, ``size`` [s] later."""
         raise NotImplementedError
+
+    def pause(self, t: float) -> None:
+        """Do at the communication point ``t`` [s] what must change nothing; nothing where there is no event mode."""
+
+    def quieten(self) -> None:
+        """Switch logging off."""
+        kind = "bool" if self.job.version == "3.0" else "int"
+        self.call("SetDebugLogging", (kind, 0), ("size", 0), ("in", "text", []))
+        self.library.notes()  # what was logged before is allowed
 
     def report_discard(self, when: str, shorter: bool, again: bool = False) -> None:
         """Report that a step was discarded, and raise unless a ``shorter`` one can be tried, at once or ``again``."""

@@ -11,7 +11,17 @@ from typing import Any
 from orchestrator.checking.probing.driver import MOST_ITERATIONS, Driver
 from orchestrator.checking.probing.job import ProbedClock
 from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
+from orchestrator.checking.probing.values import equal, values_text
+from orchestrator.checking.rules import declare
 from orchestrator.shared.numbers import exact_text
+
+declare("""
+[life cycle]
+event.endless | E | 3.2.2 | 2.3.5 | the discrete states settle after a few updates | say that nothing is left to do when it is so
+event.next-time | E | 3.2.2 | 2.3.5 | the next event is in the future | return the time of the next event, or say that there is none
+clock.interval-value | E | - | 2.2.8.4 | intervals and qualifiers of clocks are valid, and those of constant clocks as described | return what the description says
+clock.deactivation | E | - | 2.2.8.2 | output clocks are inactive after the update of the discrete states | deactivate them in fmi3UpdateDiscreteStates
+""")  # noqa: E501
 
 _NOT_YET_KNOWN, _UNCHANGED, _CHANGED = range(3)
 _SMALL = 1e-9
@@ -35,6 +45,9 @@ class EventDriver(Driver):
     of the clock), "periods" (interval by reference), "held" (values of clocked variables at their last tick) and
     "given" (values that clocked inputs get at ticks, by reference; else their start values).
     """
+
+    reads_back = False
+    """Whether clocked inputs are read after they were set."""
 
     def start_clocks(self) -> None:
         """Ask for what the description does not say of the clocks; in initialisation mode."""
@@ -140,6 +153,8 @@ class EventDriver(Driver):
         else:
             text = f"the discrete states must settle, but want more than {MOST_ITERATIONS} updates {when}"
             raise StatusError("UpdateDiscreteStates", 0, text, "event.endless")
+        if self.habits.again:
+            outcomes.append(self.update(t, when))
         still = self._active_clocks(when)
         if still:
             names = ", ".join(c.name for c in self.job.clocks if c.reference in still)
@@ -164,6 +179,10 @@ class EventDriver(Driver):
             value = self.memory.get("given", {}).get(v.reference, v.start)
             if v.causality == "input" and value is not None:
                 self.set([v], value, when)
+                if self.reads_back and not equal(v, found := self.get([v], when), value):
+                    text = f"`{v.name}` is {values_text(found)} instead of {values_text(value)}"
+                    text = f"values must stay as they were set while their clock ticks, but {text}"
+                    self.report("value.kept", text, v.name)
         held = dict(self.memory.get("held", {}))
         for v in clocked:
             if v.causality == "output":

@@ -18,12 +18,22 @@ class FmuInstance:
     def __init__(self, library: Library, number: int) -> None:
         self.library = library
         self.number = number
-        self.dead = False
+        self._epoch = library.epoch
+        self._fatal = False
         self.remarks: dict[str, tuple[int, str]] = {}
         """Warnings, and errors that were logged while a call went well: how many, and the first, by rule."""
         self.memory: dict[str, Any] = {}
         """What a driver keeps beside the FMU, saved and restored with its states."""
         self._memories: dict[int, dict[str, Any]] = {}
+
+    @property
+    def dead(self) -> bool:
+        """Whether nothing may be called any more: after a fatal status, and once its process is gone."""
+        return self._fatal or self._epoch != self.library.epoch
+
+    @dead.setter
+    def dead(self, value: bool) -> None:
+        self._fatal = value
 
     def raw(self, function: str, *arguments: Sequence[Any]) -> tuple[int, list[Any]]:
         """Call a function and return its status and what its output arguments hold."""

@@ -7,6 +7,12 @@ from typing import Any
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.movement import Movement
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
+
+declare("""
+[interfaces]
+interfaces.differ | W | * | * | co-simulation and model exchange of one FMU give the same outputs | generate both from one model, with the same parameters
+""")  # noqa: E501
 
 _TOLERANCE = 0.1  # of the range of a signal: an importer's solver and that of the FMU differ by less
 _FEWEST = 10

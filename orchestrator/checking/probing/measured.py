@@ -10,7 +10,16 @@ from orchestrator.checking.probing.movement import Values, distant
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
 from orchestrator.errors import ChildError
+
+declare("""
+[dependencies]
+dependency.missing | E | 2.2.8 | 2.4.8 | what reacts to a known at once lists it among its dependencies | add it; hosts order their calls by that list
+dependency.initial | E | 2.2.8 | 2.4.8 | what reacts to a known in initialisation mode lists it in InitialUnknowns | add it; hosts initialise loops by that list
+dependency.kind | E | 2.2.8 | 2.4.8 | factors are as dependenciesKind says | write dependent, or leave dependenciesKind out
+dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are stated are seen | see whether the value is used; list dependencies without it where it is none of them
+""")  # noqa: E501
 
 _SEEN = 1e-6  # of the size of a value: less is what an algebraic loop leaves
 _SPREAD = 0.01  # of a quotient: more is no constant
@@ -126,13 +135,12 @@ class Measured:
     def _report_silent(self) -> None:
         """Name knowns that are listed and change nothing: at no point, and in no run."""
         bench, trace = self.context.bench, self.context.trace
-        calculated = {v.name for v in bench.job.variables if v.causality == "calculatedParameter"}
-        heard = {known for _, unknown, known in self.reacted if unknown not in calculated} | self.context.heard
+        heard = {known for _, _, known in self.reacted} | self.context.heard
         if self.context.far is not None and bench.movement is self.context.far[0]:
             self.context.heard = frozenset(heard)  # what is silent here may be heard near the values of the file
             return
         often = {known for (_, _, known), count in self.tried.items() if count >= _OFTEN}
-        listed = {k.key for u in self.listing() if u.variable.name not in calculated for k in u.knowns or ()}
+        listed = {k.key for u in self.listing() for k in u.knowns or ()}
         listed |= self._listed_by_silence()
         movement = bench.movement
         states = {v.key for v in bench.job.state_variables or ()}

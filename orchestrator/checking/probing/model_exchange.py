@@ -15,6 +15,18 @@ from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import DISCARD, StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable, finite, shown
+from orchestrator.checking.rules import declare
+
+declare("""
+[life cycle]
+states.count | E | - | 2.4.8 | the number of states is that of ModelStructure | list every state, or correct the count
+states.nominal | E | 3.2.2 | 3.2.1 | nominal values of states are positive | return 1.0 where nothing is known
+indicators.count | E | - | 2.4.8 | the number of event indicators is that of ModelStructure | list every event indicator, or correct the count
+event.states-changed | E | 3.2.2 | 2.3.5 | an event that changes states says so | set valuesOfContinuousStatesChanged when states have changed
+event.reinit | E | 2.2.7 | 2.4.7.5 | an event changes only states that have reinit | write reinit="true" at the state
+[states]
+event.outside | E | 2.2.7 | 2.4.7.4 | in model exchange, discrete variables change in event mode only | change them in event mode; ask for it by an event indicator, nextEventTime or enterEventMode
+""")  # noqa: E501
 
 _TOLERANCE = 1e-3
 _MOST_STEPS = 300
@@ -104,22 +116,28 @@ class ModelExchange(EventDriver):
 
     def _place(self, t: float, x: list[float], when: str) -> tuple[list[float], list[bool]]:
         """Put the FMU to a time and states; their derivatives, and the signs of the event indicators."""
-        requests: list[tuple[str, Any]] = [("SetTime", [("double", t)])]
+        head: list[tuple[str, Any]] = [("SetTime", [("double", t)])]
+        tail: list[tuple[str, Any]] = []
         if x:
-            requests.append(("SetContinuousStates", [("in", "double", x), ("size", len(x))]))
-            requests.append((_DERIVATIVES[self.job.version], [("out", "double", len(x)), ("size", len(x))]))
+            head.append(("SetContinuousStates", [("in", "double", x), ("size", len(x))]))
+            tail.append((_DERIVATIVES[self.job.version], [("out", "double", len(x)), ("size", len(x))]))
         if self.memory["indicators"]:
             count = self.memory["indicators"]
-            requests.append(("GetEventIndicators", [("out", "double", count), ("size", count)]))
-        answers = self.call_many(requests, when)
+            tail.append(("GetEventIndicators", [("out", "double", count), ("size", count)]))
+        turn = -1 if self.habits.judges_first else 1
+        answers = self.call_many([*head, *tail[::turn]], when)[len(head) :][::turn]
         signs = [z > 0.0 for z in answers[-1][0]] if self.memory["indicators"] else []
-        return (list(answers[2][0]) if x else []), signs
+        return (list(answers[0][0]) if x else []), signs
 
     def set_discrete(self, values: Mapping[ProbedVariable, Sequence[Any]], t: float) -> None:
         when = f"at t = {t:g}"
         self.call("EnterEventMode", when=when)
         super().set_discrete(values, t)
         self._leave_event_mode(t, when)
+
+    def pause(self, t: float) -> None:
+        if self.habits.idle and self.next_instant(math.inf) > t + _SMALL * max(abs(t), self.job.step):
+            self._event(t, f"in event mode without a cause at t = {t:g}")
 
     def advance(self, t: float, size: float, when: str = "") -> None:
         end, h = t + size, min(self.memory.get("h") or size, size)
@@ -131,7 +149,7 @@ class ModelExchange(EventDriver):
             if h > slack:
                 x, t, h, signs = self._try(t, x, h, when)
                 before = self.read(self.watched, when) if self.watched else []
-                entered, terminate = self.complete_step(when)
+                entered, terminate = self.complete_step(when) if self.habits.completes else (False, False)
                 if terminate:
                     raise TerminatedError
                 crossed = signs != self.memory["signs"]
@@ -216,15 +234,18 @@ class ModelExchange(EventDriver):
                 text = f"but {function} changes number {i + 1} from {a:.6g} to {b:.6g}"
                 self.report("event.states-changed", f"states must change in event mode only, {text}", when=when)
         watched = self.watched or ()
-        for v, a, b in zip(watched, before, self.read(watched, when) if watched else (), strict=True):
-            if a != b and finite(a) and finite(b):
-                text = f"but {function} changes it from {shown(a)} to {shown(b)}"
-                self.report(
-                    "event.outside", f"`{v.name}` is discrete and must change in event mode only, {text}", v.name
-                )
-                break
+        self._judge_discrete(before, self.read(watched, when) if watched else (), f"{function} changes it", when)
         if text:
             self.watched = None
+
+    def _judge_discrete(self, before: Sequence[Any], after: Sequence[Any], how: str, when: str) -> None:
+        """What is discrete stays as it is between events."""
+        for v, a, b in zip(self.watched or (), before, after, strict=True):
+            if a != b and finite(a) and finite(b):
+                text = f"`{v.name}` is discrete and must change in event mode only, but {how} from {shown(a)}"
+                self.report("event.outside", f"{text} to {shown(b)}", v.name, when)
+                self.watched = None
+                break
 
     def _event(self, t: float, when: str) -> list[float]:
         """Handle an event; the states after it."""

@@ -82,9 +82,11 @@ def _other(v: ProbedVariable, value: Any, which: int, element: int) -> Any:
 
 
 def _bytes(v: ProbedVariable, value: bytes, which: int) -> bytes | None:
-    """A byte more, or another last one; none where a type says what bytes mean."""
+    """A byte more, behind a zero where there is room; or another last one; none where a type says what bytes mean."""
     if v.has_format:
         return None
+    if v.most_bytes is None or len(value) + 1 < v.most_bytes:
+        return value + bytes([0, 1 + which])
     if v.most_bytes is None or len(value) < v.most_bytes:
         return value + bytes([1 + which])
     return value[:-1] + bytes([value[-1] ^ (1 + which)]) if value else None

@@ -12,18 +12,49 @@ from typing import Any
 from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.movement import Movement
-from orchestrator.checking.probing.statuses import DISCARD, DiscardedError, StatusError, TerminatedError
+from orchestrator.checking.probing.statuses import (
+    DISCARD,
+    DiscardedError,
+    SkippedError,
+    StatusError,
+    TerminatedError,
+)
 from orchestrator.checking.probing.trajectory import Bench, Difference, compare
 from orchestrator.checking.probing.variables import ProbedVariable, finite, shown
 from orchestrator.checking.probing.watched import WatchedRun, watch
+from orchestrator.checking.rules import declare
 from orchestrator.shared.stopwatch import Stopwatch
+
+declare("""
+[load]
+load.version | E | 2.1.4 | 2.2.5 | GetVersion returns the version of the description | return fmi2Version or fmi3Version
+load.platform | E | 2.1.4 | - | fmi2GetTypesPlatform returns default | return fmi2TypesPlatform
+[life cycle]
+run.warning | I | 2.1.3 | 2.2.4 | calls of a normal life cycle return OK; Warning is allowed | see the message; every host goes on after it, and not every host shows it
+run.logged-error | W | 2.1.3 | 2.2.4 | what is logged as an error comes with a status of an error | return an error, or log it as a warning
+value.not-finite | E | 2.2.7 | 2.4.7.5 | outputs are finite | look for a division by zero or a missing initialisation
+value.out-of-range | W | 2.2.7 | 2.2.7.3 | outputs stay within min and max | correct the bounds or the model
+value.start | E | 2.2.7 | 2.4.7.5 | start values of the XML are those of the binary | generate both from one source
+value.string | E | 2.1.7 | 2.2.7.2 | strings and binaries are not null | return "" instead
+value.item | E | 2.2.7 | 2.4.7.5 | enumerations are items of their type | return the value of an item
+value.boolean | E | 2.1.2 | 2.2.7.2 | Booleans are true or false, 1 or 0 | return the result of a comparison, not a count or a mask
+value.binary-size | E | - | 2.4.7.5 | binaries have at most maxSize bytes | shorten them, or correct maxSize
+value.text | E | 2.1.2 | 2.2.7.2 | strings are UTF-8 | encode them before they are returned
+[determinism]
+run.inexact | W | * | * | runs that must be equal are so bit for bit, not only to a thousandth of the range | save and reset the memory of the solver too
+[memory]
+resources.instance-leak | W | * | * | memory does not grow with instances made and freed, or reset | free what is allocated at instantiation, in the reset too
+resources.step-leak | W | * | * | memory does not grow with steps | free what is allocated in a step
+resources.leak | W | * | * | threads and open files do not grow with instances or steps | end threads and close files when the instance is freed
+""")  # noqa: E501
 
 _LEAK_PER_INSTANCE = 256 * 1024
 _LEAK_PER_STEP = 8 * 1024
 _LEAK_AT_LEAST = 512 * 1024
 _FEWEST_STEPS = 10
 _RESETS = 16
-_SMALL = 1e-3
+_WARM = 9  # instances, before growth is looked at
+SMALL = 1e-3
 _BEGINNING = "in initialisation mode"
 _MOST_ITEMS = 10
 Rows = list[list[Any]] | None
@@ -93,7 +124,7 @@ class Context:
         """
         return compare(expected, values, self.names)
 
-    def report_difference(self, rule: str, wanted: str, difference: Difference, allowed: float = _SMALL) -> None:
+    def report_difference(self, rule: str, wanted: str, difference: Difference, allowed: float = SMALL) -> None:
         """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only."""
         if difference.relative > allowed:
             self.report(rule, f"{wanted}, but {difference}")
@@ -102,10 +133,6 @@ class Context:
 
 
 Probe = Callable[[Context], None]
-
-
-class SkippedError(Exception):
-    """A probe does not apply to this FMU; the text says why."""
 
 
 def carry_out(probe: Probe, context: Context) -> None:
@@ -181,7 +208,8 @@ def remarks(context: Context, driver: Driver) -> None:
     for rule, (count, first) in driver.remarks.items():
         if rule not in context.remarked:
             context.remarked.add(rule)
-            context.report(rule, f"calls must {wanted[rule]}, but {count} {found[rule]}, {first} first")
+            modal = "should" if rule == "run.warning" else "must"
+            context.report(rule, f"calls {modal} {wanted[rule]}, but {count} {found[rule]}, {first} first")
 
 
 def _start_values(context: Context, driver: Driver) -> None:
@@ -268,12 +296,12 @@ def memory(context: Context) -> None:
     if not process.jail.resident():
         raise SkippedError("the system does not tell the memory of a process")
     budget = Stopwatch(4.0 * job.budget)
-    cycles, before = 0, None
+    cycles, before, things = 0, None, (0, 0)
     for n in range(0 if context.single else 30):
         with bench.instance(moved=False):
             pass
-        if n == 9:
-            before = process.jail.resident()
+        if n == _WARM:
+            before, things = process.jail.resident(), bench.library.surroundings()
         cycles += before is not None
         if budget.over:
             break
@@ -282,16 +310,26 @@ def memory(context: Context) -> None:
         context.report(
             "resources.instance-leak", f"an instance must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
         )
+    if cycles > 1:
+        _report_things(context, things, cycles - 1, "instances made and freed")
     _reset_memory(context, budget)
     with bench.instance(moved=False) as driver:
         quarter = max(job.steps // 4, 1)
         bench.run(driver, 0, quarter, excited=False, read=False)
-        before = process.jail.resident()
+        before, things = process.jail.resident(), bench.library.surroundings()
         bench.run(driver, quarter, excited=False, read=False)
         growth = process.jail.resident() - before
+        _report_things(context, things, job.steps - quarter, "steps")
     if growth > _LEAK_AT_LEAST and growth / max(job.steps - quarter, 1) > _LEAK_PER_STEP:
         per_step = growth / max(job.steps - quarter, 1) / 1024
         context.report("resources.step-leak", f"memory must not grow with steps, but grows by {per_step:.0f} KiB each")
+
+
+def _report_things(context: Context, before: tuple[int, int], times: int, of: str) -> None:
+    """Report threads and open files that grow with instances or steps, half as many as these at least."""
+    for name, a, b in zip(("threads", "open files"), before, context.bench.library.surroundings(), strict=True):
+        if b - a > max(0.5 * times, 1.0):
+            context.report("resources.leak", f"{name} must not grow with {of}, but {b - a} are left after {times}")
 
 
 def _reset_memory(context: Context, budget: Stopwatch) -> None:

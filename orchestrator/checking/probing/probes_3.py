@@ -8,12 +8,29 @@ from orchestrator.checking.host import Update
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.movement import moved, settable
-from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
-from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
-from orchestrator.checking.probing.values import equal
+from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context
+from orchestrator.checking.probing.statuses import OK, WARNING, SkippedError, StatusError, TerminatedError
+from orchestrator.checking.probing.values import equal, values_text
+from orchestrator.checking.rules import declare
+
+declare("""
+[intermediate update]
+intermediate.unexpected | E | - | 4.2.2 | intermediateUpdate is called in fmi3DoStep, by FMUs that say so | set providesIntermediateUpdate, or do not call it
+intermediate.missing | W | - | 4.4 | an FMU that provides intermediate updates calls them | call intermediateUpdate, or clear the flag
+intermediate.time | E | - | 4.2.2 | intermediate updates lie in the step, and none before a finished one | call intermediateUpdate with intermediateStepFinished for accepted times only
+intermediate.access | E | - | 4.2.2 | variables with intermediateUpdate can be read, then set, in an update | accept the calls that the arguments of the callback allow
+intermediate.early-return | E | - | 4.1.3 | a step ends early when an update asks for it | return early, or clear canReturnEarlyAfterIntermediateUpdate
+[clocks]
+clock.inactive-change | E | - | 2.2.8.3 | clocked variables change only while their clock is active | compute them in the model partition of the clock
+misuse.clock | W | - | 5.2.1 | partitions of unknown clocks are refused | return an error
+[configuration]
+configuration.status | E | - | 2.3.6 | structural parameters can be set in configuration mode, and arrays have the size that follows | accept the calls, and resize the arrays
+configuration.value | E | - | 2.3.6 | structural parameters keep what was set | store the value
+""")  # noqa: E501
 
 _SMALL = 1e-9
 _FEW_STEPS = 20
+_FEW_TICKS = 4
 _STEPS_RESIZED = 3
 _MOST_NAMED = 5
 _LARGEST = 8
@@ -105,7 +122,7 @@ def _probe_early_return(context: Context) -> None:
 
 
 def clocks(context: Context) -> None:
-    """The intervals are those of the description, and event mode without a tick leaves clocked outputs as they are."""
+    """The intervals are those of the description, and triggered clocks can tick."""
     bench, job = context.bench, context.bench.job
     if not job.clocks:
         raise SkippedError("the FMU has no clocks")
@@ -117,24 +134,9 @@ def clocks(context: Context) -> None:
         for wrong in driver.judge_intervals():
             context.report("clock.interval-value", wrong)
     if job.interface == "ScheduledExecution":
-        raise SkippedError("there is no event mode")
-    _probe_triggered_clocks(context)
-    rows = []
-    outputs = job.outputs()
-    with bench.instance() as driver:
-        assert isinstance(driver, EventDriver)
-        for n in range(job.steps):
-            t = job.start + n * job.step
-            bench.excite(driver, t)
-            driver.advance(t, job.step, f"at t = {t:g} (step {n + 1})")
-            rows.append(driver.read(outputs))
-            driver.call("EnterEventMode")
-            driver.settle(t + job.step, "in event mode without a cause")
-            driver.call(_LEAVING[job.interface])
-    difference = context.compare(context.trace, rows)
-    if difference is not None:
-        wanted = "clocked variables must change only while their clock is active"
-        context.report_difference("clock.inactive-change", wanted, difference)
+        _probe_partitions(context)
+    else:
+        _probe_triggered_clocks(context)
 
 
 def _probe_triggered_clocks(context: Context) -> None:
@@ -148,6 +150,35 @@ def _probe_triggered_clocks(context: Context) -> None:
             driver.settle(job.start + job.step, f"while the clock `{clock.name}` ticks", [clock])
             driver.call(_LEAVING[job.interface])
             bench.run(driver, 1, min(2, job.steps))
+
+
+def _probe_partitions(context: Context) -> None:
+    """A partition that is activated alone leaves variables of other clocks as they are; unknown clocks are refused."""
+    bench, job = context.bench, context.bench.job
+    clocks = [c for c in job.clocks if c.causality == "input"]
+    outputs = [v for v in job.variables if v.clocks and v.causality in ("output", "local") and v.base != "Clock"]
+    for clock in clocks:
+        others = [v for v in outputs if clock.reference not in v.clocks]
+        with bench.instance() as driver:
+            try:
+                before = [driver.get([v]) for v in others]
+            except StatusError:
+                break  # an FMU may refuse to be read where no clock ticks
+            for n in range(_FEW_TICKS):
+                t = job.start + n * (clock.interval or job.step)
+                driver.call("ActivateModelPartition", ("uint32", clock.reference), ("double", t))
+            for v, a in zip(others, before, strict=True):
+                if not equal(v, b := driver.get([v]), a):
+                    text = f"`{v.name}` is {values_text(b)} instead of {values_text(a)} after ticks of `{clock.name}`"
+                    text = f"clocked variables must change only while their clock is active, but {text}"
+                    context.report("clock.inactive-change", text, v.name)
+                    return
+    with bench.instance() as driver:
+        unknown = max((v.reference for v in job.variables), default=0) + 12345
+        status, _ = driver.raw("ActivateModelPartition", ("uint32", unknown), ("double", job.start))
+        if status in (OK, WARNING):
+            text = f"fmi3ActivateModelPartition must refuse the unknown clock {unknown}, but does not"
+            context.report("misuse.clock", text)
 
 
 def structure(context: Context) -> None:

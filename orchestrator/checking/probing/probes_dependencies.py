@@ -9,8 +9,8 @@ from orchestrator.checking.probing.measured import Measured
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.movement import Values, moved
 from orchestrator.checking.probing.points import RestPoint, points
-from orchestrator.checking.probing.probes import Context, SkippedError
-from orchestrator.checking.probing.statuses import StatusError, TerminatedError
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.statuses import SkippedError, StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.shared.stopwatch import Stopwatch
 

@@ -11,11 +11,19 @@ from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.points import RestPoint, points
-from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.probes_slopes import judge_outputs
-from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.statuses import SkippedError, StatusError
 from orchestrator.checking.probing.values import by_variable
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
+
+declare("""
+[derivatives]
+derivative.status | E | 2.1.9 | 2.2.11 | derivatives are given as the flags promise | implement the function, or clear the flag
+derivative.value | W | 2.1.9 | 2.2.11 | derivatives are those of small changes | differentiate what is computed
+derivative.adjoint | E | - | 2.2.11 | adjoint derivatives are the directional ones transposed | compute both from one matrix
+""")  # noqa: E501
 
 _MOST = 20  # unknowns, and knowns
 _CHANGE = 1e-4

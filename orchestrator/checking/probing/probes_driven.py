@@ -9,8 +9,18 @@ from orchestrator.checking.probing.probes import Context, remarks
 from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.trajectory import excitation
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
 from orchestrator.errors import ChildError
 from orchestrator.shared.stopwatch import Stopwatch
+
+declare("""
+[inputs]
+run.input-refused | W | 2.1.7 | 2.2.7.3 | inputs within their bounds are accepted | state the bounds in min and max
+run.moved-crash | W | 2.1.7 | 2.2.7.3 | values within the limits of the description do not end the process | refuse such a value, or state min and max
+[setting]
+value.set | E | 2.1.7 | 2.3.2 | start values can be set before initialisation, and change nothing | accept what the XML says can be set
+value.set-initial | W | 2.1.7 | 2.3.2 | variables with initial exact accept their start value before initialisation | accept it, or write initial="calculated"
+""")  # noqa: E501
 
 _MOST_TRIALS = 24
 _TRIAL_STEPS = 5  # most that an FMU does not take is refused when it is set, or soon

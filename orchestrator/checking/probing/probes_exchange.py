@@ -8,6 +8,12 @@ from orchestrator.checking.probing.points import RestPoint
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.variables import ProbedVariable, finite
+from orchestrator.checking.rules import declare
+
+declare("""
+[states]
+states.history | E | 3.2.1 | 3.2.1 | between events, derivatives follow time, states and inputs alone | compute them from what was set last; change what is remembered in event mode
+""")  # noqa: E501
 
 _STALE = 1e-6  # of the size of a value: less is what an algebraic loop leaves
 _DRIFT = 1e-4  # of the largest derivative: less is what the memory of a nonlinear solver leaves

@@ -5,7 +5,17 @@ from dataclasses import replace
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
+from orchestrator.checking.rules import declare
 from orchestrator.errors import ChildError
+
+declare("""
+[end]
+ended.get | W | 4.2.4 | 2.3.8 | values can be read after the end | allow the functions in the state terminated
+[silence]
+log.off | W | 2.1.5 | 2.3.1 | nothing is logged where logging is off | ask loggingOn before the logger is called
+[another start]
+start.time | W | 2.1.6 | 2.3.2 | an experiment can begin at any time | take the start time from the arguments of the setup
+""")  # noqa: E501
 
 _FEW_STEPS = 3
 _LATER = 10  # steps

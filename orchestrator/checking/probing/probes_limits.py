@@ -11,7 +11,13 @@ from orchestrator.checking.probing.probes_restore import readable
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.values import by_variable, equal, values_text
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
 from orchestrator.errors import ChildError
+
+declare("""
+[values]
+value.batch | E | 2.1.7 | 2.2.7.2 | values that are read in one call are those that are read one by one | go through all value references, and keep each text in a place of its own
+""")  # noqa: E501
 
 _MOST = 100  # variables
 _MOST_ITEMS = 8

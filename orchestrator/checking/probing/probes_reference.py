@@ -5,10 +5,17 @@ from itertools import pairwise
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
-from orchestrator.checking.probing.probes import Context, SkippedError
-from orchestrator.checking.probing.statuses import TerminatedError
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.statuses import SkippedError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
 from orchestrator.shared.stopwatch import Stopwatch
+
+declare("""
+[reference]
+reference.result | E | * | * | the reference result is reproduced | correct the model, or write the reference again
+reference.not-run | I | * | * | the reference result can be reproduced in reasonable time | shorten the result
+""")
 
 _RELATIVE = 0.02
 _OUTSIDE = 0.02

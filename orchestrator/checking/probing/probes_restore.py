@@ -6,11 +6,24 @@ from typing import Any
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.movement import distinct, moved
-from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
-from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context
+from orchestrator.checking.probing.statuses import SkippedError, StatusError
 from orchestrator.checking.probing.trajectory import same
 from orchestrator.checking.probing.variables import ProbedVariable, shown
+from orchestrator.checking.rules import declare
 from orchestrator.errors import ChildError
+
+declare("""
+[reset]
+run.reset | E | 2.1.6 | 2.3.1 | a reset returns the instance to its first state | restore every variable, hidden ones too
+[state]
+state.status | E | 2.1.8 | 2.2.7.4 | the state functions work as the flags promise | implement them, or clear the flag
+state.restore | E | 2.1.8 | 2.2.7.4 | a restored state continues as before | save every variable and clock, hidden ones too, by value
+state.serialise | E | 2.1.8 | 2.2.7.4 | a serialised state continues as before, also in a new instance | serialise every variable
+state.portable | E | 2.1.8 | 2.2.7.4 | a serialised state is usable in another process, as one that was stored in a file is | serialise what pointers lead to, not the pointers
+state.time | W | 2.1.8 | 2.2.7.4 | a restored state has its time | save the time too
+state.free | W | 2.1.8 | 2.2.7.4 | freeing a state sets it to null | set the pointer to NULL
+""")  # noqa: E501
 
 _AMPLIFIED = 100.0
 _SMALL, _MOST_INEXACT = 1e-3, 1e-2
@@ -232,7 +245,7 @@ class _Restoring:
         data, memory = self.driver.serialise(self.saved), dict(self.driver.memory)
         if self.context.single:
             return (data, memory) if self._deserialise(self.driver, data, memory) else (b"", {})
-        with bench.instance(name="restored", moved=False) as other:
+        with bench.instance(name="restored", moved=False, second=True) as other:
             return (data, memory) if self._deserialise(other, data, memory) else (b"", {})
 
     def restore_elsewhere(self, data: bytes, memory: dict[str, Any]) -> None:

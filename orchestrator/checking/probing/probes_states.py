@@ -7,11 +7,21 @@ from itertools import pairwise
 
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.points import RestPoint, points
-from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.probes_exchange import judge_completed_step, judge_following
 from orchestrator.checking.probing.slopes import is_far
+from orchestrator.checking.probing.statuses import SkippedError
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.probing.watched import slopes
+from orchestrator.checking.rules import declare
+
+declare("""
+[states]
+states.order | E | 3.2.1 | 3.2.1 | states stand in the order of ModelStructure, by the attribute derivative | correct the order, or the attribute derivative
+states.rates | E | 3.2.2 | 3.2.1 | derivatives of states are those of their variables, in the order of ModelStructure | compute both from one place
+states.nominal-differs | W | 3.2.2 | 3.2.1 | nominal values of states are those of the description | generate both from one source
+states.slope | I | 2.2.7 | 2.4.7.5 | a variable with the attribute derivative is the derivative of that state | correct the variable, or the attribute derivative
+""")  # noqa: E501
 
 _EQUAL = 1e-9
 _NEAR = 1e-3

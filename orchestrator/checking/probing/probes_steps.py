@@ -5,13 +5,24 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-from orchestrator.checking.probing.probes import Context, SkippedError
-from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.statuses import DiscardedError, SkippedError, StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.rules import declare
+
+declare("""
+[variable steps]
+steps.variable | W | 4.3.1 | 4.4 | results hardly depend on the communication step | integrate over the step given, or clear canHandleVariableCommunicationStepSize
+[inner steps]
+steps.internal | W | 4.2.2 | 4.2.1 | communication steps are multiples of the steps inside | end the last step inside at the communication point, or state a stepSize that is a multiple
+[time]
+steps.time | W | 4.2.2 | 4.2.1 | the independent variable is not later than the communication point | take the time from the arguments of the step
+""")  # noqa: E501
 
 _FINE = 16
 """Parts of a communication step in which the outputs are looked at, so that an inner step of a third of it is seen."""
 _LENGTH = 6  # communication steps
+_SEVERAL = 2  # outputs that go by steps inside: one alone may be a staircase of the model
 _FEWEST = 3  # steps inside that must be seen
 _MULTIPLE = 0.02  # of an inner step: nearer to a multiple is one
 _STEP_TOLERANCE = 0.1
@@ -68,6 +79,8 @@ def inner_steps(context: Context) -> None:
             double = _rows(context, outputs, 2.0 * job.step, job.steps // 2)
             _report_count(context, outputs, (double, usual), 2.0 * job.step, 2)
         return
+    if sum(len(set(column)) > 1 for column in zip(*fine, strict=True)) < _SEVERAL:
+        return  # a model may have stairs over time
     fewest, most = job.step / (period + error) - _MULTIPLE, job.step / (period - error) + _MULTIPLE
     if math.floor(most) < max(math.ceil(fewest), 1):
         text = (
@@ -165,6 +178,7 @@ def variable_steps(context: Context) -> None:
         uneven = _run_in_pairs(context, outputs, (0.4, 1.0, 0.6))
     except StatusError as error:
         context.report("steps.variable", str(error))
+        context.remarked.add("steps.variable")
         return
     for i, v in enumerate(outputs):
         a, b = [r[i] for r in even], [r[i] for r in uneven]

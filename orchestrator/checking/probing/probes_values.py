@@ -4,18 +4,30 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.events import EventDriver
+from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.movement import Values, distinct, moved
-from orchestrator.checking.probing.probes import Context, SkippedError, look
+from orchestrator.checking.probing.probes import Context, look
 from orchestrator.checking.probing.probes_limits import judge_batches, judge_late_setting, judge_limits
-from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.statuses import SkippedError, StatusError
 from orchestrator.checking.probing.values import by_variable, equal, values_text
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.probing.watched import narrow
+from orchestrator.checking.rules import declare
+
+declare("""
+[values]
+value.kept | E | 2.1.7 | 2.2.7.2 | a value that is set is there | store the value, every element of it, where it is used and read
+value.lags | W | 2.1.7 | 2.2.7.2 | inputs and tunable parameters that are set at a communication point are there | store the value when it is set, not with the next step
+value.stale | E | 2.2.7 | 2.3.3 | what is read follows what was set before | compute values when they are read, or when something is set
+value.calculated | E | 2.2.7 | 2.4.7.4 | calculated parameters follow the parameters that they depend on | compute them when initialisation mode is left
+""")  # noqa: E501
 
 _FEW_STEPS = 2
 _SAME = 1e-6  # what two solutions of one algebraic loop may differ by, relative
 _MOST = 500
 _MOST_SHOWN = 5
+_TICKING = 20  # steps
 
 
 def values(context: Context) -> None:
@@ -23,6 +35,7 @@ def values(context: Context) -> None:
     bench, job = context.bench, context.bench.job
     movement = bench.movement.values
     _judge_types(context)
+    _kept_at_ticks(context)
     if not movement:
         raise SkippedError("the FMU has nothing that can be set to other values, or takes none")
     if job.interface == "ScheduledExecution":
@@ -39,6 +52,21 @@ def values(context: Context) -> None:
     except StatusError:
         return  # not every FMU takes values at every point; what must be taken has been set before
     _calculated(context, movement)
+
+
+def _kept_at_ticks(context: Context) -> None:
+    """Clocked inputs that are set to other values while their clock ticks are there."""
+    bench, job = context.bench, context.bench.job
+    inputs = [v for v in job.variables if v.clocks and v.causality == "input" and v.base != "Clock"]
+    given = {v.reference: x for v in inputs if (x := moved(v, v.start or ())) is not None}
+    if not given or job.version == "2.0":
+        return
+    with bench.instance(initialised=False) as driver:
+        assert isinstance(driver, EventDriver)
+        driver.enter_initialisation(job.start, job.stop)
+        driver.memory["given"], driver.reads_back = given, True
+        driver.exit_initialisation()
+        bench.run(driver, 0, min(_TICKING, job.steps), read=False)
 
 
 def _judge_types(context: Context) -> None:
@@ -73,21 +101,39 @@ def _kept_before(context: Context, movement: Mapping[ProbedVariable, Values]) ->
         driver.enter_initialisation(job.start, job.stop)
         bench.place(driver, inputs=True)
         found = by_variable(stays, driver.read(stays, "in initialisation mode"))
-        lost = _judge(context, {v: movement[v] for v in stays}, found, "before initialisation")
+        lost = _judge(context, {v: movement[v] for v in stays}, found, _before(job))
         driver.exit_initialisation()
         later = by_variable(stays, driver.read(stays, "after initialisation"))
     # A state that an event at the start changes is no start value any more.
     kept = {v: movement[v] for v in stays if v not in lost and equal(v, plain[v], v.start or ())}
-    return not (lost or _judge(context, kept, later, "before initialisation, when that is over"))
+    return not (lost or _judge(context, kept, later, f"{_before(job)}, when initialisation is over"))
+
+
+def _before(job: ProbeJob) -> str:
+    """When parameters and inputs were set, in words."""
+    entry = "fmi2SetupExperiment" if job.version == "2.0" else "fmi3EnterInitializationMode"
+    return f"before {entry}, or in initialisation mode for inputs"
 
 
 def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
     """Inputs and tunable parameters that are set at a communication point, early or late, are there."""
-    bench, job = context.bench, context.bench.job
     chosen = [v for v in movement if v.causality == "input" or _is_tunable(v)]
     if not chosen:
         return
+    seen = _set_between(context, chosen)
+    if seen is not None and seen[1]:
+        _follow_tunable(context, *seen)
+
+
+Followers = tuple[Mapping[ProbedVariable, Values], Mapping[ProbedVariable, Sequence[Any]]]
+"""Tunable parameters as they were set early in a run, and what is calculated from them then."""
+
+
+def _set_between(context: Context, chosen: list[ProbedVariable]) -> Followers | None:
+    """Set values in a run, early and late; what follows them early, None where what was set is not there."""
+    bench, job = context.bench, context.bench.job
     done = 0
+    seen: Followers = ({}, {})
     with bench.instance() as driver:
         for steps in dict.fromkeys((max(min(_FEW_STEPS, job.steps - 1), 0), job.steps)):
             bench.run(driver, done, steps, read=False)
@@ -95,9 +141,15 @@ def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -
             t = job.start + steps * job.step
             now = by_variable(chosen, driver.read(chosen))
             wanted = {v: x for v, value in now.items() if (x := moved(v, value, 1)) is not None}
-            if not (_takes(context, driver, wanted, t) and _follows_between(context, driver, wanted, steps)):
-                return
+            if not _takes(context, driver, wanted, t):
+                return None
+            found = by_variable(list(wanted), driver.read(list(wanted)))
+            if _judge(context, wanted, found, "at a communication point", "value.lags"):
+                return None
+            if steps <= _FEW_STEPS and not seen[1]:
+                seen = _followers(context, driver, wanted)
             driver.set_discrete(now, t)
+    return seen
 
 
 def _is_tunable(v: ProbedVariable) -> bool:
@@ -120,19 +172,15 @@ def _takes(context: Context, driver: Driver, wanted: Mapping[ProbedVariable, Val
     return True
 
 
-def _follows_between(context: Context, driver: Driver, wanted: Mapping[ProbedVariable, Values], steps: int) -> bool:
-    """Whether what was set is there, and early in the run what is calculated from it."""
-    job = context.bench.job
-    found = by_variable(list(wanted), driver.read(list(wanted)))
-    if _judge(context, wanted, found, "at a communication point", "value.lags"):
-        return False
-    followers = [v for v in job.variables if v.causality == "calculatedParameter" and v.variability == "tunable"]
+def _followers(context: Context, driver: Driver, wanted: Mapping[ProbedVariable, Values]) -> Followers:
+    """The tunable parameters that were set, and the values of what is calculated from such ones."""
+    variables = context.bench.job.variables
+    followers = [v for v in variables if v.causality == "calculatedParameter" and v.variability == "tunable"]
     followers = [v for v in followers if not v.clocks][:_MOST]
     parameters = {v: x for v, x in wanted.items() if v.causality == "parameter"}
-    if followers and parameters and steps <= _FEW_STEPS:
-        later = by_variable(followers, driver.read(followers, "after a tunable parameter was set"))
-        _follow_tunable(context, parameters, later)
-    return True
+    if not followers or not parameters:
+        return {}, {}
+    return parameters, by_variable(followers, driver.read(followers, "after a tunable parameter was set"))
 
 
 def _kept_at_limits(context: Context) -> None:

@@ -4,6 +4,12 @@ from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.rules import declare
+
+declare("""
+[life cycle]
+partition.preemption | E | - | 5.2.1 | preemption is unlocked as often as it is locked | call unlockPreemption on every way out
+""")  # noqa: E501
 
 
 class ScheduledExecution(EventDriver):

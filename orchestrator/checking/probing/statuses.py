@@ -20,6 +20,10 @@ class StatusError(Exception):
         self.rule = rule
 
 
+class SkippedError(Exception):
+    """A probe does not apply to this FMU; the text says why."""
+
+
 class TerminatedError(Exception):
     """The slave asks for the simulation to end, or cannot be followed further; that is no fault.
 

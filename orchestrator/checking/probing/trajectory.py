@@ -12,12 +12,12 @@ from typing import Any
 from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.cosimulation2 import CoSimulation2
 from orchestrator.checking.probing.cosimulation3 import CoSimulation3
-from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.driver import Driver, Habits
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.movement import Movement, moved
 from orchestrator.checking.probing.scheduled import ScheduledExecution
-from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.statuses import SkippedError, StatusError
 from orchestrator.checking.probing.variables import ProbedVariable, shown
 
 _SWITCHED = (0.2, 0.55, 0.7, 0.85)
@@ -50,9 +50,16 @@ class Bench:
         self.held: frozenset[tuple[str, int]] = frozenset()
         self._once = "canBeInstantiatedOnlyOncePerProcess" in job.flags
         self._used = False
+        self._alive = 0
 
-    def prepare(self) -> None:
-        """Make sure that an instance can be made: in another process where one has been made and only one may be."""
+    def prepare(self, second: bool = False) -> None:
+        """Make sure that an instance can be made: in another process where one has been made and only one may be.
+
+        Raises:
+            SkippedError: If another instance is alive, and this one is not meant to be a ``second`` one or must not be.
+        """
+        if self._alive and (self._once or not second):
+            raise SkippedError("a second instance beside the first is needed")
         if self._once and self._used:
             self.library.renew()
         self._used = True
@@ -64,14 +71,22 @@ class Bench:
 
     @contextmanager
     def instance(
-        self, initialised: bool = True, name: str = "instance", moved: bool = True, **options: bool
+        self,
+        initialised: bool = True,
+        name: str = "instance",
+        moved: bool = True,
+        second: bool = False,
+        habits: Habits | None = None,
+        **options: bool,
     ) -> Iterator[Driver]:
         """An instance, at its first communication point when ``initialised``.
 
         Args:
             moved: whether it starts from the values of ``movement``, not from those of the file.
+            habits: of the importer (default: the usual ones).
+            second: whether another instance may be alive; no other probe can have two, by mistake or on purpose.
         """
-        self.prepare()
+        self.prepare(second)
         number = self.driver.make(self.library, name, self.job.token, self.job, **options)
         if number is None:
             said = f" ({'; '.join(self.library.messages)})" if self.library.messages else ""
@@ -79,11 +94,17 @@ class Bench:
             raise StatusError(function, 0, f"{function} must return an instance, but returned null{said}")
         made = self.driver(self.library, number, self.job, self.report)
         made.options(**options)
+        self._alive += 1
         try:
+            if habits is not None:
+                made.habits = habits
+                if habits.quiet:
+                    made.quieten()
             if initialised:
                 self.begin(made, moved)
             yield made
         finally:
+            self._alive -= 1
             made.free()
 
     def begin(self, driver: Driver, moved: bool = True) -> None:
@@ -147,6 +168,7 @@ class Bench:
             if excited:
                 self.excite(driver, t)
             driver.advance(t, self.job.step, f"at t = {t:g} (step {n + 1})")
+            driver.pause(t + self.job.step)
             if read:
                 rows.append(driver.read(outputs, f"at t = {t + self.job.step:g}"))
         return rows
