@@ -93,14 +93,25 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     lags = []
     for rows in np.array_split(np.arange(filled.size), PARTS):
         motor, load = filled.theta_m[rows[reach:-reach]], filled.theta_l[rows]
-        left = [_residual_variance(motor, load[reach + n : reach + n + motor.size]) for n in range(-reach, reach + 1)]
-        best = int(np.argmin(left))
-        bend = 0.0
+        best, bend = _best_lag(motor, load), 0.0
         if 0 < best < 2 * reach:
-            before, least, after = left[best - 1 : best + 2]
+            before, least, after = (
+                _residual_variance(motor, load[n : n + motor.size]) for n in range(best - 1, best + 2)
+            )
             bend = 0.5 * (before - after) / max(before - 2.0 * least + after, 1e-300)
         lags.append((best - reach + bend) * filled.step)
     return float(np.mean(lags)), float(np.std(lags, ddof=1)) / math.sqrt(PARTS)
+
+
+def _best_lag(motor: Array, load: Array) -> int:
+    """Return from which row of ``load`` on a straight line in ``motor`` explains it best, by one convolution."""
+    from scipy.signal import correlate
+
+    a, b = motor - motor.mean(), load - load.mean()
+    sums, squares = (np.concatenate([[0.0], np.cumsum(values)]) for values in (b, b * b))
+    of_lag, squares_of_lag = (total[a.size :] - total[: -a.size] for total in (sums, squares))
+    left = squares_of_lag - of_lag**2 / a.size - correlate(b, a, "valid", "fft") ** 2 / max(float(a @ a), 1e-300)
+    return int(np.argmin(left))
 
 
 def _residual_variance(motor: Array, load: Array) -> float:
