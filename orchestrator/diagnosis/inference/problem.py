@@ -151,11 +151,11 @@ class FitProblem:
                     found[n][rows] = whitening.apply(change)
         return found
 
-    def reweight(self, point: ModelPoint) -> "FitProblem":
+    def reweight(self, point: ModelPoint, quiet: bool = False) -> "FitProblem":
         """Return the problem with the whitening that the residuals at a point ask for."""
         seen = self.record_points(point)
         found = tuple(
-            estimate_whitening(model, model.residuals([one])[0], self.settings)
+            estimate_whitening(model, model.residuals([one])[0], self.settings, quiet)
             for model, one in zip(self.models, seen, strict=True)
         )
         return replace(self, whitenings=found)

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 MEASUREMENT_LEVELS = (1.0, 2.0, 4.0, 10.0, 30.0)  # tried, in shares of the encoder's flat noise: a count is not white
 PROCESS_LEVELS = (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5)  # tried, in shares of the residual's power
+QUIET = 1e-4  # of the unknown torques that residuals show, where weights take hardly any for granted
 RIDGE = 1e-12  # of the diagonal of a spectral matrix: encoders that move as one leave it singular
 
 
@@ -110,7 +111,7 @@ def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
     return Whitening(weights, rows, _taper(model), model.active[:, rows] * np.sqrt(independent)[:, None], length)
 
 
-def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings) -> Whitening:
+def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings, quiet: bool = False) -> Whitening:
     """Return the weights that residuals (channels, n) of a model ask for."""
     plain = band_only(model, settings)
     segment = min(model.size // 4, 1024)
@@ -121,6 +122,8 @@ def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSett
             measured[:, row, column] = csd(right, left, 1.0 / model.step, nperseg=segment, detrend=False)[1]
     inside = np.array([(frequencies > 0) & (frequencies < max(c, 3 * frequencies[1])) for c in model.cutoffs])
     measurement, process = _most_likely_levels(model, frequencies, measured, inside)
+    if quiet:
+        measurement, process = model.noise_sources(frequencies).levels, QUIET * process
     fine = rfftfreq(plain.length, model.step)[: len(plain.weights)]
     matrix = spectral_matrix(model, fine, measurement, process)
     within = np.array([fine < cutoff for cutoff in model.cutoffs])

@@ -22,7 +22,8 @@ from orchestrator.diagnosis.settings import SelectionSettings
 from orchestrator.errors import ScenarioError
 
 Progress = Callable[[str], None]
-ROUNDS = 3  # of the search at most
+LOUDER = 2.0  # times that weights must rise by a quiet look: else the model leaves hardly any
+ROUNDS = 4  # of the search at most
 KNOWN = 8  # subsets of the round before that are fitted anew
 ALONE = 8  # effects that are fitted alone on top of re-fitted parameters
 FITS = 24  # subsets that a round fits in full, at most
@@ -50,13 +51,40 @@ def search_effects(
             result = replace(result, searched=True, alone=around.tried(frozenset()))
         result = replace(result, complete=not around.out_of_time())
         best = max(fits.values(), key=around.score.score_fit)
-        if set(best.labels) == set(result.final.labels) or not result.complete:
+        if not result.complete:
             break
-        again, final = settle_anew(result.problem, best)
+        if set(best.labels) != set(result.final.labels):
+            again, final = settle_anew(result.problem, best)
+        elif (better := _look_quietly(result, around)) is not None:
+            again, final = better
+        else:
+            break
         result = replace(result, problem=again, final=final)
     else:
         around = _Round(result.problem, result.final, base, settings, progress, out_of_time, fits)
     return around.review(result)
+
+
+def _look_quietly(result: SearchResult, around: "_Round") -> tuple[FitProblem, FittedModel] | None:
+    """Return a better model that shows where hardly any of what is left counts as unknown torques; None: there is none.
+
+    The whitening of a model that lacks an effect takes what the effect does for noise. The two are compared under the
+    whitening of the better one.
+    """
+    problem, final = result.problem, result.final
+    quiet = problem.reweight(final.point, quiet=True)
+    pairs = zip(quiet.whitenings, problem.whitenings, strict=True)
+    if max(float(np.max(np.abs(a.weights) / np.maximum(np.abs(b.weights), 1e-300))) for a, b in pairs) < LOUDER:
+        return None
+    near = _Round(quiet, fit_model(quiet, final.point), result.base, around.settings, around.progress,
+                  around.out_of_time, {})  # fmt: skip
+    best = max(near.fit_best().values(), key=near.score.score_fit)
+    if set(best.labels) == set(final.labels):
+        return None
+    own, better = settle_anew(quiet, best)
+    before = _fit(own, final.point)
+    score = Score.of(own, around.settings)
+    return (own, better) if before is None or score.score_fit(better) > score.score_fit(before) else None
 
 
 def fit_effects(
