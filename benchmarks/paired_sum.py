@@ -12,7 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from orchestrator.building.build import ensure_built
-from orchestrator.estimation.innovations import Array, affine_model, simulate
+from orchestrator.estimation.filter.innovations import simulate
+from orchestrator.estimation.filter.model import Array, affine_model
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.fmi.instances import fmu_instance

@@ -27,14 +27,14 @@ __all__ = [
 ]  # fmt: skip
 
 ZIG = "ziglang==0.17.1"
-_PLANTS = "orchestrator.plants.kernels"
+_PLANTS, _FILTER = "orchestrator.plants.kernels", "orchestrator.estimation.filter"
 LIBRARIES = (
     ("orchestrator.paired.loop_kernel", True),
     *((f"{_PLANTS}.{plant}", True) for plant in ("drivetrain", "servo_axis")),
     *((f"{_PLANTS}.motion[{_PLANTS}.{plant}]", False) for plant in ("drivetrain", "servo_axis")),
     ("orchestrator.diagnosis.fmu.loop_kernel", False),
-    ("orchestrator.estimation.kernel", False),
-    ("orchestrator.estimation.stages.kernel", False),
+    (f"{_FILTER}.kernel", False),
+    (f"{_FILTER}.kernel[{_FILTER}.two_stages]", False),
     ("orchestrator.estimation.online", True),
     ("orchestrator.estimation.flanks.chain", False),
     (f"{_PLANTS}.linear", False),

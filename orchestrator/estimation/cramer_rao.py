@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.joint import JointLikelihood
 from orchestrator.estimation.likelihood import GapFit, Likelihood, inverse
 from orchestrator.estimation.problem import ALPHA, STATE_NAMES, GapProblem, make_problem

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from orchestrator.estimation.cramer_rao import error_bound_of_fit
-from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import Fit, GapFit, Likelihood
+from orchestrator.estimation.filter.model import Array
+from orchestrator.estimation.likelihood import Fit, GapFit, Likelihood, inverse
 from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
 from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate
@@ -19,14 +19,22 @@ from orchestrator.shared.inference.normal import NORMAL_95
 
 def describe(fit: GapFit) -> Estimate:
     """Return the estimate of a fit: interval, visibility, and what else the fit says."""
-    settings = fit.likelihood.settings.verdict
-    alpha, error, column = _gap_of(fit)
-    curve = profile(fit)
-    wider = max(_misfit_variance(fit), block_variance(fit, column, settings.blocks))
+    wider = _widening(fit)
+    fit, curve = profile(fit, NORMAL_95**2 * wider)
+    alpha, error, _ = _gap_of(fit)
     low, high = curve.interval(alpha, NORMAL_95**2 * wider)
     # A profile point that is not quite the maximum makes the interval too short, never too long.
     half = NORMAL_95 * math.sqrt(wider) * error
     return _describe(fit, curve, wider, (min(low, max(alpha - half, 0.0)), max(high, alpha + half)))
+
+
+def _widening(fit: GapFit) -> float:
+    """Return the variance of the half-gap over that of white one-step errors: the level of its profile is so much more.
+
+    Kent (Biometrika 69(1), 1982): twice the drop of the log likelihood is chi-squared times that ratio.
+    """
+    *_, column = _gap_of(fit)
+    return max(_misfit_variance(fit), block_variance(fit, column, fit.likelihood.settings.verdict.blocks))
 
 
 def describe_unfinished(fit: GapFit, why: str) -> Estimate:
@@ -66,7 +74,8 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     limit = NORMAL_95**2 * wider
     low, high = interval
     kept = likelihood.run(fit.point.theta, keep=True)
-    flanks = kept.contacts[kept.contacts != 0]
+    contacts = kept.contacts[:, 0]
+    flanks = contacts[contacts != 0]
     traversals = int(np.count_nonzero(np.diff(flanks))) if alpha > 0.0 else 0
     white = kept.errors / np.sqrt(kept.variances)
     diagnostics = {
@@ -92,7 +101,7 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     )
     diagnostics["lacking"] = lacking
     message = "; ".join(text for text in (message, lacking, torque_words(problem)) if text)
-    curves = {"states": kept.states, "contacts": kept.contacts, "errors": kept.errors, "profile": curve}
+    curves = {"states": kept.states, "contacts": contacts, "errors": kept.errors, "profile": curve}
     curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
     curves["model"] = likelihood.parameters(fit.point.theta)
     curves["covariance"] = wider * fit.covariance  # of diagnostics["parameters"], in their order
@@ -119,10 +128,12 @@ def block_variance_along(fit: Fit[Any], slope: Array, blocks: int) -> float:
     sums -= sums.mean(axis=0)
     lower, upper = fit.likelihood.problem.bounds(fit.free)
     values = fit.point.theta[fit.free]
-    inside = (lower < values) & (values < upper)
-    weights = np.where(inside | (slope != 0.0), fit.covariance @ slope, 0.0)  # what is held at its bound carries none
-    variance = float(np.sum((sums @ weights) ** 2)) * blocks / (blocks - 1.0)
-    ratio = variance / max(float(slope @ fit.covariance @ slope), 1e-300)
+    # What is held at its bound moves with nothing.
+    inside = np.flatnonzero(((lower < values) & (values < upper)) | (slope != 0.0))
+    slope = slope[inside]
+    weights = inverse(fit.information[np.ix_(inside, inside)]) @ slope
+    variance = float(np.sum((sums[:, inside] @ weights) ** 2)) * blocks / (blocks - 1.0)
+    ratio = variance / max(float(slope @ weights), 1e-300)
     if not ratio > 2.0 * float(gammaincinv(0.5 * (blocks - 1), 0.975)) / (blocks - 1.0):
         return 1.0
     return ratio * (float(stdtrit(blocks - 1, 0.975)) / NORMAL_95) ** 2

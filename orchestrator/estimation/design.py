@@ -18,7 +18,8 @@ import numpy as np
 
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao
-from orchestrator.estimation.innovations import Array, affine_model, simulate
+from orchestrator.estimation.filter.innovations import simulate
+from orchestrator.estimation.filter.model import Array, affine_model
 from orchestrator.estimation.problem import make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import MINIMUM_ROWS, Record

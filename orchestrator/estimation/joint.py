@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from orchestrator.estimation.effort import Effort
-from orchestrator.estimation.innovations import Array, Innovations
+from orchestrator.estimation.filter.innovations import Innovations
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.problem import OFFSET, SAMPLED, STATE_NAMES, GapProblem
 from orchestrator.estimation.protocol import Estimate

@@ -20,8 +20,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.effort import Effort
-from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels, affine_model, innovations
-from orchestrator.estimation.problem import IMPULSE, OFFSET, SAMPLED, SCALE, STATE_NAMES, GapProblem, UnknownProblem
+from orchestrator.estimation.filter.innovations import Innovations, innovations
+from orchestrator.estimation.filter.model import AffineModel, Array, NoiseLevels, affine_model
+from orchestrator.estimation.problem import (
+    DRY,
+    IMPULSE,
+    LATE,
+    OFFSET,
+    SAMPLED,
+    SCALE,
+    STATE_NAMES,
+    TORQUE_OFFSET,
+    GapProblem,
+    UnknownProblem,
+)
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.shared.inference.inverse import pseudo_inverse
 from pyfmu_sources.drivetrain.equations import NAMES, DrivetrainParameters
@@ -29,6 +41,7 @@ from pyfmu_sources.drivetrain.equations import NAMES, DrivetrainParameters
 JUMP = 100.0
 START_DAMPING = 1e-6
 DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
+NEAR = 2.0  # steps from a bound, within which a difference quotient looks inward
 LEAST_LOG_NOISE, LARGEST_LOG_NOISE = -40.0, 20.0  # beyond all bounds, where a difference quotient may look
 
 
@@ -66,6 +79,9 @@ class FilterLikelihood(ABC, Generic[P]):
         self.settings = settings
         self.soft = False
         self.size = problem.index(size)
+        self._place = {name: n for n, name in enumerate(problem.names)}
+        self._noise = [n for name, n in self._place.items() if name.startswith("log_noise_")]
+        self._torque = [n for name, n in self._place.items() if name.startswith("log_torque_")]
         self.information = np.diag([(10.0 / u.scale) ** 2 for u in problem.unknowns])  # the last one known
         self._floor = np.array([(0.1 / u.scale) ** 2 for u in problem.unknowns])
         self.effort = effort or Effort()
@@ -73,9 +89,52 @@ class FilterLikelihood(ABC, Generic[P]):
         self._mean = problem.start
         self._weight = np.array([u.deviation**-2 if math.isfinite(u.deviation) else 0.0 for u in problem.unknowns])
 
-    @abstractmethod
     def run(self, theta: Array, keep: bool = False) -> Innovations:
         """Return the innovations at ``theta``."""
+        self.effort.check()
+        record = self.problem.record
+        outputs, (x0, spread) = self.problem.outputs, self.first(theta)
+        if OFFSET in self._place:
+            shift = theta[self._place[OFFSET]]
+            outputs = outputs - np.array([0.0, shift])
+            x0[-3] -= shift
+        return innovations(
+            self.model(theta), self.torque(theta), outputs, record.step, x0, self.noise(theta), keep, self.soft,
+            record.u_deviation, spread,
+        )  # fmt: skip
+
+    @abstractmethod
+    def model(self, theta: Array) -> AffineModel:
+        """Return the modes of the plant at a vector."""
+
+    @abstractmethod
+    def first(self, theta: Array) -> tuple[Array, Array]:
+        """Return state and standard deviations at the first row, (n,) each; the load's angle as its encoder has it."""
+
+    def value(self, theta: Array, name: str) -> float:
+        """Return a value of a vector by its name."""
+        return float(theta[self._place[name]])
+
+    def dry(self, theta: Array) -> Array:
+        """Return dry friction of motor and load, and the speeds at which it has set in: (2, 2)."""
+        return np.column_stack([[self.value(theta, name) for name in DRY], self.problem.sliding])
+
+    def torque(self, theta: Array) -> Array:
+        """Return the torque (n,) that the drive is asked for [N.m]: late, with its gain and offset."""
+        record = self.problem.record
+        u = record.u
+        if SAMPLED in self._place and record.u_sampled is not None:
+            u = u + self.value(theta, SAMPLED) * (record.u_sampled - u)
+        u = delay(u, record.step, self.value(theta, LATE))
+        return self.value(theta, SCALE) * u + self.value(theta, TORQUE_OFFSET)
+
+    def noise(self, theta: Array) -> NoiseLevels:
+        """Return the noise levels of a vector."""
+        measured, torque = (
+            tuple(math.exp(min(max(theta[n], LEAST_LOG_NOISE), LARGEST_LOG_NOISE)) for n in places)
+            for places in (self._noise, self._torque)
+        )
+        return NoiseLevels(measured, torque)
 
     def with_options(
         self,
@@ -176,14 +235,18 @@ class FilterLikelihood(ABC, Generic[P]):
         return error, spread, np.asarray(np.linalg.inv(basis))
 
     def _basis(self, theta: Array, free: NDArray[np.int64]) -> Array:
-        """Return a factor (k, k) of the covariance of the free unknowns; alpha never moves down along a column."""
+        """Return a factor (k, k) of the covariance of the free unknowns; what is at a bound looks inward alone."""
         # What is hardly known must not be moved far: a tenth of its scale bounds the step.
         information = self.information[np.ix_(free, free)] + np.diag(self._floor[free])
-        basis = covariance_factor(information)
-        alpha = np.flatnonzero(free == self.size)
-        if alpha.size:
-            basis = basis * np.where(basis[alpha[0]] < 0.0, -1.0, 1.0)
-        return np.asarray(basis)
+        lower, upper = self.problem.bounds(free)
+        alone = 1.0 / np.sqrt(np.diag(information))
+        near = NEAR * self.difference * alone
+        low, high = theta[free] - lower < near, upper - theta[free] < near
+        kept = np.flatnonzero(~(low | high))
+        basis = np.diag(np.where(high, -alone, alone))
+        if kept.size:
+            basis[np.ix_(kept, kept)] = covariance_factor(information[np.ix_(kept, kept)])
+        return basis
 
 
 def covariance_factor(information: Array) -> Array:
@@ -235,15 +298,8 @@ class Likelihood(FilterLikelihood[GapProblem]):
         effort: Effort | None = None,
     ) -> None:
         super().__init__(problem, "alpha", threads, settings, effort)
-        names = problem.names
-        self._offset = names.index(OFFSET) if OFFSET in names else None
-        self._impulse = names.index(IMPULSE)
-        self._places = [(n, NAMES.index(name)) for n, name in enumerate(names) if name in NAMES and name != OFFSET]
+        self._places = [(n, NAMES.index(name)) for name, n in self._place.items() if name in NAMES and name != OFFSET]
         self._state = [problem.index(name) for name in STATE_NAMES]
-        self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
-        self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
-        self._scale = names.index(SCALE) if SCALE in names else None
-        self._sampled = names.index(SAMPLED) if SAMPLED in names else None
 
     def parameters(self, theta: Array) -> DrivetrainParameters:
         """Return the parameters ``p`` of a vector."""
@@ -252,29 +308,22 @@ class Likelihood(FilterLikelihood[GapProblem]):
             p[name] = float(theta[place])
         return DrivetrainParameters._make(p)
 
-    def noise(self, theta: Array) -> NoiseLevels:
-        """Return the noise levels of a vector."""
-        measured = [math.exp(min(max(theta[n], LEAST_LOG_NOISE), LARGEST_LOG_NOISE)) for n in self._noise]
-        motor, load = (math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._torque)
-        return NoiseLevels((measured[0], measured[-1]), (motor, load))
+    def model(self, theta: Array) -> AffineModel:
+        """Return the modes of the drivetrain at a vector."""
+        return affine_model(self.parameters(theta), self.value(theta, IMPULSE), self.dry(theta))
 
-    def run(self, theta: Array, keep: bool = False) -> Innovations:
-        """Return the innovations at ``theta``."""
-        self.effort.check()
-        record = self.problem.record
-        u = record.u
-        if self._sampled is not None and record.u_sampled is not None:
-            u = u + theta[self._sampled] * (record.u_sampled - u)
-        if self._scale is not None:
-            u = u * theta[self._scale]
-        model = affine_model(self.parameters(theta), float(theta[self._impulse]))
-        outputs, x0 = self.problem.outputs, theta[self._state]
-        if self._offset is not None:
-            shift = theta[self._offset]
-            outputs = outputs - np.array([0.0, shift])
-            x0 = x0 - np.array([0.0, 0.0, shift, 0.0, 0.0])
-        noise = self.noise(theta)
-        return innovations(model, u, outputs, record.step, x0, noise, keep, self.soft, record.u_deviation)
+    def first(self, theta: Array) -> tuple[Array, Array]:
+        """Return the state at the first row, which is unknown, and so exact for the filter: (5,) each."""
+        return theta[self._state], np.zeros(len(self._state))
+
+
+def delay(u: Array, step: float, late: float) -> Array:
+    """Return held values (n,) by ``late`` [s] later; where two share a sample, by the time that each has of it."""
+    rows = math.floor(late / step)
+    part = late / step - rows
+    places = np.arange(u.size) - rows
+    before, after = (u[np.clip(places - n, 0, u.size - 1)] for n in (1, 0))
+    return np.asarray(part * before + (1.0 - part) * after)
 
 
 GapFit = Fit[Likelihood]

@@ -6,14 +6,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.estimation.innovations import Array, NoiseLevels
+from orchestrator.estimation.filter.model import Array, NoiseLevels
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
-from orchestrator.shared.inference.noise import rms_behind_lag, robust_noise
+from orchestrator.shared.inference.noise import rms, rms_behind_lag, robust_noise
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
 ALPHA = "alpha"
 SCALE = "u_scale"
+TORQUE_OFFSET = "torque_offset"
+LATE = "torque_late"
+DRY = tuple(f"effects.coulomb_friction.{side}.torque" for side in ("motor", "load"))
+# Prior standard deviations: of the torque's gain where the record states none, of its offset and of dry friction over
+# the rms of the drive's torque, and of how late it acts [s].
+SCALE_SPREAD, OFFSET_SHARE, FRICTION_SHARE, LATE_SPREAD = 0.03, 0.03, 0.1, 3e-3
+SLIDING = 5e-3  # of a body's rms speed, at which its dry friction has set in by seven tenths
 SAMPLED = "u_sampled"  # way from a torque that is held between its own rows to a smooth one: 0 to 1
 OFFSET = "effects.sensor_offset.load.offset"
 IMPULSE = "contact_impulse"
@@ -48,11 +55,13 @@ class UnknownProblem:
     Attributes:
         unknowns: every unknown, in the order of the vector; free or not is decided per fit.
         outputs: (n, 1 or 2) measured angles [rad].
+        sliding: speeds at which dry friction of motor and load has set in [rad/s].
     """
 
     record: Record
     unknowns: tuple[Unknown, ...]
     outputs: Array
+    sliding: tuple[float, float]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -109,7 +118,7 @@ def make_problem(record: Record, model: Model) -> GapProblem:
         unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
     damping = model.parameters["c"].value
     unknowns.append(Unknown(IMPULSE, 0.0, 0.5 * IMPULSE_DEPTH * damping, 0.5 * IMPULSE_DEPTH * damping))
-    unknowns += scale_unknowns(record)
+    unknowns += torque_unknowns(record, model.parameters["tau"].value, ratio)
     if record.u_sampled is not None:
         unknowns.append(Unknown(SAMPLED, 0.0, math.inf, 0.1, 0.0, 1.0))
     units = _torque_units(record, model.parameters["tau"].value, ratio)
@@ -127,7 +136,8 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     if not both:
         levels.append(levels[0])
     noise = NoiseLevels((levels[0], levels[1]), (1.0, 1.0))
-    return GapProblem(record, tuple(unknowns + noises), outputs, model.values, noise, units)
+    sliding = sliding_speeds(record, ratio)
+    return GapProblem(record, tuple(unknowns + noises), outputs, sliding, model.values, noise, units)
 
 
 def parameter_unknowns(model: Model, without: Collection[str]) -> list[Unknown]:
@@ -141,12 +151,32 @@ def parameter_unknowns(model: Model, without: Collection[str]) -> list[Unknown]:
     return unknowns
 
 
-def scale_unknowns(record: Record) -> list[Unknown]:
-    """Return the factor of a torque whose scale is not exact, or nothing."""
-    if record.u_scale_uncertainty <= 0.0:
-        return []
-    spread = record.u_scale_uncertainty / math.sqrt(3.0)
-    return [Unknown(SCALE, 1.0, spread, spread, 0.1, 10.0)]
+def torque_unknowns(record: Record, lag: float, ratio: float) -> list[Unknown]:
+    """Return gain, offset and lateness of the drive's torque, and dry friction of motor and load.
+
+    Args:
+        lag: of the drive [s].
+        ratio: speed of the motor over that of the load.
+    """
+    rms = rms_behind_lag(record.u, record.step, lag)
+    stated = record.u_scale_uncertainty / math.sqrt(3.0)
+    spread = stated if stated > 0.0 else SCALE_SPREAD
+    unknowns = [
+        Unknown(SCALE, 1.0, spread, spread, 0.1, 10.0),
+        Unknown(TORQUE_OFFSET, 0.0, OFFSET_SHARE * rms, 1e-3 * rms),
+        Unknown(LATE, 0.0, LATE_SPREAD, 1e-4, -10.0 * LATE_SPREAD, 10.0 * LATE_SPREAD),
+    ]
+    for name, unit in zip(DRY, (rms, rms * abs(ratio)), strict=True):
+        unknowns.append(Unknown(name, 0.0, FRICTION_SHARE * unit, 1e-3 * unit, 0.0, unit))
+    return unknowns
+
+
+def sliding_speeds(record: Record, ratio: float) -> tuple[float, float]:
+    """Return the speeds of motor and load [rad/s] at which their dry friction has set in."""
+    angles = record.fill_missing().theta_m
+    apart = max(1, min(round(0.02 / record.step), angles.size // 10))
+    speed = SLIDING * rms((angles[apart:] - angles[:-apart]) / (apart * record.step))
+    return max(speed, 1e-9), max(speed / abs(ratio), 1e-9)
 
 
 def encoder_unknown(record: Record, model: Model, column: str, level: float) -> Unknown:

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
-from orchestrator.shared.inference.normal import NORMAL_95
+
+MOST_PLACES = 30  # on one side, until the profile passes its level
+MOST_STARTS = 3  # of the fit anew, from a place of the profile that is better than it
+BETTER = 0.2  # of the objective, by which such a place is better
 
 
 @dataclass(frozen=True)
@@ -33,34 +36,50 @@ class Profile:
         return low, high
 
 
-def profile(fit: GapFit) -> Profile:
-    """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0)."""
+def profile(fit: GapFit, limit: float) -> tuple[GapFit, Profile]:
+    """Return the profile likelihood of alpha until it passes ``limit`` on both sides (or is at alpha = 0), and the fit.
+
+    Where a place of it is better than the fit, that was no maximum: it goes on from there, and is returned.
+    """
+    for _ in range(MOST_STARTS):
+        curve, better = _follow(fit, limit)
+        if better is None:
+            return fit, curve
+        fit = maximise(better.likelihood, better.point.theta, list(fit.free), tolerance=2e-3)
+    return fit, _follow(fit, limit)[0]
+
+
+def _follow(fit: GapFit, limit: float) -> tuple[Profile, GapFit | None]:
+    """Return the profile, and the place that is better than the fit, at which it stops."""
     likelihood = fit.likelihood
     place = likelihood.problem.index("alpha")
     column = list(fit.free).index(place)
     deviation = math.sqrt(fit.covariance[column, column])
     slope = fit.covariance[:, column] / fit.covariance[column, column]
-    best = float(fit.point.theta[place])
-    edge = likelihood.settings.verdict.misfit_widening * NORMAL_95
-    entries = [(best, 0.0)]
+    best, edge = float(fit.point.theta[place]), math.sqrt(limit)
+    entries = {best: 0.0}
     for side in (-1.0, 1.0):
-        reach = 0.5 * edge * deviation
-        for _ in range(14):
-            alpha = max(best + side * reach, 0.0)
-            held = _fit_constrained(likelihood, fit, place, alpha, slope)
+        reach = 0.6 * edge * deviation
+        for _ in range(MOST_PLACES):
+            alpha = min(max(best + side * reach, 0.0), likelihood.problem.unknowns[place].upper)
+            held = _fit_at_size(likelihood, fit, place, alpha, slope)
             likelihood, drop = held.likelihood, held.point.objective - fit.point.objective
-            entries.append((alpha, drop))
-            if drop > edge**2 or alpha == 0.0:
+            entries[alpha] = drop
+            if drop < -BETTER:
+                return _curve(entries), held
+            if drop > limit or alpha in (0.0, likelihood.problem.unknowns[place].upper):
                 break
-            if drop > 0.05:
-                reach *= min(max(1.06 * edge / math.sqrt(drop), 1.2), 2.5)
-            else:
-                reach *= 2.5
-    entries = sorted(set(entries))
-    return Profile(np.array([e[0] for e in entries]), np.array([e[1] for e in entries]))
+            reach *= min(max(1.06 * edge / math.sqrt(max(drop, 1e-12)), 1.2), 2.5)
+    return _curve(entries), None
 
 
-def _fit_constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
+def _curve(entries: dict[float, float]) -> Profile:
+    """Return the profile of its places."""
+    places = sorted(entries)
+    return Profile(np.array(places), np.array([entries[alpha] for alpha in places]))
+
+
+def _fit_at_size(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
     """Return the best fit found with alpha held: the linear prediction, then some scoring steps."""
     theta = fit.point.theta.copy()
     theta[fit.free] += slope * (alpha - fit.point.theta[place])

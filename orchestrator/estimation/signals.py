@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.protocol import NotApplicableError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record

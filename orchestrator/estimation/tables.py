@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95

@@ -9,9 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from orchestrator.estimation.protocol import FITTED, Estimate
 from orchestrator.estimation.settings import EstimationSettings, TrustSettings
-from orchestrator.estimation.stages.location import Location
+from orchestrator.estimation.stages.location import BOTH, FIRST, SECOND, Location
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 
@@ -46,6 +47,12 @@ def trust_of_location(location: Location, record: Record, model: Model, settings
             )
         if location.answers and location.traversals < settings.trust.least_traversals:
             yield Reason(Level.AMBER, f"the gap is traversed only {_times(location.traversals)}")
+        for stage, gap in zip((FIRST, SECOND), location.stages, strict=True):
+            low, high = gap.interval
+            widest = 2.0 * NORMAL_95 * settings.trust.widest * gap.alpha
+            if location.answers in ((stage,), (BOTH,)) and high - low > widest:
+                text = f"the half-gap of stage {stage} lies anywhere from {low:.2g} to {high:.2g} rad"
+                yield Reason(Level.AMBER, text)
         if record.u_sampled is not None:
             yield Reason(Level.AMBER, "the torque has rows of its own and was taken as held between them")
         if record.u_deviation is not None:

@@ -36,7 +36,9 @@ def check_plausible(record: Record, model: Model) -> None:
     parameters = _of_one_stage({name: entry.value for name, entry in model.parameters.items()})
     if record.theta_l is not None:
         _check_directions(record, record.theta_l, parameters)
-        _check_slope(record, record.theta_l, parameters["i"], "i" if "i" in model.parameters else "i_1")
+        slow = 2 * _rows_of_swing(record, parameters)
+        motor, load = (_smooth(angles, slow) for angles in (record.theta_m, record.theta_l))
+        _check_slope(record.source, motor, load, parameters["i"], "i" if "i" in model.parameters else "i_1")
     _check_rate(record, _frequency(parameters))
     _check_inertia(record, parameters)
 
@@ -71,7 +73,7 @@ def _check_rate(record: Record, frequency: float) -> None:
 
 def _check_directions(record: Record, theta_l: Array, p: Mapping[str, float]) -> None:
     """Refuse angles of which one counts the other way: motion slower than the load's swing on a held motor tells."""
-    width = max(1, round(2.0 * math.pi * math.sqrt(p["J_l"] / p["k"]) / record.step))
+    width = _rows_of_swing(record, p)
     if 4 * width > record.size:
         return
     kernel = np.ones(width) / width
@@ -86,16 +88,27 @@ def _check_directions(record: Record, theta_l: Array, p: Mapping[str, float]) ->
         )
 
 
-def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float, name: str = "i") -> None:
+def _rows_of_swing(record: Record, p: Mapping[str, float]) -> int:
+    """Return the rows of a swing of the load on a held motor: what is slower, the load follows."""
+    return max(1, round(2.0 * math.pi * math.sqrt(p["J_l"] / p["k"]) / record.step))
+
+
+def _smooth(values: Array, rows: int) -> Array:
+    """Return the means over so many rows, a quarter of all at most, about their own mean."""
+    rows = min(rows, values.size // 4)
+    sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
+    means = (sums[rows:] - sums[:-rows]) / rows
+    return np.asarray(means - means.mean())
+
+
+def _check_slope(source: str, motor: Array, load: Array, ratio: float, name: str = "i") -> None:
     """Compare the slope of load over motor angle with 1/i, where the parameter ``name`` would mend ``i``."""
-    motor = record.theta_m - record.theta_m.mean()
-    load = theta_l - theta_l.mean()
     if max(float(np.ptp(motor)) / ratio, float(np.ptp(load))) < LARGE_TRAVEL:
         return
     correlation = float(motor @ load) / math.sqrt(float(motor @ motor) * float(load @ load))
     if abs(correlation) < 0.95:
         raise RecordError(
-            f"{record.source}: column `theta_l` must follow `theta_m`, but their correlation is "
+            f"{source}: column `theta_l` must follow `theta_m`, but their correlation is "
             f"{correlation:.2f}: name the right column by `[columns.theta_l] name = ...` in the model file"
         )
     relative = float(np.std(load) / np.std(motor)) * ratio
@@ -117,12 +130,10 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float, nam
     )
     for factor, text, cure in suspects:
         if abs(math.log(relative / factor)) < min(0.2, abs(math.log(relative))):  # nearer to that than to what is right
-            raise RecordError(
-                f"{record.source}: {text} (theta_m/theta_l is {ratio / relative:.4g}, i is {ratio:g}): {cure}"
-            )
+            raise RecordError(f"{source}: {text} (theta_m/theta_l is {ratio / relative:.4g}, i is {ratio:g}): {cure}")
     if abs(math.log(relative)) > 0.3:
         raise RecordError(
-            f"{record.source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have "
+            f"{source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have "
             f"{ratio / relative:.4g}: mend `[columns.theta_m] unit` or `[parameters.{name}] value` (`model`)"
         )
 

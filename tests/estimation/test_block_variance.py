@@ -11,13 +11,13 @@ from orchestrator.estimation.problem import Unknown, UnknownProblem
 ROWS, BLOCKS = 2000, 20
 
 
-def fit_at(theta: list[float], covariance: np.ndarray, scores: np.ndarray) -> SimpleNamespace:
+def fit_at(theta: list[float], information: np.ndarray, scores: np.ndarray) -> SimpleNamespace:
     """A fit of two unknowns, the second of which lies between 0 and 1."""
     unknowns = (Unknown("alpha", 0.0, np.inf, 1.0, 0.0, 3.0), Unknown("level", 0.0, np.inf, 1.0, 0.0, 1.0))
-    problem = UnknownProblem(record=None, unknowns=unknowns, outputs=np.zeros((ROWS, 1)))
+    problem = UnknownProblem(record=None, unknowns=unknowns, outputs=np.zeros((ROWS, 1)), sliding=(1.0, 1.0))
     likelihood = SimpleNamespace(problem=problem, scores=lambda point, free: scores)
     point = SimpleNamespace(theta=np.array(theta))
-    return SimpleNamespace(likelihood=likelihood, point=point, free=np.arange(2), covariance=covariance)
+    return SimpleNamespace(likelihood=likelihood, point=point, free=np.arange(2), information=information)
 
 
 @pytest.fixture
@@ -27,12 +27,12 @@ def white() -> np.ndarray:
 
 @pytest.mark.parametrize("level", [0.0, 1.0])
 def test_an_unknown_at_its_bound_adds_nothing(white: np.ndarray, level: float) -> None:
-    covariance = np.array([[1.0 / ROWS, 1e6], [1e6, 1e13]])
-    assert block_variance(fit_at([0.5, level], covariance, white), 0, BLOCKS) == 1.0
-    assert block_variance(fit_at([0.5, 0.5], covariance, white), 0, BLOCKS) > 1e12
+    information = ROWS * np.array([[1.0, 1.0 - 1e-9], [1.0 - 1e-9, 1.0]])
+    assert block_variance(fit_at([0.5, level], information, white), 0, BLOCKS) == 1.0
+    assert block_variance(fit_at([0.5, 0.5], information, white), 0, BLOCKS) > 1e6
 
 
 def test_a_gap_of_nothing_keeps_the_scatter_of_its_blocks(white: np.ndarray) -> None:
     together = np.repeat(white[: ROWS // 100], 100, axis=0)
-    found = [block_variance(fit_at([alpha, 0.5], np.eye(2) / ROWS, together), 0, BLOCKS) for alpha in (0.0, 0.5)]
+    found = [block_variance(fit_at([alpha, 0.5], ROWS * np.eye(2), together), 0, BLOCKS) for alpha in (0.0, 0.5)]
     assert found[0] == found[1] > 10.0

@@ -13,7 +13,8 @@ from orchestrator.cli import main
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.design import SEARCHED, MachineLimits, design
-from orchestrator.estimation.innovations import NoiseLevels, affine_model, innovations, simulate
+from orchestrator.estimation.filter.innovations import innovations, simulate
+from orchestrator.estimation.filter.model import NoiseLevels, affine_model
 from orchestrator.estimation.likelihood import Likelihood, maximise
 from orchestrator.estimation.methods import ekf
 from orchestrator.estimation.methods.maximum_likelihood import fit_record

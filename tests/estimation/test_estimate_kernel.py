@@ -4,21 +4,19 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from orchestrator.estimation.innovations import KERNEL, _discrete, affine_model
-from orchestrator.estimation.kernel import BLUR
+from orchestrator.estimation.filter.innovations import KERNELS, _arrays
+from orchestrator.estimation.filter.kernel import BLUR
+from orchestrator.estimation.filter.model import affine_model
 from pyfmu_sources.drivetrain.equations import parameters
 
 STEP, TORQUE = 0.005, 40.0
+TORQUES = np.array([TORQUE, 3.0, -5.0])
 
 
 def advanced(model, x):
     """Return the state after a sample, and the Jacobian that ``propagate`` leaves."""
-    phi, gain_u, gain_1 = _discrete(model, STEP)
     x, total, scratch = x.copy(), np.empty((5, 5)), np.empty(5)
-    KERNEL.propagate(
-        model.matrices, model.inputs, model.constants, model.normal, model.alpha, model.jump, phi, gain_u, gain_1,
-        STEP, TORQUE, x, total, scratch,
-    )  # fmt: skip
+    KERNELS[1].propagate(*_arrays(model, STEP), STEP, TORQUES, x, total, scratch)
     return x, total
 
 
@@ -38,7 +36,7 @@ def test_the_jacobian_is_the_derivative_also_across_contact_events(twist, omega_
         shift = size * np.eye(5)[n]
         numeric[:, n] = (advanced(model, x + shift)[0] - advanced(model, x - shift)[0]) / (2.0 * size)
     np.testing.assert_allclose(jacobian, numeric, rtol=1e-5, atol=1e-5)
-    flanks = [int(np.sign(t) * (abs(t) > 0.01)) for t in (model.normal @ x, model.normal @ after)]
+    flanks = [int(np.sign(t) * (abs(t) > 0.01)) for t in (model.normals[0] @ x, model.normals[0] @ after)]
     assert (flanks[0] != flanks[1]) == bool(events)
 
 
@@ -47,7 +45,7 @@ def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
     model = affine_model(parameters(alpha=0.01, c=0.0))
     x = np.array([3.984 * (0.3 + twist), 0.0, 0.3, 0.0, 25.0])
     covariance = np.diag([1e-4, 0.0, 3e-5, 0.0, 0.0])
-    deviation = np.sqrt(model.normal**2 @ np.diag(covariance) + BLUR**2)
+    deviation = np.sqrt(model.normals[0] ** 2 @ np.diag(covariance) + BLUR**2)
     places = np.linspace(-8.0, 8.0, 4001)
     weights = np.exp(-0.5 * places**2)
     weights /= weights.sum()
@@ -55,12 +53,10 @@ def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
     wound = weights @ (np.sign(twists) * np.maximum(np.abs(twists) - 0.01, 0.0))
     touching = weights @ (np.abs(twists) > 0.01)
     h, after, total = 1e-6, x.copy(), np.empty((5, 5))
-    KERNEL.advance_blurred(
-        model.matrices, model.inputs, model.constants, model.normal, 0.01, covariance, h, TORQUE, after, total
-    )  # fmt: skip
+    KERNELS[1].advance_blurred(*_arrays(model, h)[:5], covariance, h, TORQUES, after, total)
     free, tight = model.matrices[1], model.matrices[2]
     by_twist = free[:, 2] - tight[:, 2]  # accelerations per twist of the shaft
-    rate = free @ x + model.inputs * TORQUE + model.constants[1] + by_twist * wound
+    rate = free @ x + TORQUES @ model.inputs + model.constants[1] + by_twist * wound
     np.testing.assert_allclose((after - x) / h, rate, rtol=1e-3, atol=1e-2)
     np.testing.assert_allclose((total - np.eye(5)) / h, free + touching * (tight - free), rtol=0.02, atol=1e-2)
 
@@ -69,13 +65,13 @@ def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
 def test_the_transition_is_exact_for_a_drive_of_any_lag(lag):
     """A lag of a thousandth of a sample too: the series of the whole sample would have lost every digit."""
     model = affine_model(parameters(J_m=0.002, J_l=0.3, k=900.0, c=1.0, b_m=0.003, b_l=0.1, i=12.0, tau=lag))
-    phi, gain_u, gain_1 = _discrete(model, STEP)
+    *_, phi, gain, gain_1 = _arrays(model, STEP)
     for mode in range(3):
         whole = np.zeros((7, 7))
         whole[:5, :5] = model.matrices[mode]
-        whole[:5, 5], whole[:5, 6] = model.inputs, model.constants[mode]
+        whole[:5, 5], whole[:5, 6] = model.inputs[0], model.constants[mode]
         expected = scipy.linalg.expm(STEP * whole)
         scale = np.abs(expected[:5]).max()
         np.testing.assert_allclose(phi[mode], expected[:5, :5], rtol=1e-9, atol=1e-12 * scale)
-        np.testing.assert_allclose(gain_u[mode], expected[:5, 5], rtol=1e-9, atol=1e-12 * scale)
+        np.testing.assert_allclose(gain[mode, 0], expected[:5, 5], rtol=1e-9, atol=1e-12 * scale)
         np.testing.assert_allclose(gain_1[mode], expected[:5, 6], rtol=1e-9, atol=1e-12 * scale)

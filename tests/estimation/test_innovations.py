@@ -5,7 +5,8 @@ import pytest
 from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
-from orchestrator.estimation.innovations import FADING, Innovations, NoiseLevels, affine_model, innovations, simulate
+from orchestrator.estimation.filter.innovations import Innovations, innovations, simulate
+from orchestrator.estimation.filter.model import FADING, NoiseLevels, affine_model, row_model
 from pyfmu_sources.drivetrain import contact, drivetrain
 from pyfmu_sources.drivetrain import equations as dt
 
@@ -18,7 +19,7 @@ START = np.array([0.1, 0.5, 0.02, 0.1, 2.0])
 def joint(y: np.ndarray, p: tuple[float, ...]) -> float:
     """Return twice the negative log density of a record, without 2 pi, from its mean and covariance as a whole."""
     model = affine_model(p)
-    A, b, outputs = model.matrices[2], model.inputs, y.shape[1]
+    A, b, outputs = model.matrices[2], model.inputs[0], y.shape[1]
     block = np.zeros((6, 6))
     block[:5, :5], block[:5, 5] = A * H, b * H
     step = expm(block)
@@ -60,7 +61,7 @@ def test_the_deviance_is_that_of_the_whole_record(outputs: int) -> None:
 
 def test_the_deviance_counts_variance_and_error_alike() -> None:
     errors, variances = np.array([[1.0, 2.0]]), np.array([[4.0, 0.5]])
-    found = Innovations(errors, variances, np.empty((0, 5)), np.empty(0, dtype=np.int64))
+    found = Innovations(errors, variances, np.empty((0, 5)), np.empty((0, 1), dtype=np.int64))
     assert found.deviance == pytest.approx(np.log(4.0) + np.log(0.5) + 1.0 / 4.0 + 4.0 / 0.5)
 
 
@@ -82,15 +83,15 @@ def test_without_noise_in_the_torque_errors_are_those_of_the_exact_plant() -> No
     twist = exact[:, 0] / p.i - exact[:, 2]
     clear = np.abs(np.abs(twist) - 0.004) > 1e-6
     flank = np.where(twist > 0.004, 1, np.where(twist < -0.004, -1, 0))
-    assert np.array_equal(found.contacts[clear], flank[clear])
-    assert {-1, 0, 1} <= set(found.contacts.tolist())
+    assert np.array_equal(found.contacts[clear, 0], flank[clear])
+    assert {-1, 0, 1} <= set(found.contacts[:, 0].tolist())
     assert np.allclose(simulate(affine_model(p), torque, H, np.zeros(5))[: len(y)], exact[:, :5], atol=1e-9)
 
 
 def test_nothing_is_kept_unless_asked_for() -> None:
     found = innovations(affine_model(dt.parameters()), U, np.zeros((30, 1)), H, START, NOISE)
     assert found.states.shape == (0, 5)
-    assert found.contacts.shape == (0,)
+    assert found.contacts.shape == (0, 1)
     assert found.errors.shape == (30, 1)
 
 
@@ -104,10 +105,30 @@ def test_modes_by_hand() -> None:
     assert np.allclose(model.constants[2], [0.0, 3000 * 0.01 / 4 / 0.5, 0.0, -3000 * 0.01 / 5, 0.0])
     assert np.allclose(model.constants[0], -model.constants[2])
     assert np.allclose(model.constants[1], 0.0)
-    assert np.allclose(model.inputs, [0, 0, 0, 0, 2.0])
-    assert np.allclose(model.normal, [0.25, 0, -1, 0, 0])
+    assert np.allclose(model.inputs, [[0, 0, 0, 0, 2.0], [0, 2.0, 0, 0, 0], [0, 0, 0, 0.2, 0]])
+    assert np.allclose(model.normals, [[0.25, 0, -1, 0, 0]])
     assert np.allclose(model.mobility, [2.0, 0.2])
-    assert model.alpha == 0.01
+    assert model.halves == 0.01
+    row = row_model(*map(np.array, ([0.5, 5.0], [0.1, 1.0], [4.0], [3000.0], [2.0])), 0.5, np.array([0.01]), model.dry)
+    for name in ("matrices", "inputs", "constants", "normals", "halves", "mobility", "jumps"):
+        assert np.allclose(getattr(row, name), getattr(model, name)), name
+
+
+def test_dry_friction_stops_a_body_and_takes_what_it_takes() -> None:
+    """Two free bodies (a gap never closed): each is slowed by F / J, then rests; a torque below friction moves none."""
+    p = dt.parameters(alpha=10.0, b_m=0.0, b_l=0.0)
+    model = affine_model(p, dry=np.array([[2.0, 1e-4], [7.0, 1e-4]]))
+    start = np.array([0.0, 1.0, 0.0, -1.0, 0.0])
+    states = simulate(model, np.zeros(400), H, start)
+    times = H * np.arange(400)
+    expected = np.maximum(1.0 - times * 2.0 / 0.4, 0.0), -np.maximum(1.0 - times * 7.0 / 5.6, 0.0)
+    for speed, exact in zip((states[:, 1], states[:, 3]), expected, strict=True):
+        assert np.allclose(speed, exact, atol=2e-3)
+        assert abs(speed[-1]) < 1e-6
+    held = simulate(model, np.full(400, 1.0), H, np.zeros(5))  # creeps at the speed at which half of it has set in
+    assert np.abs(held[:, 1]).max() < 1e-4
+    moved = simulate(model, np.full(801, 3.0), H, np.zeros(5))  # after ln 3, when the drive's torque is above friction
+    assert moved[-1, 1] == pytest.approx((4.0 - np.log(3.0) - 1.0 + 3.0 * np.exp(-4.0)) / 0.4, rel=1e-3)
 
 
 def test_dry_friction_is_not_seen() -> None:
@@ -121,11 +142,11 @@ def test_dry_friction_is_not_seen() -> None:
 
 
 def test_the_impulse_of_a_contact_fades_with_the_gap() -> None:
-    wide = affine_model(dt.parameters(alpha=1.0), 3.0).jump
+    wide = affine_model(dt.parameters(alpha=1.0), 3.0).jumps[0]
     assert wide == pytest.approx([0.0, 3.0 / 0.4 / 3.984, 0.0, -3.0 / 5.6, 0.0], rel=1e-5)
-    narrow = affine_model(dt.parameters(alpha=FADING), 3.0).jump
+    narrow = affine_model(dt.parameters(alpha=FADING), 3.0).jumps[0]
     assert narrow == pytest.approx(wide / np.sqrt(2.0), rel=1e-5)
-    assert not affine_model(dt.parameters(alpha=0.0), 3.0).jump.any()
+    assert not affine_model(dt.parameters(alpha=0.0), 3.0).jumps.any()
 
 
 def test_blurred_flanks_change_what_is_expected() -> None:

@@ -10,20 +10,21 @@ import pytest
 
 import orchestrator as oc
 from orchestrator.building.translation.kernel_arrays import plain_array
-from orchestrator.building.translation.kernels import Kernels
 from orchestrator.cli import main
+from orchestrator.estimation.filter.innovations import KERNELS, _arrays
+from orchestrator.estimation.filter.model import row_model
+from orchestrator.estimation.likelihood import delay
+from orchestrator.estimation.problem import OFFSET
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.estimation.stages.fit import fit_stages, look_nearby, move_share
 from orchestrator.estimation.stages.likelihood import StagesLikelihood
 from orchestrator.estimation.stages.location import locate
-from orchestrator.estimation.stages.motion import VALUES
-from orchestrator.estimation.stages.problem import OFFSET, SHARE, TOTAL, make_problem
+from orchestrator.estimation.stages.problem import SHARE, TOTAL, make_problem
 from orchestrator.records.record import record_from_columns
 from tests.support.independent_plant import write_csv
 from tests.support.two_stage_record import FRICTION, NOMINAL, make_two_stage_record
 
-KERNEL = Kernels("orchestrator.estimation.stages.kernel")
-STEP, HALVES = 1e-3, (0.01, 0.004)
+STEP, HALVES, LAG = 1e-3, (0.01, 0.004), 5e-3
 MODEL = 'fmu = "TwoStageTrain"\n[parameters.J_s]\nvalue = {}\n'
 
 
@@ -35,18 +36,15 @@ def model_of(folder, share, more=""):
 
 def train():
     """Return the arrays that ``propagate`` takes, of the nominal train with a gap in both stages."""
-    p = np.array([NOMINAL[name] for name in VALUES])
-    mats, b_u, b_1, normals = np.empty((9, 6, 6)), np.empty((2, 6)), np.empty((9, 6)), np.empty((2, 6))
-    KERNEL.fill_modes(p, np.array(HALVES), mats, b_u, b_1, normals)
-    phi, gain_u, gain_1 = np.empty((9, 6, 6)), np.empty((9, 2, 6)), np.empty((9, 6))
-    for mode in range(9):
-        KERNEL.transition(mats[mode], b_u, b_1[mode], STEP, phi[mode], gain_u[mode], gain_1[mode])
-    return mats, b_u, b_1, normals, np.array(HALVES), phi, gain_u, gain_1
+    inertias, drags = (np.array([NOMINAL[f"{n}_{body}"] for body in "msl"]) for n in "Jb")
+    ratios, stiffnesses, dampings = (np.array([NOMINAL[f"{n}_{stage}"] for stage in (1, 2)]) for n in "ikc")
+    model = row_model(inertias, drags, ratios, stiffnesses, dampings, LAG, np.array(HALVES), np.zeros((2, 2)))
+    return _arrays(model, STEP)
 
 
 def advanced(arrays, x):
-    x, total, end = x.copy(), np.empty((6, 6)), np.empty(6)
-    KERNEL.propagate(*arrays, STEP, 20.0, -2.0, x, total, end)
+    x, total, end = x.copy(), np.empty((7, 7)), np.empty(7)
+    KERNELS[2].propagate(*arrays, STEP, np.array([30.0, -1.0, -2.0]), x, total, end)
     return x, total
 
 
@@ -54,7 +52,7 @@ def state(first, second, fast, middle, slow):
     """Return a state by its twists in half-gaps and its speeds of motor, intermediate shaft and load."""
     load = 0.2
     shaft = NOMINAL["i_2"] * (load + second * HALVES[1])
-    return np.array([NOMINAL["i_1"] * (shaft + first * HALVES[0]), fast, shaft, middle, load, slow])
+    return np.array([NOMINAL["i_1"] * (shaft + first * HALVES[0]), fast, shaft, middle, load, slow, 21.0])
 
 
 # Floats in both gaps; meets in stage 1; meets in stage 2; parts in stage 1; both stages change flank.
@@ -68,9 +66,9 @@ def state(first, second, fast, middle, slow):
 def test_the_step_of_both_stages_has_its_jacobian_and_is_that_of_small_steps(x):
     arrays = train()
     after, jacobian = advanced(arrays, x)
-    numeric = np.empty((6, 6))
-    for n, size in enumerate((1e-8, 1e-6) * 3):
-        shift = size * np.eye(6)[n]
+    numeric = np.empty((7, 7))
+    for n, size in enumerate((*(1e-8, 1e-6) * 3, 1e-3)):
+        shift = size * np.eye(7)[n]
         numeric[:, n] = (advanced(arrays, x + shift)[0] - advanced(arrays, x - shift)[0]) / (2.0 * size)
     np.testing.assert_allclose(jacobian, numeric, rtol=1e-4, atol=1e-4 * np.abs(numeric).max())
     y, parts = x.copy(), 20_000
@@ -85,9 +83,10 @@ def test_the_step_of_both_stages_has_its_jacobian_and_is_that_of_small_steps(x):
             ):
                 torques.append(k * (d - math.copysign(half, d)) + c * w if abs(d) > half else 0.0)
             return np.array([
-                z[1], (20.0 - torques[0] / p["i_1"] - p["b_m"] * z[1]) / p["J_m"],
+                z[1], (z[6] - 1.0 - torques[0] / p["i_1"] - p["b_m"] * z[1]) / p["J_m"],
                 z[3], (torques[0] - torques[1] / p["i_2"] - p["b_s"] * z[3]) / p["J_s"],
                 z[5], (torques[1] - 2.0 - p["b_l"] * z[5]) / p["J_l"],
+                (30.0 - z[6]) / LAG,
             ])  # fmt: skip
 
         h = STEP / parts
@@ -95,19 +94,11 @@ def test_the_step_of_both_stages_has_its_jacobian_and_is_that_of_small_steps(x):
     np.testing.assert_allclose(after, y, rtol=0, atol=2e-5 * np.abs(y - x).max() + 1e-7)
 
 
-def test_the_mean_torque_of_a_late_drive_is_its_integral():
-    rng = np.random.default_rng(0)
-    u, tau, start, late, fine = rng.normal(size=40), 4e-3, 1.0, 2.3e-3, 500
-    torque, impulse, means = np.empty(41), np.empty(41), np.empty(40)
-    KERNEL.fill_torque(u, tau, start, late, STEP, torque, impulse, means)
-    h = STEP / fine
-    level, before, levels = start, round(late / h), []
-    for k in range(40 * fine):
-        asked = u[(k - before) // fine] if k >= before else None
-        middle = level if asked is None else asked + (level - asked) * math.exp(-0.5 * h / tau)
-        levels.append(middle)
-        level = level if asked is None else asked + (level - asked) * math.exp(-h / tau)
-    np.testing.assert_allclose(means, np.mean(np.reshape(levels, (40, fine)), axis=1), atol=1e-5)
+def test_a_late_torque_is_the_held_one_moved():
+    u = np.array([1.0, -2.0, 4.0, 0.0, 3.0])
+    np.testing.assert_allclose(delay(u, STEP, 2.0 * STEP), [1.0, 1.0, 1.0, -2.0, 4.0])
+    np.testing.assert_allclose(delay(u, STEP, -STEP), [-2.0, 4.0, 0.0, 3.0, 3.0])
+    np.testing.assert_allclose(delay(u, STEP, 0.25 * STEP), 0.25 * delay(u, STEP, STEP) + 0.75 * u)
 
 
 def likelihood_of(folder, effects, seed, share, **given):
@@ -138,34 +129,30 @@ def test_at_the_truth_the_innovations_are_white(tmp_path):
     assert likelihood.at(moved).deviance > likelihood.at(theta).deviance + 100.0
 
 
-def test_the_kernel_in_machine_code_has_the_bits_of_plain_python(tmp_path):
+def test_the_kernel_in_machine_code_has_the_bits_of_plain_python(tmp_path, monkeypatch):
     likelihood, _ = likelihood_of(tmp_path, {"alpha_1": 0.004} | FRICTION, 5, 0.2, duration=0.2)
     theta = likelihood.problem.start
     theta[likelihood.problem.index(TOTAL)] = 0.003
     fast = likelihood.run(theta)
-    calls = []
+    calls, kernels = [], KERNELS[2]
 
     class Recorder:
         def __getattr__(self, name):
             def call(*values):
                 calls.append((name, values))
-                return getattr(KERNEL, name)(*values)
+                return getattr(kernels, name)(*values)
 
             return call
 
-    from orchestrator.estimation.stages import likelihood as room
-
-    kept, room.KERNEL = room.KERNEL, Recorder()
-    try:
-        likelihood.run(theta)
-    finally:
-        room.KERNEL = kept
+    monkeypatch.setitem(KERNELS, 2, Recorder())
+    likelihood.run(theta)
+    monkeypatch.undo()
     name, values = calls[-1]
     assert name == "run_filter"
     plain = [plain_array(v) if isinstance(v, np.ndarray) else v for v in values]
-    KERNEL.python.run_filter(*plain)
-    assert plain[10].tolist() == fast.errors.ravel().tolist()
-    assert plain[11].tolist() == fast.variances.ravel().tolist()
+    KERNELS[2].python.run_filter(*plain)
+    assert plain[-5].tolist() == fast.errors.ravel().tolist()
+    assert plain[-4].tolist() == fast.variances.ravel().tolist()
 
 
 @pytest.mark.parametrize(

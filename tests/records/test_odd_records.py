@@ -10,7 +10,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.model_file import read_model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Column, Reading, Record, read_record, record_from_columns
-from tests.support.independent_plant import make_record
+from tests.support.independent_plant import NOMINAL, make_record
 
 Table = dict[str, np.ndarray]
 
@@ -116,3 +116,20 @@ def test_a_rate_in_place_of_stamps_of_any_kind(table: Table, tmp_path: Path) -> 
     with pytest.raises(RecordError, match=r"say `\[columns.time\] rate"):
         read_record(tmp_path / "log.csv")
     assert read_record(tmp_path / "log.csv", {"time": Column(rate=200.0)}).step == pytest.approx(5e-3)
+
+
+def test_a_heavy_load_behind_a_soft_shaft_follows_the_motor_where_it_is_slow(tmp_path: Path) -> None:
+    soft = NOMINAL | {"J_l": 200.0, "k": 5000.0, "tau": 0.02}
+    columns, _ = make_record({}, 5, 20.0, mismatch=0.0, nominal=soft, torque=8.0)
+    assert np.corrcoef(columns["theta_m"], columns["theta_l"])[0, 1] < 0.95
+    path = tmp_path / "model.toml"
+    path.write_text("".join(f"[parameters.{name}]\nvalue = {value}\n" for name, value in soft.items()))
+    check_plausible(record_from_columns(columns, "soft"), read_model(path))
+    wandering = np.cumsum(np.random.default_rng(1).normal(size=columns["time"].size)) * 0.02
+    for wrong, said in (
+        (-columns["theta_l"], "falls"),
+        (57.3 * columns["theta_l"], "degrees"),
+        (wandering, "foll"),
+    ):
+        with pytest.raises(RecordError, match=said):
+            check_plausible(record_from_columns(columns | {"theta_l": wrong}, "wrong"), read_model(path))

@@ -1,8 +1,8 @@
 """Kernels in machine code: translated, compiled and loaded at their first call.
 
-``Kernels("orchestrator.estimation.kernel").run_free(...)`` calls the kernel ``run_free`` of that module. Its library is
-that of the installation, else one that the user's cache keeps, else it is made there now. Arithmetic is that of
-IEEE 754 in double precision without any shortcut (``machine_code.FLAGS``), so that all machines with the same
+``Kernels("orchestrator.estimation.filter.kernel").run_free(...)`` calls the kernel ``run_free`` of that module. Its
+library is that of the installation, else one that the user's cache keeps, else it is made there now. Arithmetic is
+that of IEEE 754 in double precision without any shortcut (``machine_code.FLAGS``), so that all machines with the same
 elementary functions compute the same bits, as plain Python does.
 """
 

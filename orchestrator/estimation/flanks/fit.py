@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.flanks.chain import STATES
 from orchestrator.estimation.flanks.points import Points
-from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.settings import FlankSettings
 
 CHAIN = Kernels("orchestrator.estimation.flanks.chain")

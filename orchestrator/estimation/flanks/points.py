@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.records.arrays import runs_of
 from orchestrator.records.record import Record, quantisation_step
 

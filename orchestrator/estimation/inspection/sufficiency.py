@@ -8,7 +8,8 @@ import numpy as np
 
 from orchestrator.errors import RecordError
 from orchestrator.estimation.design import Excitation, MachineLimits, error_bound_of_excitation, simple_candidates
-from orchestrator.estimation.innovations import affine_model, simulate
+from orchestrator.estimation.filter.innovations import simulate
+from orchestrator.estimation.filter.model import affine_model
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.plants.known.two_stage_train import TRAIN

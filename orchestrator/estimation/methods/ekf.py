@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.building.translation.kernels import Kernels
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
 from orchestrator.records.model_file import Model

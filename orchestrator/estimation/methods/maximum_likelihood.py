@@ -18,7 +18,7 @@ import numpy as np
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import describe, describe_unfinished
 from orchestrator.estimation.effort import Effort, Stop, StoppedError, never
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
 from orchestrator.estimation.problem import (
@@ -117,7 +117,7 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit
     """Return the fit that starts from that of the beginning; None where the beginning does not show the gap."""
     first = fit_record(short)
     short = first.likelihood
-    flanks = short.run(first.point.theta, keep=True).contacts
+    flanks = short.run(first.point.theta, keep=True).contacts[:, 0]
     flanks = flanks[flanks != 0]
     if np.count_nonzero(np.diff(flanks)) < likelihood.settings.fit.enough_traversals:
         return None

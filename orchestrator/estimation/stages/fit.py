@@ -15,7 +15,7 @@ import numpy as np
 
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import block_variance
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import Fit, Point, inverse, maximise
 from orchestrator.estimation.settings import StageSettings
 from orchestrator.estimation.stages.likelihood import StagesLikelihood

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.description import autocorrelation, block_variance, block_variance_along
-from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.settings import StageSettings
 from orchestrator.estimation.stages.fit import GRID, StageFits, StagesFit
-from orchestrator.estimation.stages.problem import BODIES, SHARE, TOTAL
+from orchestrator.estimation.stages.problem import BODIES, OFFSET, SHARE, TOTAL
 from orchestrator.shared.inference.normal import NORMAL_95
 
 FIRST, SECOND, BOTH = "1", "2", "both"
@@ -99,7 +99,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         absent = 1 if answers[0] == FIRST else 0
         stages[absent] = StageGap(0.0, (0.0, _most(fits.free, absent, wider[answers[0]])))
     kept = best.likelihood.run(best.point.theta, keep=True)
-    traversals = _changes(kept.contacts // 3) + _changes(kept.contacts % 3)
+    traversals = sum(_changes(flanks) for flanks in kept.contacts.T)
     if not _total(best, settings.misfit_widening**2).interval[0] > 0.0 or traversals == 0:
         answers = []
     white = kept.errors / np.sqrt(kept.variances)
@@ -132,7 +132,7 @@ def _possible_answers(behind: dict[str, float], share: float, settings: StageSet
 
 
 def _changes(flanks: NDArray[np.int64]) -> int:
-    touched = flanks[flanks != 1]
+    touched = flanks[flanks != 0]
     return int(np.count_nonzero(np.diff(touched)))
 
 
@@ -230,7 +230,7 @@ def _curves(fit: StagesFit, states: Array, contacts: NDArray[np.int64], errors: 
     """Return twists [rad] and flanks (-1, 0, 1) of both stages, and one-step errors [rad], each (n,)."""
     p = fit.likelihood.parameters(fit.point.theta)
     record = fit.likelihood.problem.record
-    offset = fit.likelihood.value(fit.point.theta, "zero_of_load")
+    offset = fit.likelihood.value(fit.point.theta, OFFSET)
     curves: dict[str, Any] = {
         "time": record.time,
         "u": record.u,
@@ -240,8 +240,8 @@ def _curves(fit: StagesFit, states: Array, contacts: NDArray[np.int64], errors: 
         "theta_l_fitted": states[:, 4] + offset,
         "twist_1": states[:, 0] / p["i_1"] - states[:, 2],
         "twist_2": states[:, 2] / p["i_2"] - states[:, 4],
-        "contact_1": contacts // 3 - 1.0,
-        "contact_2": contacts % 3 - 1.0,
+        "contact_1": contacts[:, 0].astype(float),
+        "contact_2": contacts[:, 1].astype(float),
         "one_step_error_m": errors[:, 0],
         "one_step_error_l": errors[:, 1],
     }

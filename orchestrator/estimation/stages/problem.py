@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.estimation.problem import (
+    OFFSET,
     OFFSET_SPREAD,
     Unknown,
     UnknownProblem,
@@ -13,7 +14,8 @@ from orchestrator.estimation.problem import (
     first_line,
     measurement_noise,
     parameter_unknowns,
-    scale_unknowns,
+    sliding_speeds,
+    torque_unknowns,
 )
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -22,9 +24,6 @@ from orchestrator.shared.inference.noise import rms_behind_lag
 GAPS = ("alpha_1", "alpha_2")
 TOTAL = "alpha_total"  # both half-gaps, seen from the load: alpha_1 / i_2 + alpha_2
 SHARE = "share"  # of the second stage in it
-OFFSET = "zero_of_load"
-LATE = "torque_late"
-DRY = ("friction_motor", "friction_load")
 TWIST = "twist_1_start"
 TORQUE = "T_m_start"
 BODIES = ("motor", "middle", "load")
@@ -34,7 +33,6 @@ LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-5, 30.0
 # At the intermediate shaft, over the drive's torque [s^0.5]: nothing but the friction of its bearings is unknown there.
 # With more, a fit far from any optimum takes its whole motion for noise.
 LARGEST_AT_SHAFT = 1.5e-3
-LATE_DEVIATION = 3e-3  # s, of the torque, before anything is known
 TWIST_DEVIATION = 0.03  # rad, of stage 1 at the first row
 SPEED_DEVIATIONS = (3.0, 1.0)  # rad/s of motor and load at the first row
 
@@ -65,12 +63,10 @@ def make_problem(record: Record, model: Model) -> StagesProblem:
         Unknown(TOTAL, 0.0, math.inf, 1e-3, 0.0, 3.0),
         Unknown(SHARE, 0.5, math.inf, 0.1, 0.0, 1.0),
         Unknown(OFFSET, _zero_of_load(record, base["i_1"] * base["i_2"]), OFFSET_SPREAD, 1e-3),
-        Unknown(LATE, 0.0, LATE_DEVIATION, 1e-4, -10.0 * LATE_DEVIATION, 10.0 * LATE_DEVIATION),
-        *(Unknown(name, 0.0, 0.3 * unit, 0.01 * unit, 0.0, unit) for name, unit in zip(DRY, units[::2], strict=True)),
         Unknown(TWIST, 0.0, TWIST_DEVIATION, 1e-3),
         Unknown(TORQUE, 0.0, 3.0 * rms, 0.01 * rms),
     ]
-    unknowns += scale_unknowns(record)
+    unknowns += torque_unknowns(record, base["tau"], base["i_1"] * base["i_2"])
     unknowns += (encoder_unknown(record, model, name, measurement_noise(record, model, name)) for name in ENCODERS)
     for body, unit in zip(BODIES, units, strict=True):
         low, high = (math.log(unit / rms * level) for level in (LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE))
@@ -79,7 +75,8 @@ def make_problem(record: Record, model: Model) -> StagesProblem:
     speeds = [first_line(record.time, angles) for angles in (record.theta_m, record.theta_l)]
     first = (speeds[0][1], speeds[0][0], speeds[1][1], speeds[1][0])
     outputs = np.column_stack([record.theta_m, record.theta_l])
-    return StagesProblem(record, tuple(unknowns), outputs, base, first, units)
+    sliding = sliding_speeds(record, base["i_1"] * base["i_2"])
+    return StagesProblem(record, tuple(unknowns), outputs, sliding, base, first, units)
 
 
 def _zero_of_load(record: Record, ratio: float) -> float:

@@ -1,0 +1,1 @@
+"""One filter for drivetrains of any number of gaps in a row: kernel, its sizes for each plant, models, innovations."""
