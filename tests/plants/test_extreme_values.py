@@ -83,9 +83,17 @@ def work(monkeypatch):
     return count
 
 
-@pytest.mark.parametrize("model", range(1, 7))
-@pytest.mark.parametrize("torque", [1.0, 1e12])
-@pytest.mark.parametrize("values", EXTREMES, ids="-".join)
+# Half of them hold every pair of values, torque and model; the whole runs at night.
+CASES = [
+    pytest.param(
+        values, torque, model, id=f"{'-'.join(values)}-{torque:g}-{model}",
+        marks=[pytest.mark.night] if (k + n + model) % 2 else [],
+    )
+    for k, values in enumerate(EXTREMES) for n, torque in enumerate((1.0, 1e12)) for model in range(1, 7)
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("values", "torque", "model"), CASES)
 def test_a_drivetrain_of_extreme_values_ends_or_says_why_not(values, torque, model, work):
     said = stepped(Drivetrain(instance_name="a"), values, {"u": torque, "T_l": 0.0}, model)
     assert all(any(reason in text for reason in REASONS) for text in said), said
