@@ -35,7 +35,6 @@ def require_linear(model: Model) -> None:
         active = name.startswith("effects.") and name.rsplit(".", 1)[1] in (
             "delay", "amplitude", "coulomb", "breakaway", "cubic", "coefficient", "inertia"
         )  # fmt: skip
-        active = active or (name.startswith("effects.coulomb") and name.endswith("torque"))
         if active and (entry.value != 0.0 or entry.uncertainty > 0.0):
             raise ScenarioError(
                 f"{model.source}: `estimate` fits the plant without nonlinear effects, but `{name}` is "

@@ -111,14 +111,14 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     """
     both = record.theta_l is not None
     outputs = record.theta_m[:, None] if record.theta_l is None else np.column_stack([record.theta_m, record.theta_l])
-    unknowns = parameter_unknowns(model, {ALPHA} if both else {ALPHA, "i"})
+    unknowns = parameter_unknowns(model, {ALPHA, OFFSET, *DRY} if both else {ALPHA, OFFSET, *DRY, "i"})
     ratio = model.parameters["i"].value
     unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
     if both:
         unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
     damping = model.parameters["c"].value
     unknowns.append(Unknown(IMPULSE, 0.0, 0.5 * IMPULSE_DEPTH * damping, 0.5 * IMPULSE_DEPTH * damping))
-    unknowns += torque_unknowns(record, model.parameters["tau"].value, ratio)
+    unknowns += torque_unknowns(record, model, model.parameters["tau"].value, ratio)
     if record.u_sampled is not None:
         unknowns.append(Unknown(SAMPLED, 0.0, math.inf, 0.1, 0.0, 1.0))
     units = _torque_units(record, model.parameters["tau"].value, ratio)
@@ -151,8 +151,8 @@ def parameter_unknowns(model: Model, without: Collection[str]) -> list[Unknown]:
     return unknowns
 
 
-def torque_unknowns(record: Record, lag: float, ratio: float) -> list[Unknown]:
-    """Return gain, offset and lateness of the drive's torque, and dry friction of motor and load.
+def torque_unknowns(record: Record, model: Model, lag: float, ratio: float) -> list[Unknown]:
+    """Return gain, offset and lateness of the drive's torque, and dry friction of motor and load about what is stated.
 
     Args:
         lag: of the drive [s].
@@ -167,7 +167,10 @@ def torque_unknowns(record: Record, lag: float, ratio: float) -> list[Unknown]:
         Unknown(LATE, 0.0, LATE_SPREAD, 1e-4, -10.0 * LATE_SPREAD, 10.0 * LATE_SPREAD),
     ]
     for name, unit in zip(DRY, (rms, rms * abs(ratio)), strict=True):
-        unknowns.append(Unknown(name, 0.0, FRICTION_SHARE * unit, 1e-3 * unit, 0.0, unit))
+        own = model.parameters.get(name)
+        mean, deviation = (own.value, own.standard_deviation) if own is not None else (0.0, 0.0)
+        spread = deviation if deviation > 0.0 else FRICTION_SHARE * unit
+        unknowns.append(Unknown(name, mean, spread, 1e-3 * unit, 0.0, unit + 2.0 * mean))
     return unknowns
 
 

@@ -346,7 +346,7 @@ def test_help_says_every_default(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_nonlinear_models_are_sent_to_diagnose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = tmp_path / "model.toml"
-    model.write_text('[parameters."effects.coulomb_friction.motor.torque"]\nvalue = 1.0\n')
+    model.write_text('[parameters."effects.quadratic_drag.coefficient"]\nvalue = 1.0\n')
     assert main(["estimate", "--design", "--model", str(model), "--out", str(tmp_path / "out")]) == 2
     assert "diagnose" in capsys.readouterr().err
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.estimation.problem import (
+    DRY,
     OFFSET,
     OFFSET_SPREAD,
     Unknown,
@@ -56,7 +57,7 @@ def make_problem(record: Record, model: Model) -> StagesProblem:
     """Return the problem of a record, which has torque and both angles, under a model of the train."""
     assert record.theta_l is not None
     base = {name: parameter.value for name, parameter in model.parameters.items()}
-    unknowns = parameter_unknowns(model, GAPS)
+    unknowns = parameter_unknowns(model, {*GAPS, *DRY})
     rms = rms_behind_lag(record.u, record.step, base["tau"])
     units = (rms, rms * abs(base["i_1"]), rms * abs(base["i_1"] * base["i_2"]))
     unknowns += [
@@ -66,7 +67,7 @@ def make_problem(record: Record, model: Model) -> StagesProblem:
         Unknown(TWIST, 0.0, TWIST_DEVIATION, 1e-3),
         Unknown(TORQUE, 0.0, 3.0 * rms, 0.01 * rms),
     ]
-    unknowns += torque_unknowns(record, base["tau"], base["i_1"] * base["i_2"])
+    unknowns += torque_unknowns(record, model, base["tau"], base["i_1"] * base["i_2"])
     unknowns += (encoder_unknown(record, model, name, measurement_noise(record, model, name)) for name in ENCODERS)
     for body, unit in zip(BODIES, units, strict=True):
         low, high = (math.log(unit / rms * level) for level in (LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE))
