@@ -43,6 +43,7 @@ def run_tool(
             try:
                 process.communicate(timeout=_PATIENCE)
             except subprocess.TimeoutExpired:
-                kill_group(process) or process.kill()
+                if not kill_group(process):
+                    process.kill()
             raise
     return subprocess.CompletedProcess(command, process.returncode, out, told)
