@@ -70,6 +70,7 @@ class Loaded:
         notes: what was detected and assumed.
         doubts: readings that failed; see ``Record``.
         torque_raster: step of the torque's own rows [s], where they are rarer than the angles'; else 0.0.
+        load_in_metres: the load is measured by a length; see ``Record``.
         angle_unit: of the load's angles, else of the motor's; see ``Record``.
     """
 
@@ -79,6 +80,7 @@ class Loaded:
     doubts: tuple[str, ...] = ()
     torque_raster: float = 0.0
     angle_unit: str = "rad"
+    load_in_metres: bool = False
 
 
 def load(
@@ -147,7 +149,9 @@ def load(
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
     table, more = make_uniform(table, reading.resample)
     texts = [columns.get(n, Column()).unit or source.heads[chosen[n].place].unit for n in ANGLES_OF if n in chosen]
-    return Loaded(table, labels, (*notes, *more), tuple(doubts), raster, angle_unit(texts))
+    of_load = parse_unit(texts[0], KINDS["theta_l"]) if "theta_l" in chosen else None
+    metric = of_load is not None and of_load.kind in ("length", "velocity")
+    return Loaded(table, labels, (*notes, *more), tuple(doubts), raster, angle_unit(texts), metric)
 
 
 def _unused(source: RecordSource, places: Sequence[int], rasters: Collection[int]) -> list[str]:
