@@ -149,9 +149,20 @@ def load(
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
     table, more = make_uniform(table, reading.resample)
     texts = [columns.get(n, Column()).unit or source.heads[chosen[n].place].unit for n in ANGLES_OF if n in chosen]
-    of_load = parse_unit(texts[0], KINDS["theta_l"]) if "theta_l" in chosen else None
-    metric = of_load is not None and of_load.kind in ("length", "velocity")
-    return Loaded(table, labels, (*notes, *more), tuple(doubts), raster, angle_unit(texts), metric)
+    return Loaded(
+        table,
+        labels,
+        (*notes, *more),
+        tuple(doubts),
+        raster,
+        angle_unit(texts),
+        "theta_l" in chosen and _is_length(texts[0]),
+    )
+
+
+def _is_length(text: str) -> bool:
+    unit = parse_unit(text, KINDS["theta_l"])
+    return unit is not None and unit.kind in ("length", "velocity")
 
 
 def _unused(source: RecordSource, places: Sequence[int], rasters: Collection[int]) -> list[str]:
