@@ -11,11 +11,13 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
 
 import orchestrator as oc
+from orchestrator.control.loops import ControlTask
 from orchestrator.control.measures import bound_time
 from orchestrator.control.take_away import c_files
 from orchestrator.errors import OrchestratorError
@@ -27,7 +29,7 @@ SUBSTEPS = 10
 Array = np.ndarray
 
 
-def draw_machine(rng: np.random.Generator) -> tuple[dict[str, float], dict[str, float], dict[str, object]]:
+def draw_machine(rng: np.random.Generator) -> tuple[dict[str, float], dict[str, float], dict[str, Any]]:
     """Return linear values, effects, and what the record needs: torque limit, noise and counts of the encoders."""
     i, J_m = float(np.exp(rng.uniform(0.0, np.log(100.0)))), float(np.exp(rng.uniform(np.log(1e-4), np.log(10.0))))
     J_l = J_m * i**2 * float(np.exp(rng.uniform(np.log(0.3), np.log(3.0))))
@@ -64,7 +66,7 @@ def move(x: Array, bend: Array, v: Array, requests: Array, substeps: int, h: flo
 class PlainC:
     """The estimator and the compensator as the command wrote them."""
 
-    def __init__(self, folder: Path, task: object) -> None:
+    def __init__(self, folder: Path, task: ControlTask) -> None:
         for name, text in c_files("machine", task).items():
             (folder / name).write_text(text, encoding="utf-8")
         library = folder / f"controller_{time.monotonic_ns()}.so"
@@ -75,7 +77,7 @@ class PlainC:
 
     def sample(self, first: bool, values: tuple[float, ...]) -> float:
         """Return the request [N.m] for angles and reference."""
-        self.inputs[:] = values
+        self.inputs[:] = list(values)
         step = self.library.controller_machine_start if first else self.library.controller_machine_step
         if step(self.inputs, self.outputs):
             raise RuntimeError("the controller failed")

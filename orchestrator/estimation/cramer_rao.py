@@ -31,7 +31,7 @@ def error_bound_of_fit(likelihood: Likelihood, fit: GapFit) -> float:
 def error_bound(
     problem: GapProblem | Sequence[GapProblem],
     values: Mapping[str, float],
-    noise: tuple[float, float],
+    noise: tuple[float, ...],
     torque: float = 1e-8,
     threads: int = 1,
 ) -> float:

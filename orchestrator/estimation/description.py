@@ -162,7 +162,7 @@ def _verdict(alpha: float, low: float, high: float, traversals: int) -> tuple[bo
     return False, "the gap cannot be seen: every size fits the record; `design` proposes an excitation"
 
 
-def stillness_note(outputs: Array, noise: tuple[float, float], settings: GapVerdictSettings) -> str:
+def stillness_note(outputs: Array, noise: tuple[float, ...], settings: GapVerdictSettings) -> str:
     """Return the sentence that says which side does not move beyond its noise, or nothing."""
     sides = (("motor", settings.least_travel_motor), ("load", settings.least_travel_load))
     for n, (name, least) in enumerate(sides[: outputs.shape[1]]):

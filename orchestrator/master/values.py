@@ -29,17 +29,12 @@ def coerce_value(variable: Variable, value: Value) -> tuple[Value | None, str | 
     if kind == "String":
         return (value, None) if isinstance(value, str) else (None, f"must be a string, but is {value!r}")
     if kind == "Boolean":
-        known = {"true": True, "false": False}.get(value) if isinstance(value, str) else value  # a sweep has texts
-        return (known, None) if isinstance(known, bool) else (None, f"must be true or false, but is {value!r}")
+        return (value, None) if isinstance(value, bool) else (None, f"must be true or false, but is {value!r}")
     if kind == "Enumeration" and isinstance(value, str):
         literals = dict(variable.items)
         if value not in literals:
             return None, f"must be one of {', '.join(literals)}, but is {value!r}{nearest(value, list(literals))}"
         return literals[value], None
-    numbers = [number for _, number in variable.items]
-    if kind == "Enumeration" and numbers and value not in numbers:
-        items = ", ".join(f"{name} ({number})" for name, number in variable.items)
-        return None, f"must be the number of an item, {items}, but is {value!r}"
     low, high = variable.minimum, variable.maximum
     widest = (low is None or low >= _INT32[0]) and (high is None or high <= _INT32[1])
     if not _is_number(value, whole=kind != "Real") or (kind != "Real" and widest and not _fits(value)):

@@ -36,7 +36,6 @@ class Record:
         notes: what was detected and assumed, one sentence each.
         doubts: what the rows of the log say of how it was taken, and what was done about it; see ``records.rows``.
         averaged: how many samples of the file went into one of these by ``rate``.
-        load_in_metres: ``theta_l`` is a length [m], as behind a screw.
         angle_unit: in which the file has angles: rad, deg, arcmin or turns; rad where it is another.
         zeros_set: whether the encoders' zeros were brought near each other, by an estimate that may be a little off.
     """
@@ -56,7 +55,6 @@ class Record:
     u_sampled: Array | None = None
     u_raster: float = 0.0
     angle_unit: str = "rad"
-    load_in_metres: bool = False
     zeros_set: bool = False
 
     @property

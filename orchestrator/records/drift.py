@@ -74,12 +74,12 @@ def _drift(step: float, motor: Array, load: Array) -> tuple[float, float]:
     scale = max(float(np.sqrt(np.mean((speed * along)[rows] ** 2))), 1e-300)
     parts = np.array_split(np.arange(rows.size), DRIFT_BLOCKS)
     squares, products = [table[n].T @ table[n] for n in parts], [table[n].T @ load[rows[n]] for n in parts]
-    squares_sum, products_sum = sum(squares), sum(products)
+    squares_sum, products_sum = np.sum(squares, axis=0), np.sum(products, axis=0)
 
     def last(square: Array, product: Array) -> float:
         return float(np.linalg.lstsq(square, product, rcond=1e-12)[0][-1]) / scale
 
-    left_out = [last(squares_sum - a, products_sum - b) for a, b in zip(squares, products, strict=True)]
+    left_out = np.array([last(squares_sum - a, products_sum - b) for a, b in zip(squares, products, strict=True)])
     error = np.sqrt((DRIFT_BLOCKS - 1) / DRIFT_BLOCKS * np.sum((left_out - np.mean(left_out)) ** 2))
     duration = step * (load.size - 1)
     return -2.0 * last(squares_sum, products_sum) / duration, 2.0 * float(error) / duration

@@ -70,7 +70,6 @@ class Loaded:
         notes: what was detected and assumed.
         doubts: readings that failed; see ``Record``.
         torque_raster: step of the torque's own rows [s], where they are rarer than the angles'; else 0.0.
-        load_in_metres: the load is measured by a length; see ``Record``.
         angle_unit: of the load's angles, else of the motor's; see ``Record``.
     """
 
@@ -80,7 +79,6 @@ class Loaded:
     doubts: tuple[str, ...] = ()
     torque_raster: float = 0.0
     angle_unit: str = "rad"
-    load_in_metres: bool = False
 
 
 def load(
@@ -121,8 +119,10 @@ def load(
             if head.raster != source.heads[motor].raster:
                 own[name] = read_own_time(source, place, clock, columns.get("time", Column()), motor, path)
             rows = own.get(name, clock.time)
-            raw, failed = _drop_failed(take(place), name, columns.get(name, Column()), labels[name])
-            doubts += failed
+            raw, failed = take(place), np.zeros(0, dtype=np.int64)
+            if name != "u" and (named := columns.get(name, Column())).modulo is None and named.sign_bit is None:
+                raw, failed = drop_failed_readings(raw)  # else they look like an angle that starts again
+            doubts += [describe_failed(failed, labels[name])] if failed.size else []
             table[name], said = _convert(name, raw, columns.get(name, Column()), head.unit, labels[name], path, rows)
             units.append(said)
     for name, place in extra.items():
@@ -135,8 +135,10 @@ def load(
         *more,
     ]
     drive = columns.get("u", Column())
-    driven = parse_unit(drive.unit or source.heads[chosen["u"].place].unit, KINDS["u"]) if "u" in chosen else None
-    if driven is not None and driven.kind == "voltage":
+    unit = None
+    if "u" in chosen:
+        unit = parse_unit(drive.unit or source.heads[chosen["u"].place].unit, KINDS["u"])
+    if unit is not None and unit.kind == "voltage":
         for name in ("u", SAMPLED):
             if name in table:
                 table[name] = torque_of_voltage(table[name], table["theta_m"], table["time"], drive)
@@ -144,23 +146,8 @@ def load(
     if "u" not in chosen:
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
     table, more = make_uniform(table, reading.resample)
-    unit, metric = _load_unit(source, columns, chosen)
-    return Loaded(table, labels, (*notes, *more), tuple(doubts), raster, unit, metric)
-
-
-def _drop_failed(raw: Array, name: str, column: Column, label: str) -> tuple[Array, list[str]]:
-    """Return an angle without readings that failed, which look like an angle that starts again, and what was done."""
-    if name == "u" or column.modulo is not None or column.sign_bit is not None:
-        return raw, []
-    raw, failed = drop_failed_readings(raw)
-    return raw, [describe_failed(failed, label)] if failed.size else []
-
-
-def _load_unit(source: RecordSource, columns: Mapping[str, Column], chosen: Mapping[str, Choice]) -> tuple[str, bool]:
-    """Return the unit of the file's angles, and whether the load is measured by a length."""
     texts = [columns.get(n, Column()).unit or source.heads[chosen[n].place].unit for n in ANGLES_OF if n in chosen]
-    unit = parse_unit(texts[0], KINDS["theta_l"]) if "theta_l" in chosen else None
-    return angle_unit(texts), unit is not None and unit.kind in ("length", "velocity")
+    return Loaded(table, labels, (*notes, *more), tuple(doubts), raster, angle_unit(texts))
 
 
 def _unused(source: RecordSource, places: Sequence[int], rasters: Collection[int]) -> list[str]:

@@ -32,13 +32,6 @@ def check_plausible(record: Record, model: Model) -> None:
     """Refuse a record of one stage or two whose units, signs or columns cannot be what the format demands."""
     if model.fmu not in ("Drivetrain", "TwoStageTrain"):
         return
-    if record.load_in_metres:
-        raise RecordError(
-            f"{record.source}: column `theta_l` must be an angle for a {model.fmu}, whose half-gap is one, but is a "
-            'length: take the screw\'s angle for it by `[columns.theta_l] unit = "rad"` and `factor` = 2 pi over the '
-            "lead (in the file's unit), and state `i`, `J_l`, `k`, `c` and `b_l` at the screw; a half-gap in rad times "
-            "the lead over 2 pi is the one along the screw"
-        )
     record = record.fill_missing()
     parameters = _of_one_stage({name: entry.value for name, entry in model.parameters.items()})
     if record.theta_l is not None:

@@ -56,9 +56,7 @@ def read_record(
     if "u" in loaded.table:
         check_driven(loaded.table["u"], loaded.labels["u"], path.name)
     record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform", reading.holes)
-    record = replace(
-        record, u_raster=loaded.torque_raster, angle_unit=loaded.angle_unit, load_in_metres=loaded.load_in_metres
-    )
+    record = replace(record, u_raster=loaded.torque_raster, angle_unit=loaded.angle_unit)
     span = motion_span(interpolate_missing(record.theta_m), record.time)
     if span is not None:
         start, end = span

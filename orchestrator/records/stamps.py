@@ -16,14 +16,12 @@ _HALF = r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\.?)?"
 _HOUR = r"(?P<hour>\d\d?):(?P<minute>\d\d)"
 _TIME = rf"[T _]+{_HOUR}(?:{_SECOND})?{_HALF}"
 _ISO = re.compile(
-    rf"(?P<year>\d{{4}})(?P<mark>[-/])(?P<month>\d\d?)(?P=mark)(?P<day>\d\d?){_TIME}(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
+    rf"(?P<year>\d{{4}})(?P<mark>[-/])(?P<month>\d\d?)(?P=mark)(?P<day>\d\d?){_TIME}(?P<zone>Z|[+-]\d\d:?\d\d)?"
 )
 _GERMAN = re.compile(rf"(?P<day>\d\d?)\.(?P<month>\d\d?)\.(?P<year>\d{{4}}){_TIME}")
 _SLASHES = re.compile(rf"(?P<date>\d\d?/\d\d?/\d{{4}}){_TIME}")  # day or month first: nobody knows
-_MATLAB = re.compile(rf"(?P<day>\d\d?)-(?P<month>[A-Z][a-z]{{2}})-(?P<year>\d{{4}}){_TIME}")
-MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _CLOCK = re.compile(rf"{_HOUR}{_SECOND}{_HALF}")
-_PATTERNS = (_ISO, _GERMAN, _MATLAB, _SLASHES, _CLOCK)
+_PATTERNS = (_ISO, _GERMAN, _SLASHES, _CLOCK)
 DAY = 86_400 * 10**9  # ns
 _NO_TIME = np.datetime64("NaT", "ns").astype(np.int64)
 
@@ -92,7 +90,7 @@ class StampReader:
         value += self._midnight(found)
         zone = found["zone"] if self._pattern is _ISO else None
         if zone and zone != "Z":
-            digits = zone[1:].replace(":", "").ljust(4, "0")
+            digits = zone[1:].replace(":", "")
             away = (int(digits[:2]) * 60 + int(digits[2:])) * 60 * 10**9
             value -= away if zone[0] == "+" else -away
         return value
@@ -112,8 +110,7 @@ class StampReader:
 
     def _midnight(self, match: re.Match[str]) -> int:
         """Return when the day of a date begins [ns]."""
-        month = match["month"]
-        key = match["year"], str(MONTHS.index(month) + 1) if month in MONTHS else month, match["day"]
+        key = match["year"], match["month"], match["day"]
         if key not in self._days:
             try:
                 day = np.datetime64(f"{key[0]}-{int(key[1]):02d}-{int(key[2]):02d}", "ns")

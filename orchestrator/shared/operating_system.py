@@ -27,7 +27,6 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 try:
     import resource as _resource
@@ -117,7 +116,7 @@ def set_limits(limits: Mapping[str, int]) -> None:
             _resource.setrlimit(which, (most, most))
 
 
-def kill_group(process: "subprocess.Popen[Any]") -> bool:
+def kill_group(process: "subprocess.Popen[bytes] | subprocess.Popen[str]") -> bool:
     """Kill the process group that a child leads; tell whether anything was in it."""
     if not hasattr(os, "killpg"):
         return False

@@ -1,18 +1,14 @@
 """Signs of torque and angles are told before any fit, in position loops with dry friction and over small travel too."""
 
 from contextlib import nullcontext
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orchestrator.api.diagnose import diagnose
-from orchestrator.api.estimate import estimate
 from orchestrator.errors import RecordError
-from orchestrator.records.columns import Column
 from orchestrator.records.model_file import default_model
 from orchestrator.records.plausibility import _check_directions, check_plausible
-from orchestrator.records.record import Record, read_record, record_from_columns
+from orchestrator.records.record import Record, record_from_columns
 from tests.support.independent_plant import make_record
 
 MODEL = default_model()
@@ -57,20 +53,3 @@ def test_a_load_that_swings_against_the_motor_is_no_wrong_sign() -> None:
         _check_directions(record, record.theta_l, p)
         with pytest.raises(RecordError, match="must grow with `theta_m`, but falls") if slow else nullcontext():
             _check_directions(record, -record.theta_l, p)
-
-
-def test_a_load_behind_a_screw_is_refused_and_the_cure_gives_its_gap(tmp_path: Path) -> None:
-    """A lead of 10 mm: what was told in rad was a length."""
-    log, _ = make_record({"alpha": 0.01}, 5, 6.0, 500.0, counts=None, substeps=30)
-    lead, path = 10.0, tmp_path / "log.csv"
-    rows = np.column_stack([log["time"], log["u"], log["theta_m"], log["theta_l"] * lead / (2.0 * np.pi)])
-    np.savetxt(path, rows, delimiter=",", header="time [s],u [Nm],theta_m [rad],x_l [mm]", comments="", fmt="%.9g")
-    in_length = read_record(path, {"theta_l": Column(name="x_l")})
-    for wrong in (lambda: estimate(in_length), lambda: diagnose(in_length)):
-        with pytest.raises(
-            RecordError, match="must be an angle for a Drivetrain, whose half-gap is one, but is a length"
-        ):
-            wrong()
-    cured = read_record(path, {"theta_l": Column(name="x_l", unit="rad", factor=2.0 * np.pi / lead)})
-    found = estimate(cured, diagnose=False)
-    assert found.alpha * lead / (2.0 * np.pi) == pytest.approx(0.01 * lead / (2.0 * np.pi), rel=0.03)

@@ -51,7 +51,7 @@ class Surroundings:
     def _handler(self, number: int) -> str:
         action = (ctypes.c_char * _ACTION)()
         self._library.sigaction(number, None, action)
-        return bytes(action[:8]).hex()
+        return action.raw[:8].hex()
 
     def _environment(self) -> Mapping[str, str]:
         entries = ctypes.POINTER(ctypes.c_char_p).in_dll(self._library, "environ")

@@ -216,12 +216,13 @@ class _Round:
         """Return the result with what each effect of the final model gains there, and its family."""
         for label in result.final.labels:
             others = self.has - {label}
-            if self.fit(others) is None:
-                self.fits[others] = fit_model(self.problem, result.final.point.without_effects([label]), 0)
+            known = self.fit(others)
+            if known is None:
+                known = self.fits[others] = fit_model(self.problem, result.final.point.without_effects([label]), 0)
             rivals = [one for one in self.ranked if others < one and len(one) == len(self.has) and one != self.has]
             for subset in rivals[:RIVALS]:
                 self.fit(subset)
-            step = SearchStep(self.fits[others], self.tried(others), label)
+            step = SearchStep(known, self.tried(others), label)
             result = replace(result, reviews={**result.reviews, label: replace(step, family=self._family(step))})
         return result
 

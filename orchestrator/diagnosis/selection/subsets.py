@@ -50,7 +50,7 @@ class Score:
     def of(problem: FitProblem, settings: SelectionSettings) -> "Score":
         """Return the score for the whitening of a problem."""
         weights = np.concatenate([whitening.active.ravel() for whitening in problem.whitenings])
-        rows = np.bincount(problem.blocks, weights**2)
+        rows = np.bincount(problem.blocks, weights**2).astype(float)
         odds = -float(np.log(settings.effect_probability / (1.0 - settings.effect_probability)))
         most = 2.0 * odds / max(settings.least_gain, 1e-9)
         return Score(problem, rows, max(problem.overdispersion, float(rows.sum()) / most), settings)
@@ -91,7 +91,8 @@ class Neighbours:
         prior, slopes = self.problem.prior(point, reference.coordinates)
         self._matrix = [residual, *(reference.jacobian[:, n] for n in own)]
         self._prior, self._slopes = [0.0, *prior[own]], [0.0, *slopes[own]]
-        self._base, self.effects = list(range(1, 1 + len(own))), {}
+        self._base = list(range(1, 1 + len(own)))
+        self.effects: dict[str, _Columns] = {}
         for label in reference.labels:
             places = [n for n, one in enumerate(reference.coordinates) if not isinstance(one, int) and one[0] == label]
             (gone,) = self.problem.whiten_residuals([point.without_effects([label])])
@@ -101,15 +102,15 @@ class Neighbours:
         for screened in Screening(self.problem, reference).screen(others):
             effect = self.problem.effects[screened.label]
             start = point.with_effect(effect.label, screened.values)
-            places = [(effect.label, n) for n in effect.fitted]
+            moved = [(effect.label, n) for n in effect.fitted]
             (there,) = self.problem.whiten_residuals([start])
             if not np.isfinite(there).all():
                 continue
             try:
-                jacobian = self.problem.jacobian(start, places, there)
+                jacobian = self.problem.jacobian(start, moved, there)
             except np.linalg.LinAlgError:  # the machine runs away with it
                 continue
-            self._add(effect.label, screened.values, there - residual, jacobian, *self.problem.prior(start, places))
+            self._add(effect.label, screened.values, there - residual, jacobian, *self.problem.prior(start, moved))
         whole = np.column_stack(self._matrix)
         parts = (whole[self.problem.blocks == block] for block in range(self.problem.block_count))
         self._products = np.array([part.T @ part for part in parts])
@@ -183,8 +184,8 @@ class Neighbours:
         def leading(count: int) -> list[str]:
             best = dict.fromkeys(self.effects, -np.inf)
             for subset, fit in found.items():
-                for label in subset if fit is not None else ():
-                    best[label] = max(best[label], fit[0])
+                if fit is not None:
+                    best |= {label: max(best[label], fit[0]) for label in subset}
             return sorted(best, key=lambda label: -best[label])[:count]
 
         look([frozenset(), reference, *(frozenset({label}) for label in self.effects)])

@@ -115,7 +115,8 @@ def fields_table(
         of: the class of the items, where there may be none.
     """
     structs = list(items.values()) if isinstance(items, Mapping) else list(items)
-    told = displays(of or type(structs[0]))
+    kind: type[msgspec.Struct] = of or type(structs[0])
+    told = displays(kind)
     columns = [column for q in told.values() for column in q.columns]
     rows = [[cell for name, q in told.items() for cell in q.cells(getattr(item, name))] for item in structs]
     if isinstance(items, Mapping):
