@@ -66,10 +66,15 @@ class Score:
         return self.score_blocks(block_errors(fitted.held_out, fitted.blocks), prior, fitted.labels)
 
     def log_prior(self, label: str) -> float:
-        """Return what an effect costs: the log odds of being there, and of the start that it has."""
+        """Return what an effect costs: the log odds of being there, and of the start that it has.
+
+        A law that contains a simpler one is that law and one more: it costs as both do, or it would take the place of
+        the simpler one for any gain.
+        """
         effect, p = self.problem.effects[label], self.settings.effect_probability
         starts = len(effect.starts) if effect.wave is None else effect.wave.cycles.size
-        return float(np.log(p / (1.0 - p)) - np.log(max(starts, 1)))
+        simpler = sum(self.log_prior(one) for one in effect.contains if one in self.problem.effects)
+        return float(np.log(p / (1.0 - p)) - np.log(max(starts, 1))) + simpler
 
 
 @dataclass(frozen=True, eq=False)
