@@ -33,8 +33,9 @@ def test_alternating_steps_are_brought_to_their_mean_rate(how: str, share: float
     time = np.concatenate([[0.0], np.cumsum(steps)])
     motion = {"time": time, "u": 3.0 * np.cos(4.0 * time), "theta_m": np.sin(4.0 * time), "theta_l": np.sin(4.0 * time)}
     path = _write(tmp_path / "log.csv", motion)
-    with pytest.raises(RecordError, match="say how to resample"):
-        read_record(path)
+    unasked = read_record(path)  # interpolated, and told
+    assert any("resampled (linear)" in note for note in unasked.notes)
+    np.testing.assert_allclose(unasked.theta_m, np.sin(4.0 * unasked.time), atol=2e-3)
     record = read_record(path, reading=Reading(resample=how))
     assert record.step == pytest.approx(float(np.mean(steps)), rel=1e-3)
     assert abs(record.size - time.size) <= 1

@@ -22,8 +22,12 @@ from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
 from orchestrator.estimation.problem import (
+    DRY,
     IMPULSE,
+    LATE,
     LEAST_WHERE_INEXACT,
+    SCALE,
+    TORQUE_OFFSET,
     make_problem,
     scale_noise,
     with_least_torque_noise,
@@ -288,8 +292,10 @@ def _first_fits(
     if all(smallest is not start for start in starts):
         starts.append(smallest)
     fits: list[GapFit] = []
+    held = {SCALE, TORQUE_OFFSET, LATE, *DRY}  # a first step of these too may leave the size behind for good
+    early = [n for n in others if problem.names[n] not in held]
     for point in starts:
-        fits.append(maximise(likelihood, point.theta, others, 3, tolerance=1.0))
+        fits.append(maximise(likelihood, point.theta, early, 3, tolerance=1.0))
         likelihood = fits[-1].likelihood
     return sorted(fits, key=lambda fit: fit.point.objective), likelihood
 
