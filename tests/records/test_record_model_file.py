@@ -54,7 +54,7 @@ def test_a_model_file_is_read(tmp_path: Path) -> None:
     [
         ('fmu = "Gearbox"', "`fmu` in {} must be one of Drivetrain, ServoAxis, TwoStageTrain, but is 'Gearbox'"),
         ("fmu = 3", "`fmu` in {} must be text, but is a number"),
-        ("fum = 3", "`fum` in {} must be one of fmu, header, parameters, encoders, columns, record"),
+        ("fum = 3", "`fum` in {} must be one of fmu, header, record, parameters, encoders, columns"),
         ("parameters = []", "`parameters` in {} must be a table, but is a list"),
         ("parameters.J_m = 3", "`parameters.J_m` in {} must be a table, but is a number"),
         ("[parameters.J_q]\nvalue = 1", "`parameters.J_q` in {} must be a parameter of Drivetrain, but no such name"),
