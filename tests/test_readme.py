@@ -49,15 +49,21 @@ LINES = {
 }
 TUTORIAL = LINES.pop("docs/your-machine.md")
 OWN_CHECK = "python -m orchestrator check"  # of all our FMUs: the last step of CI
+TO_A_CONTROLLER = LINES["docs/tour.md"][-3:]  # each goes on with what the one before has left
 # What stands twice is run once.
-COMMANDS = list(dict.fromkeys(line for lines in LINES.values() for line in lines if line != OWN_CHECK))
+COMMANDS = list(
+    dict.fromkeys(
+        line for lines in LINES.values() for line in lines if line != OWN_CHECK and line not in TO_A_CONTROLLER
+    )
+)
 (DIAGNOSE,) = (line for line in COMMANDS if " diagnose " in line)
 
 
 def test_there_are_commands_to_test():
     assert len(COMMANDS) >= 6
-    words = ["inspect", "estimate", "estimate", "diagnose", "check"]
+    words = ["inspect", "estimate", "estimate", "diagnose", "check", "compensate"]
     assert [line.split()[3] for line in TUTORIAL] == words
+    assert [line.split()[3] for line in TO_A_CONTROLLER] == ["estimate", "compensate", "simulate"]
     assert "-m orchestrator check --out" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
@@ -113,11 +119,18 @@ def test_the_diagnosis_finds_what_the_readme_says(diagnosed):
 @pytest.mark.slow
 def test_the_tutorial_goes_from_a_log_in_amperes_to_an_fmu_of_the_machine(tmp_path):
     copy_examples(tmp_path / "docs" / "examples")
-    _, estimated, _, diagnosed, _ = (done_there(tmp_path, line) for line in TUTORIAL)
+    _, estimated, _, diagnosed, _, _ = (done_there(tmp_path, line) for line in TUTORIAL)
     assert estimated["alpha"] == pytest.approx(SERVO_GAP, rel=5e-3)
     found = {effect["name"]: effect["parameters"] for effect in diagnosed["effects"]}
     assert found["backlash"]["alpha"]["value"] == pytest.approx(SERVO_GAP, rel=5e-3)
     assert found["coulomb_friction"]["torque"]["value"] == pytest.approx(SERVO_FRICTION, rel=0.1)
+
+
+@pytest.mark.slow
+def test_the_tour_ends_with_a_controller_of_the_machine(tmp_path):
+    copy_examples(tmp_path / "docs" / "examples", whole=True)
+    for line in TO_A_CONTROLLER:
+        assert done_there(tmp_path, line)
 
 
 def test_the_example_records_are_what_their_simulator_makes():
