@@ -41,6 +41,7 @@ def test_the_outcome_of_a_run(root, monkeypatch, what):
 
 def test_tests_of_the_changed_function_come_first(root):
     (root / "orchestrator").mkdir()
+    (root / "orchestrator" / "__init__.py").touch()
     (root / "orchestrator" / "sums.py").write_text("def add(a, b):\n    return a + b\n")
     (root / "test_one.py").write_text(
         "from orchestrator.sums import add\ndef test_other(): pass\ndef test_sum(): assert add(1, 1) == 2\n"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
 from orchestrator.api.at_rest import five, margins_text, rest_text
-from orchestrator.api.machine import read_fitted_model, trusted_machine
+from orchestrator.api.machine import read_fitted_model, require_machine
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, text_table
 from orchestrator.building.fastest import ensure_fastest
@@ -235,7 +235,7 @@ def compensate(
         machine = machine if torque_limit is None else replace(machine, torque_limit=torque_limit)
         task = ControlTask(machine, given["impact_speed"], sample_time=sample_time)
     else:
-        machine, doubts = trusted_machine(said, alpha, torque_limit, force)
+        machine, doubts = require_machine(said, alpha, torque_limit, force)
         task = make_task(machine, sample_time, impact_speed)
     if state_weights is not None:
         task = replace(task, state_weights=five("state_weights", state_weights, 0.0), torque_weight=1.0)

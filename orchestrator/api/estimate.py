@@ -30,7 +30,7 @@ from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSetting
 from orchestrator.estimation.tables import write_tables
 from orchestrator.estimation.trust import trust_of_estimates
 from orchestrator.records.model_file import Model, read_model
-from orchestrator.records.model_text import fitted_record, model_text
+from orchestrator.records.model_text import describe_fit, model_text
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.inference.repeats import Repeats
@@ -238,9 +238,7 @@ class EstimateResult(PlottedResult):
         stated = [name for name in model.parameters if name in {*model.plant.linear, *model.stated, *values}]
         table = {name: (values.get(name, model.parameters[name].value), float(half.get(name, 0.0))) for name in stated}
         noise = fit.diagnostics["measurement_noise"]
-        return model_text(
-            model, table, fitted_record(self.record, model, "none", self.trust, noise, values, covariance)
-        )
+        return model_text(model, table, describe_fit(self.record, model, "none", self.trust, noise, values, covariance))
 
 
 def estimate(

@@ -30,7 +30,7 @@ def read_fitted_model(path: Path) -> Model:
     return read_model(found[-1])
 
 
-def trusted_machine(
+def require_machine(
     model: Model, alpha: float | None, torque_limit: float | None, force: bool
 ) -> tuple[Machine, tuple[str, ...]]:
     """Return the machine, and what was to be said of the model before it was forced.

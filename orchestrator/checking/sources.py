@@ -8,7 +8,6 @@ import importlib.util
 import os
 import posixpath
 import subprocess
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from orchestrator.checking.description import Description
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.rules import declare
 from orchestrator.shared.machine_code import compiler_environment, local_compiler
+from orchestrator.shared.scratch import Scratch
 
 declare("""
 [sources]
@@ -55,14 +55,14 @@ def check_sources(d: Description, files: FmuFiles) -> tuple[list[Finding], str]:
         return [], "the FMU brings no sources in C"
     if compiler is None:
         return [], "there is no compiler"
-    with tempfile.TemporaryDirectory(prefix="sources-") as folder:
+    with Scratch("sources") as scratch:
         for path in (n for n in files.names() if n.startswith("sources/")):
-            target = Path(folder) / path
+            target = scratch.path / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(files.read(path, _LARGEST))
         chosen = [(name, one.words) for one in sets for name in one.files]
         for name, words in chosen[:_MOST]:
-            message = _compile(compiler, Path(folder) / "sources", name, words)
+            message = _compile(compiler, scratch.path / "sources", name, words)
             if message:
                 text = f"a compiler must take the sources, but does not take `{name}`: {message}"
                 return [Finding("build.compiles", f"sources/{name}", text)], ""

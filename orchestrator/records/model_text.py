@@ -44,7 +44,7 @@ def model_text(model: Model, values: Mapping[str, tuple[float, float]], record: 
     return "\n".join(lines) + "\n"
 
 
-def fitted_record(
+def describe_fit(
     record: Record, model: Model, verdict: str, trust: Trust, noise: Sequence[float], values: Mapping[str, float],
     covariance: NDArray[np.float64],
 ) -> FittedRecord:  # fmt: skip

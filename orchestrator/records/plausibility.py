@@ -138,7 +138,7 @@ def _check_slope(source: str, motor: Array, load: Array, ratio: float, name: str
         )
 
 
-def smooth(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
+def smooth(record: Record, tau: float) -> tuple[Array, Array, Array, Array]:
     """Return impulse, speed and angle of the motor, smoothed over a short time.
 
     Args:
@@ -146,22 +146,25 @@ def smooth(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
         tau: lag of the drive [s].
 
     Returns:
-        Impulse of the torque [N.m.s], speed [rad/s] and angle [rad], and how many rows each is a mean of.
+        Impulse of the torque [N.m.s], speed [rad/s], angle [rad], and the impulse [s] of a unit torque that the drive
+        had when the record began, which nobody knows.
     """
-    width = _smooth_width(record)
+    width = smooth_rows(record)
     kernel = np.ones(width) / width
+    first = np.cumsum(np.exp(-record.step / max(tau, 1e-9) * np.arange(record.size))) * record.step
     impulse = np.cumsum(lag_torque(record.u, tau, record.step)) * record.step
     speed = np.gradient(record.theta_m, record.step)
-    impulse, speed, angle = (np.convolve(v, kernel, "valid") for v in (impulse, speed, record.theta_m))
-    return impulse, speed, angle, width
+    impulse, speed, angle, first = (np.convolve(v, kernel, "valid") for v in (impulse, speed, record.theta_m, first))
+    return impulse, speed, angle, first
 
 
-def _smooth_width(record: Record) -> int:
+def smooth_rows(record: Record) -> int:
+    """Return how many rows ``smooth`` takes the mean of."""
     return max(5, round(SMOOTHING_TIME / record.step))
 
 
-def momentum_balance(impulse: Array, speed: Array, angle: Array) -> tuple[float, float, float]:
-    """Return what a torque's impulse moves, a constant torque and dry friction apart.
+def momentum_balance(impulse: Array, speed: Array, angle: Array, first: Array) -> tuple[float, float, float]:
+    """Return what a torque's impulse moves, apart from a constant torque, dry friction and the drive's first torque.
 
     Without dry friction a position loop with much of it, whose torque follows the angle, seems to move an inertia of
     any size and sign.
@@ -170,17 +173,18 @@ def momentum_balance(impulse: Array, speed: Array, angle: Array) -> tuple[float,
         impulse: (n,) of the torque [N.m.s].
         speed: (n,) of the motor [rad/s].
         angle: (n,) of the motor [rad].
+        first: (n,) impulse of a unit torque that the drive began with [s].
 
     Returns:
         Inertia [kg.m2] and viscous friction [N.m.s/rad] at the motor, and the share of the impulse they explain.
     """
     time = np.linspace(-1.0, 1.0, speed.size)
-    trend = np.column_stack([np.ones_like(time), time])
+    trend = np.column_stack([np.ones_like(time), time, first])
     dry = np.cumsum(np.tanh(speed / max(NEARLY_STILL * float(np.sqrt(np.mean(speed**2))), 1e-300))) / speed.size
     table = np.column_stack([speed, angle, trend, dry])
     solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
-    plain, *_ = np.linalg.lstsq(trend, impulse, rcond=None)
-    share = 1.0 - float(np.var(impulse - table @ solution)) / max(float(np.var(impulse - trend @ plain)), 1e-300)
+    plain, *_ = np.linalg.lstsq(trend[:, :2], impulse, rcond=None)
+    share = 1.0 - float(np.var(impulse - table @ solution)) / max(float(np.var(impulse - trend[:, :2] @ plain)), 1e-300)
     return float(solution[0]), float(solution[1]), share
 
 
@@ -189,12 +193,12 @@ def _apparent_inertia(record: Record, tau: float) -> float | None:
 
     None where the record does not tell.
     """
-    if record.size < 20 * _smooth_width(record):
+    if record.size < 20 * smooth_rows(record):
         return None
-    impulse, speed, angle, _ = smooth(record, tau)
+    impulse, speed, angle, first = smooth(record, tau)
     if np.ptp(angle) < 0.2:
         return None
-    inertia, _, share = momentum_balance(impulse, speed, angle)
+    inertia, _, share = momentum_balance(impulse, speed, angle, first)
     return inertia if share >= NEEDED_FIT else None
 
 

@@ -285,6 +285,7 @@ def test_the_command_writes_everything(csv_file: Path, tmp_path: Path, capsys: p
         "estimate.csv",
         "estimate.json",
         "profile.csv",
+        "corrected.toml",
         "online.csv",
         "estimate.png",
         "flanks.csv",

@@ -28,7 +28,7 @@ from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
 from orchestrator.records.fitted_record import FittedRecord
 from orchestrator.records.model_file import Model
-from orchestrator.records.model_text import fitted_record, model_text
+from orchestrator.records.model_text import describe_fit, model_text
 
 Array = NDArray[np.float64]
 
@@ -194,7 +194,7 @@ def fitted_record_of(diagnosis: Diagnosis) -> FittedRecord:
         problem, fitted, {label: named(label) for label in fitted.labels}, diagnosis.settings.report.level
     )
     kept = [n for n, name in enumerate(names) if name in model.parameters]
-    return fitted_record(
+    return describe_fit(
         workings.records[0], model, diagnosis.verdict, diagnosis.trust, workings.balances[0].signals.noise,
         {names[n]: plant.value(workings.final, names[n]) for n in kept}, covariance[np.ix_(kept, kept)],
     )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model, ModelParameter
-from orchestrator.records.plausibility import check_plausible, momentum_balance, smooth
+from orchestrator.records.plausibility import check_plausible, momentum_balance, smooth, smooth_rows
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.inverse import pseudo_inverse
 from orchestrator.shared.results.inspect import EffectShown
@@ -41,7 +41,7 @@ def is_of(record: Record, model: Model) -> bool:
     p = {name: entry.value for name, entry in model.parameters.items()}
     record = record.fill_missing()
     same = record.theta_l is None or abs(_ratio(record)[0] / p["i"] - 1.0) < SAME_RATIO
-    inertia, _, _ = momentum_balance(*smooth(record, p["tau"])[:3])
+    inertia, _, _ = momentum_balance(*smooth(record, p["tau"]))
     relative = inertia / (p["J_m"] + p["J_l"] / p["i"] ** 2)
     return same and 1.0 / SAME_INERTIA < relative < SAME_INERTIA
 
@@ -102,7 +102,7 @@ def _balance(record: Record) -> tuple[float, float, float, float]:
     The lag is the shortest one that the next longer one does not better: behind seconds of lag any torque looks like
     one that a friction without inertia takes.
     """
-    tried = [(tau, *momentum_balance(*smooth(record, tau)[:3])) for tau in LAGS]
+    tried = [(tau, *momentum_balance(*smooth(record, tau))) for tau in LAGS]
     best = next((now for now, longer in itertools.pairwise(tried) if longer[3] <= now[3]), tried[-1])
     tau, inertia, friction, share = best
     return tau, abs(inertia) or 1.0, abs(friction), share
@@ -134,7 +134,7 @@ def visible_effects(record: Record, model: Model) -> list[EffectShown]:
     if not record.has_torque:
         return []
     p = {name: entry.value for name, entry in model.parameters.items()}
-    impulse, speed, angle, width = smooth(record, max(p["tau"], LEAST_LAG))
+    impulse, speed, angle, _ = smooth(record, max(p["tau"], LEAST_LAG))
     h = record.step
     load = angle / p.get("i", 1.0)
     shapes = {
@@ -143,7 +143,7 @@ def visible_effects(record: Record, model: Model) -> list[EffectShown]:
         EFFECTS[2]: (np.sin(load), "N.m"),
         EFFECTS[3]: (np.sin(6.0 * angle), "N.m"),
     }
-    hop = max(width, round(0.1 / h))
+    hop = max(smooth_rows(record), round(0.1 / h))
     ends = np.arange(0, speed.size, hop)
     if ends.size < 20:
         return []

@@ -14,7 +14,7 @@ from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.plants.known.two_stage_train import TRAIN
 from orchestrator.records.model_file import Model
-from orchestrator.records.plausibility import check_plausible, smooth
+from orchestrator.records.plausibility import check_plausible, smooth, smooth_rows
 from orchestrator.records.record import Record
 from pyfmu_sources.drivetrain.equations import DrivetrainParameters
 
@@ -132,7 +132,8 @@ def _other_sign(record: Record, model: Model) -> float:
     """
     record = record.fill_missing()
     p = {name: entry.value for name, entry in model.parameters.items()}
-    impulse, speed, angle, width = smooth(record, p["tau"])
+    impulse, speed, angle, _ = smooth(record, p["tau"])
+    width = smooth_rows(record)
     rows = np.arange(0, speed.size, width)
     if rows.size < 8:
         return 1.0
