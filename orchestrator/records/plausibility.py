@@ -210,7 +210,7 @@ def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
     own = p["J_m"] + p["J_l"] / p["i"] ** 2
     relative = moved / own
     machine = "the machine's `[parameters.J_m] value` and `[parameters.J_l] value` (`model`)"
-    if relative < -0.2:
+    if relative < -3.0 / DEGREES:
         raise RecordError(
             f"{record.source}: column `u` must be positive where it drives `theta_m` forward, but the motion goes "
             "against it: the sign of `u` or of the angles is wrong; say `[columns.u] factor = -1` (`model`)"
