@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(
 DOCS = Path(__file__).parents[2] / "docs" / "check.md"
 CORPUS = corpus() if have_compiler() else []
 OUTLINES = outlines("2")
-MORE = {"behaviour set_has_effect": {"value.order"}}
+MORE = {"behaviour set_has_effect": {"value.order"}, "behaviour hidden_state": {"derivative.value"}}
 """Faults that break another rule as well."""
 
 
