@@ -62,7 +62,9 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
             )  # fmt: skip
             findings += probed
         elif not options.static and not has_errors(findings):
-            findings.append(Finding("run.not-executed", "", f"the FMU must be executed to pass, but is not: {reason}"))
+            # Binaries for other platforms are as they should be; those for none that FMI names run nowhere.
+            rule = "run.not-executed" if result.facts.get("platforms") else "run.no-platform"
+            findings.append(Finding(rule, "", f"the FMU must be executed to pass, but is not: {reason}"))
         shown = order_findings(findings)
         if result.files is not None and result.description is not None:
             data = result.files.read("modelDescription.xml", MAXIMUM_BYTES)

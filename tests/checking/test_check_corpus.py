@@ -145,6 +145,7 @@ NOT_IN_THE_CORPUS = {
     "resources.leak",
     "run.failed",
     "run.moved-crash",
+    "run.no-platform",
     "run.not-executed",
     "value.order",
     "value.sequence",
