@@ -4,13 +4,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from orchestrator.plain_text import plain_text
-from orchestrator.records.arrays import Record
 from orchestrator.shared.numbers import cell_text
 from orchestrator.shared.output import stage_output, write_result
 from orchestrator.shared.results.fields import ReportTable
+
+if TYPE_CHECKING:  # numpy, which help texts do without
+    from orchestrator.records.arrays import Record
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class TextTable:
 Block = TextTable | str
 
 
-def doubts_of(records: Sequence[Record]) -> list[str]:
+def doubts_of(records: "Sequence[Record]") -> list[str]:
     """Return what the rows of logs say of how they were taken, a line each, for the head of a result."""
     return [f"{record.source}: {text}." for record in records for text in record.doubts]
 
