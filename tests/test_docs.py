@@ -10,10 +10,10 @@ from pathlib import Path
 import yaml
 
 from tests.support.prose import count_words, sentences
-from tools import messages_page
+from tools import effects_page, messages_page, settings_page
 
 ROOT = Path(__file__).resolve().parents[1]
-GENERATED = {"docs/settings.md", "docs/rules.md", "fmus/README.md"}
+GENERATED = {"docs/effects.md", "docs/settings.md", "docs/rules.md", "fmus/README.md"}
 CHANGES = "CHANGELOG.md"
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
@@ -117,6 +117,11 @@ def test_the_glossary_has_each_term_once_and_stays_short():
     rows = text_of("docs/naming.md").partition("## Glossary")[2]
     terms = re.findall(r"^\| ([^|]+) \|", rows, re.MULTILINE)[1:]
     assert 40 <= len(set(terms)) == len(terms) <= 80
+
+
+def test_generated_pages_are_current():
+    for tool in (effects_page, settings_page):
+        assert tool.PAGE.read_text(encoding="utf-8") == tool.page(), f"run `python -m {tool.__name__}`"
 
 
 def test_the_page_of_messages_has_all_its_sections():
