@@ -18,7 +18,6 @@ from tools import refuse_arguments
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 WIDTH, HEIGHT = 1100, 900
 COLOURS = 64
-CHOICES = "sessionStorage.setItem('workbench', JSON.stringify(arguments[0]))"
 
 
 def main() -> None:
@@ -30,8 +29,8 @@ def main() -> None:
         inspected = served.wait(served.start("inspect", [log], model=model))["name"]
         machine = f"results/{inspected}/model.toml"
         set_screen(driver, WIDTH, HEIGHT, "light")
-        driver.get(f"{served.address}state")  # of the same origin, and no page that keeps choices of its own
-        driver.execute_script(CHOICES, {"log": log, "model": machine, "columns": columns, "header": None})
+        said = {"columns": columns, "header": None}
+        served.ask("POST", "notes", {"log": log, "model": machine, "logs": {log: said}, "given": inspected})
         driver.get(served.address)
         _wait(driver, "#panel-log .card")
         _save(driver, "log", 980)

@@ -105,13 +105,34 @@ class Jobs:
         Raises:
             InputError: there is no such job.
         """
-        job = self.all.get(name)
-        if job is None:
-            raise InputError(f"`job` must be one of this session, but is {name[:60]!r}")
+        job = self.named(name)
         if not job.is_over():
             job.stops += 1
             if job.process is not None:
                 _signal(job.process, signal.SIGINT if job.stops < 3 else signal.SIGKILL)
+        return job
+
+    async def remove(self, name: str) -> None:
+        """Remove a job that has ended, and its results.
+
+        Raises:
+            InputError: there is no such job, or it has not ended.
+        """
+        job = self.named(name)
+        if not job.is_over():
+            raise InputError(f"`job` must have ended before it is removed, but {name} is {job.state}: stop it first")
+        await asyncio.to_thread(self._session.remove_result, job.folder.name)
+        self.all.pop(name, None)
+
+    def named(self, name: Any) -> Job:
+        """Return a job.
+
+        Raises:
+            InputError: there is no such job.
+        """
+        job = self.all.get(name) if isinstance(name, str) else None
+        if job is None:
+            raise InputError(f"`job` must be one of this session, but is {str(name)[:60]!r}")
         return job
 
     async def close(self) -> None:

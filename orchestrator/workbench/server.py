@@ -24,14 +24,14 @@ from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.reporting import render
 from orchestrator.reporting.plots import SCRIPTS
 from orchestrator.shared.output import write_whole
-from orchestrator.shared.version import __version__
 from orchestrator.workbench.command_lines import command_line
 from orchestrator.workbench.compare import compare_results
 from orchestrator.workbench.guard import PAGE_POLICY, Guard
 from orchestrator.workbench.jobs import Jobs
 from orchestrator.workbench.model_fields import model_fields, model_text
+from orchestrator.workbench.notes import Notes
 from orchestrator.workbench.scenario_text import scenario_text
-from orchestrator.workbench.session import SessionFolder
+from orchestrator.workbench.session import SessionFolder, kind_of
 from orchestrator.workbench.settings import WorkbenchSettings
 from orchestrator.workbench.simulation import SliderModel, SliderModels
 from orchestrator.workbench.uploads import UploadTooLargeError, save_upload
@@ -53,21 +53,24 @@ class Workbench:
     settings: WorkbenchSettings
     jobs: Jobs
     models: SliderModels
+    notes: Notes
 
     async def state(self, request: Request) -> Response:
-        """Return files and jobs of the session."""
+        """Return files and jobs of the session, and the notes where the page has those of another version."""
         uploads = [
-            {"file": self.session.reference_of(path), "name": path.name, "bytes": path.stat().st_size}
+            {"file": self.session.reference_of(path), "name": path.name, "kind": kind_of(path)}
             for path in sorted(self.session.files.iterdir(), key=lambda path: path.stat().st_mtime)
             if path.is_file() and not path.name.startswith(".")
         ]
         jobs = [job.as_plain() for job in self.jobs.all.values()]
-        return JSONResponse(
-            {
-                "folder": str(self.session.folder), "version": __version__, "files": uploads, "jobs": jobs,
-                "largest_file": self.settings.largest_file,
-            }
-        )  # fmt: skip
+        notes = {} if request.query_params.get("notes") == str(self.notes.version) else {"notes": self.notes.all}
+        found = {"folder": str(self.session.folder), "files": uploads, "jobs": jobs, "version": self.notes.version}
+        return JSONResponse(found | notes)
+
+    async def keep(self, request: Request) -> Response:
+        """Take what a page keeps of its work."""
+        self.notes.change(await self._asked(request))
+        return JSONResponse({"version": self.notes.version})
 
     async def upload(self, request: Request) -> Response:
         """Take a file."""
@@ -138,6 +141,13 @@ class Workbench:
         """Stop a job."""
         return JSONResponse(self.jobs.stop(request.path_params["name"]).as_plain())
 
+    async def remove(self, request: Request) -> Response:
+        """Remove a job that has ended, with its results."""
+        job = self.jobs.named(request.path_params["name"])
+        await run_in_threadpool(self.models.forget, job.folder)
+        await self.jobs.remove(job.name)
+        return JSONResponse({})
+
     async def file(self, request: Request) -> Response:
         """Hand out a file of the session: pages and pictures of results to look at, all else to save."""
         path = self.session.path_of(request.path_params["reference"])
@@ -164,28 +174,22 @@ class Workbench:
 
     async def sliders(self, request: Request) -> Response:
         """Return the sliders of a result's model, and what was measured."""
-        folder = self._result(request.query_params.get("job", ""))
+        folder = self.jobs.named(request.query_params.get("job", "")).folder
         return JSONResponse(await run_in_threadpool(lambda: self.models.use(folder, SliderModel.describe)))
 
     async def simulate(self, request: Request) -> Response:
         """Run a result's model with the values of the sliders."""
         asked = await self._asked(request)
-        folder, values = self._result(str(asked.get("job"))), asked.get("values", {})
+        folder, values = self.jobs.named(asked.get("job")).folder, asked.get("values", {})
         if not isinstance(values, Mapping):
             raise InputError("`values` must be numbers by name, but is none")
         return JSONResponse(await run_in_threadpool(lambda: self.models.use(folder, lambda model: model.run(values))))
 
     async def compare(self, request: Request) -> Response:
         """Return the page on two results of one command."""
-        folders = [self._result(request.query_params.get(name, "")) for name in ("first", "second")]
+        folders = [self.jobs.named(request.query_params.get(name, "")).folder for name in ("first", "second")]
         page = await run_in_threadpool(lambda: render(compare_results(*folders)))
         return Response(page, media_type="text/html", headers={"content-security-policy": _RESULT_POLICY})
-
-    def _result(self, name: str) -> Path:
-        job = self.jobs.all.get(name)
-        if job is None:
-            raise InputError(f"`job` must be one of this session, but is {name[:60]!r}")
-        return job.folder
 
     async def _asked(self, request: Request) -> dict[str, Any]:
         """Return what a page asks for: a JSON object of a sensible size."""
@@ -268,7 +272,7 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
     """Return the application behind the guard; jobs end with it."""
     jobs = Jobs(session, settings)
     models = SliderModels(settings.slider_models)
-    workbench = Workbench(session, settings, jobs, models)
+    workbench = Workbench(session, settings, jobs, models, Notes(session.folder, settings.largest_notes))
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
@@ -280,6 +284,7 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
         Route("/", _page),
         Route("/static/{name}", _page),
         Route("/state", _answer_in_words(workbench.state)),
+        Route("/notes", _answer_in_words(workbench.keep), methods=["POST"]),
         Route("/upload/{name:path}", _answer_in_words(workbench.upload), methods=["PUT"]),
         Route("/columns", _answer_in_words(workbench.columns), methods=["POST"]),
         Route("/cost", _answer_in_words(workbench.cost), methods=["POST"]),
@@ -287,6 +292,7 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
         Route("/models", _answer_in_words(workbench.write_model), methods=["POST"]),
         Route("/jobs", _answer_in_words(workbench.start), methods=["POST"]),
         Route("/jobs/{name}/stop", _answer_in_words(workbench.stop), methods=["POST"]),
+        Route("/jobs/{name}/remove", _answer_in_words(workbench.remove), methods=["POST"]),
         Route("/variables", _answer_in_words(workbench.variables)),
         Route("/scenarios", _answer_in_words(workbench.write_scenario), methods=["POST"]),
         Route("/sliders", _answer_in_words(workbench.sliders)),
@@ -309,9 +315,10 @@ def serve(
     Raises:
         InputError: the port is taken.
     """
+    inner = application(session, settings or WorkbenchSettings())
     listener = listen(port)
     token, bound = secrets.token_urlsafe(24), listener.getsockname()[1]
-    app = Guard(application(session, settings or WorkbenchSettings()), token, bound)
+    app = Guard(inner, token, bound)
     config = uvicorn.Config(
         app, log_config=None, access_log=False, server_header=False, proxy_headers=False, date_header=False,
         lifespan="on", ws="none", limit_concurrency=200, timeout_graceful_shutdown=2,

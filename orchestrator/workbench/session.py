@@ -4,20 +4,28 @@
 
     DIR/files/axis.csv             what was uploaded, and model files that were written
     DIR/results/estimate-3/        what the command wrote, with job.json: the command line and how it ended
+    DIR/session.json               what the page keeps: choices, the drawn scenario, which results are shown
 """
 
 import os
 import re
+import secrets
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
-from orchestrator.errors import InputError, OutputError
+from orchestrator.errors import InputError, OutputError, ScenarioError
 from orchestrator.shared.operating_system import PLAIN_FILE
 from orchestrator.shared.output import write_whole
+from orchestrator.shared.scratch import remove
+from orchestrator.shared.toml_files import read_toml
+from orchestrator.workbench.settings import MEBIBYTE
 
 FILES, RESULTS = "files", "results"
 LONGEST_NAME = 120
 DEEPEST = 6  # folders of a result: those of an unpacked report, and no endless path
+_GONE = ".gone-"
+_MODEL_KEYS = {"fmu", "columns", "encoders", "parameters", "header"}
 _NAME = re.compile(r"[^\x00-\x1f\x7f/\\:]+")
 
 
@@ -96,6 +104,12 @@ class SessionFolder:
                 continue
             return self.results / f"{command}-{number}"
 
+    def remove_result(self, name: str) -> None:
+        """Remove a folder of results: out of sight in one step, and then from the disk."""
+        gone = self.results / f"{_GONE}{secrets.token_hex(8)}"
+        (self.results / name).rename(gone)
+        remove(gone)
+
     def reference_of(self, path: Path) -> str:
         """Return what a page calls a file."""
         return path.relative_to(self.folder).as_posix()
@@ -111,12 +125,35 @@ def is_name(text: str) -> bool:
     return plain and not text.startswith((".", "-")) and text == text.strip()
 
 
+def kind_of(path: Path) -> str:
+    """Return what an upload is: "log", "model", "settings", "scenario" or "fmu"; "other" what a page only keeps."""
+    ending = path.suffix.lower()
+    if ending in (".fmu", ".ssp"):
+        return "fmu"
+    if ending != ".toml":
+        return "other" if ending in (".json", ".html", ".png") else "log"
+    return _kind_of_toml(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=1000)
+def _kind_of_toml(path: Path, changed: int) -> str:
+    try:
+        found = read_toml(path, MEBIBYTE).keys()
+    except ScenarioError:
+        return "model"  # where it is chosen, its reader says what is wrong
+    if not found or found & _MODEL_KEYS:
+        return "model"
+    return "scenario" if "instances" in found else "settings"
+
+
 def open_session(folder: Path) -> SessionFolder:
     """Return the session of a directory, which is made where there is none; what lies there stays."""
     session = SessionFolder(folder.absolute())
     try:
         session.files.mkdir(parents=True, exist_ok=True)
         session.results.mkdir(exist_ok=True)
+        for gone in session.results.glob(f"{_GONE}*"):  # what a server that was killed had begun to remove
+            remove(gone)
         os.chmod(session.folder, 0o700)  # data of machines: of this user alone
     except OSError as error:
         raise OutputError(f"`out` must be a writable directory, but {folder} is not: {error.strerror}", "out") from None

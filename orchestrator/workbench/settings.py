@@ -13,6 +13,7 @@ class WorkbenchSettings:
         largest_file: bytes of an upload: what the readers of records take, too.
         largest_session: bytes of all uploads: a disk is filled by nobody's mistake.
         largest_request: bytes of what a page asks: model files and tables, no data.
+        largest_notes: bytes of what the pages keep of their work: choices and a scenario of some hundred FMUs.
         jobs_at_once: further ones wait: each of them keeps a core busy.
         answer_seconds: that a look at a file or a model may take.
         slider_models: models that stay ready under sliders: each holds an instance of an FMU.
@@ -24,6 +25,7 @@ class WorkbenchSettings:
     largest_file: int = 500_000_000
     largest_session: int = 4_000_000_000
     largest_request: int = MEBIBYTE
+    largest_notes: int = 4 * MEBIBYTE
     jobs_at_once: int = 4
     answer_seconds: float = 120.0
     slider_models: int = 3

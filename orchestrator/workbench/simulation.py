@@ -135,6 +135,12 @@ class SliderModels:
                 self._models.pop(next(iter(self._models))).close()
             return act(model)
 
+    def forget(self, folder: Path) -> None:
+        """Free the model of a result, which is about to be removed."""
+        with self._lock:
+            if model := self._models.pop(folder.name, None):
+                model.close()
+
     def close(self) -> None:
         """Free all of them."""
         with self._lock:

@@ -40,10 +40,14 @@ def page(served: Served):
 
 def wait(driver: Any, condition: Any) -> Any:
     """Return what the condition gives once it is true; what a redraw takes away or moves is looked up again."""
-    from selenium.common.exceptions import ElementClickInterceptedException, StaleElementReferenceException
+    from selenium.common.exceptions import (
+        ElementClickInterceptedException,
+        ElementNotInteractableException,
+        StaleElementReferenceException,
+    )
     from selenium.webdriver.support.wait import WebDriverWait
 
-    moved = (ElementClickInterceptedException, StaleElementReferenceException)
+    moved = (ElementClickInterceptedException, ElementNotInteractableException, StaleElementReferenceException)
     return WebDriverWait(driver, NEVER, 0.1, ignored_exceptions=moved).until(condition)
 
 
@@ -74,6 +78,11 @@ def press(driver: Any, text: str) -> None:
         return found is not None
 
     wait(driver, is_pressed)
+
+
+def press_named(driver: Any, name: str) -> None:
+    """Press a button by its whole name."""
+    wait(driver, lambda d: find(d, f"[role=tabpanel]:not([hidden]) button[aria-label='{name}']").click() is None)
 
 
 def pick(driver: Any, css: str, text: str) -> None:
@@ -429,14 +438,50 @@ def test_tabs_follow_the_arrow_keys_and_every_control_has_a_name(inspected: Any)
     assert inspected.execute_script(nameless) == []
 
 
-def test_two_tabs_of_the_browser_work_side_by_side(inspected: Any, served: Served) -> None:
+def test_a_new_tab_shows_the_work_as_it_is(inspected: Any, served: Served) -> None:
     first = inspected.current_window_handle
     inspected.switch_to.new_window("tab")
     try:
         open_workbench(inspected, served)
-        assert inspected.find_element("css selector", "#panel-log select").get_attribute("value") == ""
-        text = wait(inspected, lambda d: d.find_element("id", "panel-compare").get_attribute("textContent"))
-        assert "inspect-1" in text
+        log = "return document.querySelector('#panel-log select').value"
+        assert inspected.execute_script(log) == "files/counter.csv"
+        choose_tab(inspected, "fmus")
+        find(inspected, "[data-port='drivetrain.u']")
+        find(inspected, "#panel-fmus iframe")  # what the scenario gave
+        choose_tab(inspected, "compare")
+        press_named(inspected, "Open: inspect-1")
+        wait(inspected, lambda d: d.execute_script(log) == "files/drive.csv")
+        find(inspected, "#panel-log iframe[title='Page of inspect-1']")
+        wait(inspected, lambda d: find(d, "[data-key=use-3]").get_attribute("value") == "theta_l")
     finally:
         inspected.close()
         inspected.switch_to.window(first)
+    wait(inspected, lambda d: d.execute_script(log) == "files/drive.csv")  # every open page follows
+
+
+def test_results_are_no_logs_and_settings_no_models(inspected: Any, served: Served, tmp_path: Path) -> None:
+    (tmp_path / "strict.toml").write_text("test_share = 0.2\n")
+    choose_tab(inspected, "machine")
+    find(inspected, "#panel-machine input[type=file]").send_keys(str(tmp_path / "strict.toml"))
+    wait_for_text(inspected, "panel-machine", "it is chosen in the tab Diagnosis")
+    script = """return [...document.querySelectorAll('#panel-diagnosis select')].map((select) =>
+        [select.labels[0].textContent, [...select.options].map((option) => option.textContent)])"""
+    offered = dict(inspected.execute_script(script))
+    assert offered["Settings"] == ["the usual ones", "strict.toml"]
+    assert "strict.toml" not in offered["Model file"]
+    assert "inspect-1: model.toml" in offered["Model file"]
+    assert not [name for name in offered["Log"] if name == "drawn.csv" or ": " in name]
+
+
+def test_a_past_result_runs_again_and_goes_for_good(inspected: Any, served: Served) -> None:
+    choose_tab(inspected, "compare")
+    press_named(inspected, "Run again: inspect-1")
+    job = served.wait("inspect-2")
+    assert job["asked"] == served.job("inspect-1")["asked"]
+    find(inspected, "#panel-log iframe[title='Page of inspect-2']")
+    choose_tab(inspected, "compare")
+    press_named(inspected, "Remove: inspect-2")
+    inspected.switch_to.alert.accept()
+    wait(inspected, lambda d: not (served.folder / "results" / "inspect-2").exists())
+    wait(inspected, lambda d: not d.find_elements("css selector", "#panel-log iframe"))
+    assert served.job("inspect-2") == {}

@@ -1,6 +1,5 @@
 """Columns that are named by clicks in the tab Log: no choice is a dead end, and commands of other tabs get them."""
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -70,9 +69,10 @@ def put(driver: Any, css: str, value: str) -> None:
 
 def open_tab(driver: Any, served: Served, tab: str, log: str, **chosen: Any) -> None:
     set_screen(driver, 1280, 900, "light")
-    driver.get(f"{served.address}state")  # of the same origin, and no page that keeps choices of its own
-    choices = {"log": f"files/{log}", "columns": {}, "header": None, **chosen}
-    driver.execute_script("sessionStorage.setItem('workbench', arguments[0])", json.dumps(choices))
+    driver.get(f"{served.address}state")  # of no page, which would keep its own choices
+    said = {"columns": chosen.pop("columns", {}), "header": chosen.pop("header", None)}
+    notes = {"log": f"files/{log}", "logs": {f"files/{log}": said}, "model": "", **chosen}
+    assert served.ask("POST", "notes", notes)[0] == 200
     driver.get(f"{served.address}#{tab}")
 
 

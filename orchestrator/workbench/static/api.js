@@ -11,8 +11,10 @@ export async function get(path) {
   return answer(await fetch(path));
 }
 
-export async function post(path, body = {}) {
-  return answer(await fetch(path, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) }));
+// `last`: also where the page is closed right after.
+export async function post(path, given = {}, last = false) {
+  const body = JSON.stringify(given), keepalive = last && body.length < 60_000;
+  return answer(await fetch(path, { method: "POST", headers: { "content-type": "application/json" }, body, keepalive }));
 }
 
 // Send a file; `tell` is called with the share that is sent.

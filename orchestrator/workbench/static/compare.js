@@ -1,5 +1,5 @@
 import { field, fill, make } from "./dom.js";
-import { message, duration } from "./parts.js";
+import { duration, jobButtons, message } from "./parts.js";
 import { isOver, session, watch } from "./state.js";
 
 // Two results of one command side by side, and the history of the session.
@@ -23,11 +23,11 @@ export function build(panel) {
     first.replaceChildren(...whole().map((job) => make("option", { value: job.name, selected: job.name === before }, job.name)));
     alike();
     fill(table, jobs.length ? make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "History" }, make("table", { class: "stack" },
-      make("thead", {}, make("tr", {}, ["job", "ended", "state", "took", "command line"].map((text) => make("th", { scope: "col" }, text)))),
+      make("thead", {}, make("tr", {}, ["job", "ended", "state", "took", "command line", "actions"].map((text) => make("th", { scope: "col" }, text)))),
       make("tbody", {}, jobs.toReversed().map((job) => make("tr", {},
         make("td", {}, job.files.includes("report.html") ? make("a", { href: `file/results/${job.name}/report.html`, target: "_blank", rel: "noopener" }, job.name) : job.name),
         make("td", {}, job.ended ? new Date(1000 * job.ended).toLocaleString() : ""), make("td", {}, job.state),
-        make("td", {}, job.ended > job.begun ? duration(job.ended - job.begun) : ""), make("td", { class: "long" }, make("code", {}, job.line)))))))
+        make("td", {}, job.ended > job.begun ? duration(job.ended - job.begun) : ""), make("td", { class: "long" }, make("code", {}, job.line)), make("td", {}, jobButtons(job, "open")))))))
       : make("p", {}, "No job has ended yet."));
   });
   const show = () => {

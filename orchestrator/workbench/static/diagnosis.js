@@ -1,7 +1,7 @@
 /* global Units */
 import { check, digits, fill, make, plain, withInterval } from "./dom.js";
 import { inputs, needLog, reading, trustTag } from "./gap.js";
-import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
+import { action, fileChoice, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, jobOf, modelOfLog, start } from "./state.js";
 
 const SIZES = { alpha: "half-gap" }, SIGNALS = { theta_m: "motor angle", theta_l: "load angle" };
@@ -11,9 +11,9 @@ const GRADES = { certain: "good", likely: "good", possible: "warn" };
 const headline = (found) => plain(found.summary?.[0]?.split(". ").slice(1).join(". ") || `Verdict: ${found.verdict}`);
 
 export function build(panel, go) {
-  const said = message(), read = reading();
-  let test = "", settings = "";
-  const options = async () => ({ model: await modelOfLog(), test, settings, ...read.options() });
+  const said = message(), read = reading("diagnosis");
+  const fileOf = (text, kind, key, none) => fileChoice(text, kind, () => choices.fields[key] ?? "", (file) => choose({ fields: { [key]: file || null } }), none);
+  const options = async () => ({ model: await modelOfLog(), test: choices.fields.test ?? "", settings: choices.fields.settings ?? "", ...read.options() });
   const view = jobView("diagnosis", (job) => {
     const place = make("div", {});
     show(job, place).catch((error) => said.say(error.message));
@@ -22,7 +22,7 @@ export function build(panel, go) {
 
   async function show(job, place) {
     const found = await resultOf(job);
-    const from = jobOf(choices.before?.[job.name]), earlier = from ? await resultOf(from) : null;
+    const from = jobOf(choices.before[job.name]), earlier = from ? await resultOf(from) : null;
     const back = earlier ? action(`Back to ${from.name}`, said, () => view.show(from.name)) : null;
     if (!found) { fill(place, earlier ? refit(from, earlier) : null, back); return; }
     fill(place,
@@ -83,15 +83,14 @@ export function build(panel, go) {
       action("Fit the model again with what is ticked", said, async () => {
         const { no_search, time_limit, ...rest } = job.asked.options;
         const name = await start("diagnose", job.asked.inputs, { ...rest, effects: [...on] });
-        choose({ before: { ...choices.before, [name]: job.name } });
+        choose({ before: { [name]: job.name } });
         view.show(name);
       }));
   }
 
   panel.append(inputs(),
     make("div", { class: "row" },
-      fileChoice("Test data", isLog, () => test, (file) => { test = file; choose({}); }, "the last part of the log"),
-      fileChoice("Settings", isModel, () => settings, (file) => { settings = file; choose({}); }, "the usual ones")),
+      fileOf("Test data", "log", "test", "the last part of the log"), fileOf("Settings", "settings", "settings", "the usual ones")),
     read.element, said.element,
     make("div", { class: "row" },
       action("Diagnose", said, async () => { needLog(); view.show(await start("diagnose", [choices.log], await options())); }, "main"),

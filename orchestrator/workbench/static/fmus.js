@@ -1,8 +1,8 @@
 import { fileAddress, get, post, upload } from "./api.js";
 import { check, choice, digits, field, fill, make, numberIn, numberInput, plain } from "./dom.js";
 import { Graph, fits, inputsOf, outputsOf, place, shape } from "./graph.js";
-import { action, dropZone, fileChoice, isFmu, isLog, jobView, message } from "./parts.js";
-import { choices, choose, refresh, start } from "./state.js";
+import { action, dropZone, fileChoice, isFmu, isLog, jobView, kept as remembered, message } from "./parts.js";
+import { choices, choose, refresh, start, watch } from "./state.js";
 
 const KINDS = {
   constant: [["value", "value", 0]],
@@ -24,10 +24,9 @@ function pairOf(line) {
 export function build(panel) {
   const said = message(), graphSaid = message(), tree = make("div", {}), editor = make("div", {}), view = jobView("fmus"), checked = jobView("fmu");
   const nodes = {}, known = new Map(), drawings = [];
-  const kept = choices.scenario ?? { nodes: {}, connections: [], sources: [], unwanted: [], run: { stop: 1, step: 0.001, algorithm: "gauss_seidel" } };
-  let { connections, sources } = kept, fmu = "";
-  const { run } = kept, unwanted = new Set(kept.unwanted);
-  const graph = new Graph(connect, () => {});
+  let connections = [], sources = [], fmu = "", last = "", restoring = false;
+  const run = { stop: 1, step: 0.001, algorithm: "gauss_seidel" }, unwanted = new Set();
+  const graph = new Graph(connect, keep);
 
   async function variablesOf(file) {
     if (!known.has(file)) known.set(file, await get(`variables?file=${encodeURIComponent(file)}`));
@@ -36,7 +35,7 @@ export function build(panel) {
 
   async function pick(file) {
     fmu = file;
-    choose({});
+    if (file !== (choices.fields.fmu ?? "")) choose({ fields: { fmu: file || null } });
     said.say("");
     fill(tree);
     if (!file) return;
@@ -118,6 +117,7 @@ export function build(panel) {
   }
 
   function draw() {
+    keep();
     graph.draw(nodes, connections);
     drawings.length = 0;
     const outs = Object.entries(nodes).flatMap(([name, node]) => outputsOf(node).map((one) => `${name}.${one.name}`));
@@ -185,7 +185,7 @@ export function build(panel) {
     return make("div", { class: "card" }, make("div", { class: "row" },
       field("Input", choice(ins.map((key) => [key, key]), source.to, (value) => { source.to = value; })), field("is", kind),
       KINDS[source.kind].map(([key, text]) => number(text, source, key)),
-      source.kind === "table" ? [fileChoice("Table", isLog, () => source.file ?? "", (file) => { source.file = file; choose({}); }),
+      source.kind === "table" ? [fileChoice("Table", "log", () => source.file ?? "", (file) => { source.file = file; keep(); }),
         field("Column", make("input", { value: source.column ?? "", placeholder: "name, or #2", onchange: (event) => { source.column = event.target.value.trim(); } }))] : null,
       remove(`source of ${source.to}`, () => { sources = sources.filter((one) => one !== source); })),
       source.kind === "drawn" ? drawing(source) : null);
@@ -233,7 +233,9 @@ export function build(panel) {
       if (source.kind === "table") Object.assign(made, { file: source.file, ...(source.column ? { column: source.column } : {}) });
       if (source.kind === "drawn") {
         const table = new File([`time,value\n${points.map((pair) => pair.join(",")).join("\n")}\n`], "drawn.csv");
-        Object.assign(made, { kind: "table", file: (await upload(table)).file, column: "value" });
+        const { file } = await upload(table);
+        choose({ drawn: { [file]: true } });  // no log
+        Object.assign(made, { kind: "table", file, column: "value" });
       }
       fed.push(made);
     }
@@ -244,12 +246,12 @@ export function build(panel) {
     return made;
   }
 
-  const limit = numberInput({ placeholder: "the usual one" });
+  const limit = remembered("fmus.time_limit", numberInput({ placeholder: "the usual one" }));
   const limited = () => ({ time_limit: numberIn(limit) });
   const written = make("p", { class: "note", role: "status" });
   panel.append(
     dropZone("Drop FMUs, SSP files or tables here", (name) => isFmu(name) || isLog(name), (file) => (isFmu(file) ? pick(file) : undefined), true),
-    make("div", { class: "row" }, fileChoice("FMU or SSP file", isFmu, () => fmu, pick), field("Time limit [s]", limit)),
+    make("div", { class: "row" }, fileChoice("FMU or SSP file", "fmu", () => fmu, pick), field("Time limit [s]", limit)),
     said.element,
     make("div", { class: "row" },
       action("Check this FMU", said, async () => { if (!fmu) throw new Error("choose an FMU first"); checked.show(await start("check", [fmu], limited())); }),
@@ -267,18 +269,41 @@ export function build(panel) {
         view.show(await start("simulate", [], { scenario: made.file, ...limited() }));
       }, "main")),
     written, view.element);
+  panel.addEventListener("change", keep);
+  watch(follow);
+  follow();
   draw();
-  restore().catch((error) => said.say(error.message));
 
-  // The scenario stands here again after a reload of the page.
-  async function restore() {
-    const before = Object.entries(kept.nodes);
-    if (!before.length) return;
-    for (const [name, node] of before) nodes[name] = { ...node, variables: (await variablesOf(node.fmu)).variables };
+  function keep() {
+    const plain = Object.fromEntries(Object.entries(nodes).map(([name, { variables, ...node }]) => [name, node]));
+    const now = { nodes: plain, connections, sources, unwanted: [...unwanted], run }, text = JSON.stringify(now);
+    if (restoring || text === last || (!last && !Object.keys(plain).length)) return;
+    last = text;
+    choose({ scenario: structuredClone(now) });
+  }
+
+  // The scenario and the FMU that the session keeps: of an earlier day, or of another tab of the browser.
+  function follow() {
+    const kept = choices.scenario, text = kept ? JSON.stringify(kept) : "";
+    if (fmu !== (choices.fields.fmu ?? "")) pick(choices.fields.fmu ?? "");
+    if (text !== last) {
+      last = text;
+      if (kept) restore(structuredClone(kept), text).catch((error) => said.say(`The scenario cannot be shown: ${error.message}`));
+    }
+  }
+
+  async function restore(kept, text) {
+    const found = {};
+    restoring = true;  // what stands here is not yet what the session keeps
+    for (const [name, node] of Object.entries(kept.nodes)) found[name] = { ...node, variables: (await variablesOf(node.fmu)).variables };
+    if (text !== last) return;  // a later one is on its way
+    for (const name of Object.keys(nodes)) delete nodes[name];
+    Object.assign(nodes, found);
+    Object.assign(run, kept.run);
+    ({ connections, sources } = kept);
+    unwanted.clear();
+    kept.unwanted.forEach((key) => unwanted.add(key));
+    restoring = false;
     draw();
   }
-  addEventListener("pagehide", () => {
-    const plain = Object.fromEntries(Object.entries(nodes).map(([name, { variables, ...node }]) => [name, node]));
-    choose({ scenario: { nodes: plain, connections, sources, unwanted: [...unwanted], run } });
-  });
 }

@@ -1,28 +1,30 @@
 /* global Units */
 import { post } from "./api.js";
 import { check, digits, field, make, numberIn, numberInput, plain, withInterval } from "./dom.js";
-import { action, fileChoice, isLog, isModel, jobView, message, resultOf } from "./parts.js";
-import { choices, choose, chooseLog, draft, modelOfLog, start, watch } from "./state.js";
+import { action, fileChoice, jobView, kept, message, resultOf } from "./parts.js";
+import { choices, choose, modelOfLog, start, watch } from "./state.js";
+import { unsaved } from "./machine.js";
 
 export function inputs() {
   const note = make("p", { class: "note", role: "status" });
   const tell = () => {
-    note.textContent = draft.names.length ? `Changed in the tab Machine and not saved: ${draft.names.join(", ")}`
+    note.textContent = unsaved().length ? `Changed in the tab Machine and not saved: ${unsaved().join(", ")}`
       : choices.log && !choices.model ? "Without a model file the machine is the default one; “Look at this log” in the tab Log drafts one from the record." : "";
   };
   watch(tell);
   tell();
   return make("div", {}, make("div", { class: "row" },
-    fileChoice("Log", isLog, () => choices.log, chooseLog),
-    fileChoice("Model file", isModel, () => choices.model, (model) => choose({ model }), "the default machine")), note);
+    fileChoice("Log", "log", () => choices.log, (log) => choose({ log })),
+    fileChoice("Model file", "model", () => choices.model, (model) => choose({ model }), "the default machine")), note);
 }
 
-// Options that all commands have for reading a log; `reading()` gives what the user has filled in.
-export function reading() {
-  const part = make("input", { placeholder: "all, or 2:30", "aria-describedby": "" });
-  const rate = numberInput({ placeholder: "all samples" });
+// Options that all commands have for reading a log, kept for a tab; `options()` gives what the user has filled in.
+export function reading(tab) {
+  const part = kept(`${tab}.part`, make("input", { placeholder: "all, or 2:30" }));
+  const rate = kept(`${tab}.rate`, numberInput({ placeholder: "all samples" }));
   const stamps = make("select", {}, [["", "are uniform"], ["uniform", "jitter, the samples do not"], ["linear", "interpolate linearly"], ["cubic", "interpolate by cubics"]]
     .map(([value, text]) => make("option", { value }, text)));
+  kept(`${tab}.stamps`, stamps);
   return {
     element: make("details", {}, make("summary", {}, "Reading of the log"), make("div", { class: "row" },
       field("Part [s]", part), field("Samples per second", rate), field("Times of the rows", stamps))),
@@ -47,7 +49,8 @@ export function answerOf(found) {
 
 export function build(panel) {
   const said = message(), cost = make("p", { role: "status" });
-  const read = reading(), motorOnly = check("leave the load encoder out", false, () => {});
+  const read = reading("gap"), motorOnly = check("leave the load encoder out", false, () => {});
+  kept("gap.motor_only", motorOnly.querySelector("input"), false);
   const options = async () => ({ model: await modelOfLog(), motor_only: motorOnly.querySelector("input").checked, ...read.options() });
   const view = jobView("gap", (job) => {
     const place = make("div", {});
@@ -78,7 +81,7 @@ export function build(panel) {
 
   // An experiment that would show the gap better, by the command's own design.
   const limits = [["size", "Half-gap to be seen [rad]", "the estimate"], ["torque_limit", "Largest torque [N.m]", "250"], ["speed_limit", "Largest motor speed [rad/s]", "50"], ["duration", "Length [s]", "10"]]
-    .map(([key, text, usual]) => ({ key, text, input: numberInput({ placeholder: usual }) }));
+    .map(([key, text, usual]) => ({ key, text, input: kept(`design.${key}`, numberInput({ placeholder: usual })) }));
   const wanted = () => Object.fromEntries(limits.map(({ key, input }) => [key, numberIn(input)]));
   const proposal = make("details", {}, make("summary", {}, "What to log next: propose an experiment"),
     make("div", { class: "row" }, limits.map(({ text, input }) => field(text, input)),

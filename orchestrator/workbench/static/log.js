@@ -1,7 +1,7 @@
 import { post } from "./api.js";
 import { choice, digits, field, fill, make, numberInput, plain } from "./dom.js";
 import { action, dropZone, fileChoice, isLog, jobView, message, resultOf } from "./parts.js";
-import { choices, choose, chooseLog, jobOf, noteColumns, start, watch } from "./state.js";
+import { choices, choose, jobOf, noteColumns, session, start, state, stated, watch } from "./state.js";
 
 const TITLES = { time: "Time", u: "Torque asked for", theta_m: "Motor angle", theta_l: "Load angle" };
 const UNITS = {
@@ -25,24 +25,33 @@ const OF_COLUMN = {
 export function build(panel, go) {
   const said = message(), changes = make("p", { class: "message calm", role: "status" });
   const busy = make("p", { class: "note busy", role: "status" }), body = make("div", {}), rows = make("div", {});
-  let seen = null, turn = 0, looked = choices.log, came = null;
+  let seen = null, turn = 0, looked = "", came = null, looking = null;
   const view = jobView("log", (job) => {
     const place = make("div", {});
-    resultOf(job).then((found) => fill(place, follow((found?.verdict ?? job.messages).join(" "))));
+    resultOf(job).then((found) => fill(place, advised((found?.verdict ?? job.messages).join(" "))));
     return job.state === "done" ? [place, make("p", {}, action("Go on to the machine", said, () => go("machine")))] : place;
   });
-  watch(() => {  // whichever tab has chosen another log
-    if (choices.log === looked) return;
-    looked = choices.log;
-    seen = came = null;
-    view.show("");
-    look();
-  });
+  let log = "";
+  const follow = () => {  // whichever tab, or page, has chosen another log or other columns
+    const now = JSON.stringify([choices.log, stated()]);
+    if (now === looked) return;
+    looked = now;
+    if (log !== choices.log) {
+      seen = came = null;
+      const of = session.jobs.filter((job) => job.command === "inspect" && job.asked.inputs?.[0] === choices.log).at(-1);
+      if (jobOf(view.name())?.asked.inputs[0] !== choices.log) choose({ shown: { log: of?.name ?? null } });
+    }
+    log = choices.log;
+    looking = look();
+  };
   watch(() => {
     const job = jobOf(view.name());
     const made = job && `results/${job.name}/model.toml`;
+    if (job && job.asked.inputs[0] !== choices.log) return;
     if (job?.state === "done" && job.files.includes("model.toml") && choices.given !== job.name) choose({ model: made, given: job.name });
   });
+
+  const asked = () => ({ columns: stated().columns, ...(stated().header === null ? {} : { header: stated().header }) });
 
   async function look() {
     const mine = ++turn;
@@ -50,7 +59,7 @@ export function build(panel, go) {
     said.say("");
     busy.textContent = "Reading …";
     try {
-      const found = await post("columns", { file: choices.log, columns: choices.columns, ...(choices.header === null ? {} : { header: choices.header }) });
+      const found = await post("columns", { file: choices.log, ...asked() });
       if (mine !== turn) return;
       changes.textContent = seen ? differences(seen, found) : "";
       seen = found;
@@ -67,35 +76,34 @@ export function build(panel, go) {
   }
 
   function pick(log) {
-    chooseLog(log, { model: "" });
+    if (log !== choices.log) choose({ log, model: "" });
   }
 
-  function state(column, changed) {
-    const entry = { ...choices.columns[column], ...changed };
+  function change(column, changed) {
+    const entry = { ...stated().columns[column], ...changed };
     for (const key of Object.keys(entry)) if (entry[key] === "" || entry[key] === null || Number.isNaN(entry[key])) delete entry[key];
     came = null;
-    const columns = { ...choices.columns, [column]: entry };
+    const columns = { ...stated().columns, [column]: entry };
     if (!Object.keys(entry).length) delete columns[column];
-    choose({ columns });
-    look();
+    state({ columns });
   }
 
   // Give a channel to a column; whoever had it before is asked for another one. Arrow keys pass other options on the way
   // to one: what a control does, it does to what stood there when one came to it.
   function assign(key, column, place, taken = "") {
-    if (came?.key !== key) came = { key, columns: choices.columns, taken };
+    if (came?.key !== key) came = { key, columns: stated().columns, taken };
     column ||= came.taken;
     const columns = structuredClone(came.columns);
-    if (!column) { choose({ columns }); look(); return; }
+    if (!column) { state({ columns }); return; }
     const label = place === "" ? "" : nameOf(seen.channels[Number(place)]);
     for (const [other, entry] of Object.entries(columns)) if (label && other !== column && entry.name === label) delete entry.name;
     const entry = label ? { name: label } : {};
     if (columns[column]?.rate) entry.rate = columns[column].rate;
     columns[column] = entry;
     if (!Object.keys(entry).length) delete columns[column];
-    choose({ columns });
     const kept = !label && came.taken && !came.columns[came.taken]?.name;  // taken by its own name
-    const looking = look(), mine = turn;
+    state({ columns });
+    const mine = turn;
     looking.then(() => kept && mine === turn && said.say(`It is recognised by its name: give “${TITLES[came.taken]}” another channel; the tab Gap can leave the load encoder out`));
   }
 
@@ -106,18 +114,18 @@ export function build(panel, go) {
   }
 
   function card(one) {
-    const stated = choices.columns[one.column] ?? {};
-    const options = [["", one.how === "absent" ? "none" : one.how === "named" && !stated.name ? "by its own name" : "as recognised"],
+    const entry = stated().columns[one.column] ?? {};
+    const options = [["", one.how === "absent" ? "none" : one.how === "named" && !entry.name ? "by its own name" : "as recognised"],
       ...seen.channels.map((channel) => [String(channel.place), channel.label])];
-    const pickChannel = choice(options, stated.name && one.place !== null ? String(one.place) : "", (place) => assign(`channel-${one.column}`, one.column, place));
+    const pickChannel = choice(options, entry.name && one.place !== null ? String(one.place) : "", (place) => assign(`channel-${one.column}`, one.column, place));
     pickChannel.dataset.key = `channel-${one.column}`;
     const list = `units-${one.column}`;
     const told = adviceOf(seen.problem), wrong = told?.column === one.column && told.key === "unit";
-    const unit = make("input", { value: stated.unit ?? "", placeholder: one.unit || "SI", list, "data-key": `unit-${one.column}`,
-      onchange: () => state(one.column, { unit: unit.value.trim() }) });
+    const unit = make("input", { value: entry.unit ?? "", placeholder: one.unit || "SI", list, "data-key": `unit-${one.column}`,
+      onchange: () => change(one.column, { unit: unit.value.trim() }) });
     const needed = new Set(one.column === "time" && one.place === null ? [...one.needs, "rate"] : one.needs);
     if (told?.column === one.column) needed.add(told.key);
-    const numbers = OF_COLUMN[one.column].map((key) => numberField(one.column, key, stated[key], needed.has(key)));
+    const numbers = OF_COLUMN[one.column].map((key) => numberField(one.column, key, entry[key], needed.has(key)));
     const asked = numbers.filter(({ open }) => open).map(({ element }) => element);
     const rest = numbers.filter(({ open }) => !open).map(({ element }) => element);
     const tag = one.how === "absent" && one.least === null ? ["not found", one.column === "theta_l" ? "warn" : "bad"]
@@ -132,7 +140,7 @@ export function build(panel, go) {
   }
 
   function numberField(column, key, value, needed) {
-    const input = numberInput({ value: value ?? "", "data-key": `${key}-${column}` }, (number) => state(column, { [key]: number }));
+    const input = numberInput({ value: value ?? "", "data-key": `${key}-${column}` }, (number) => change(column, { [key]: number }));
     return { open: needed || value !== undefined, element: field(NUMBERS[key], input) };
   }
 
@@ -147,7 +155,7 @@ export function build(panel, go) {
     fill(body,
       make("p", { class: "note" }, plain(seen.dialect)),
       seen.problem ? make("p", { class: "message", role: "alert" }, problemOf(seen)) : make("p", {}, make("span", { class: "tag good" }, "can be read")),
-      ...namesakes(seen.problem), follow(seen.problem),
+      ...namesakes(seen.problem), advised(seen.problem),
       make("div", { class: "cards" }, seen.columns.map(card)),
       changes,
       make("p", {}, action("Look at this log", said, inspect, "main")));
@@ -162,16 +170,16 @@ export function build(panel, go) {
   }
 
   // A button that does what a line advises, where it says all of it.
-  function follow(line) {
+  function advised(line) {
     const told = adviceOf(line);
     if (told?.value === undefined) return null;
-    return action(`Set “${NUMBERS[told.key] ?? told.key}” of “${TITLES[told.column]}” to ${told.value}`, said, async () => state(told.column, { [told.key]: told.value }));
+    return action(`Set “${NUMBERS[told.key] ?? told.key}” of “${TITLES[told.column]}” to ${told.value}`, said, async () => change(told.column, { [told.key]: told.value }));
   }
 
   // A button for each channel of which a line says that both look like one column.
   function namesakes(line) {
     const { column, names } = rivalsOf(line) ?? { names: [] };
-    return names.map((name) => action(`Use “${name}” as “${TITLES[column]}”`, said, async () => state(column, { name })));
+    return names.map((name) => action(`Use “${name}” as “${TITLES[column]}”`, said, async () => change(column, { name })));
   }
 
   function useOf(channel) {
@@ -183,12 +191,12 @@ export function build(panel, go) {
   }
 
   function lines() {
-    const set = (line) => { seen = came = null; choose({ header: line, columns: {} }); look(); };
-    const other = numberInput({ value: choices.header || "", placeholder: "found", "data-key": "header" }, set, (line) => Number.isInteger(line) && line >= 0);
-    return make("details", { open: seen.names_line === null || choices.header !== null || !seen.channels.length },
+    const { header } = stated(), set = (line) => { seen = came = null; state({ header: line, columns: {} }); };
+    const other = numberInput({ value: header || "", placeholder: "found", "data-key": "header" }, set, (line) => Number.isInteger(line) && line >= 0);
+    return make("details", { open: seen.names_line === null || header !== null || !seen.channels.length },
       make("summary", {}, seen.names_line ? `The names are in line ${seen.names_line}; choose another line` : "Which line holds the names?"),
       make("fieldset", { class: "raw" }, make("legend", { class: "visually-hidden" }, "Line of the names"),
-        make("label", {}, make("input", { type: "radio", name: "header", checked: choices.header === 0, onchange: () => set(0) }), "none of them"),
+        make("label", {}, make("input", { type: "radio", name: "header", checked: header === 0, onchange: () => set(0) }), "none of them"),
         seen.lines.map((text, n) => make("label", { class: seen.names_line === n + 1 ? "names" : "" },
           make("input", { type: "radio", name: "header", checked: seen.names_line === n + 1, onchange: () => set(n + 1) }),
           make("span", { class: "at" }, String(n + 1)), text))),
@@ -197,9 +205,10 @@ export function build(panel, go) {
 
   async function inspect() {
     const options = {};
-    if (Object.keys(choices.columns).length || choices.header !== null) {
+    const { columns, header } = asked();
+    if (Object.keys(columns).length || header !== undefined) {
       const stem = choices.log.split("/").at(-1).replace(/\.[^.]*$/, "");
-      const model = await post("models", { name: `${stem}-columns.toml`, columns: choices.columns, ...(choices.header === null ? {} : { header: choices.header }) });
+      const model = await post("models", { name: `${stem}-columns.toml`, columns, header });
       options.model = model.file;
     }
     const name = await start("inspect", [choices.log], options);
@@ -209,9 +218,10 @@ export function build(panel, go) {
 
   panel.append(
     dropZone("Drop a log here", isLog, pick),
-    make("div", { class: "row" }, fileChoice("Log of this session", isLog, () => choices.log, pick)),
+    make("div", { class: "row" }, fileChoice("Log of this session", "log", () => choices.log, pick)),
     said.element, busy, body, view.element, rows);
-  if (choices.log) look();
+  watch(follow);
+  follow();
 }
 
 // What a line of the commands advises to say of a column: which, and of what; `value` where it names one.

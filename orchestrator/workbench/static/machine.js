@@ -1,10 +1,16 @@
 import { fileAddress, get, post } from "./api.js";
 import { digits, field, fill, make, numberInput } from "./dom.js";
 import { action, dropZone, fileChoice, isModel, message } from "./parts.js";
-import { choices, choose, draft, watch } from "./state.js";
+import { choices, choose, session, watch } from "./state.js";
 
 const ENCODERS = { theta_m: "motor encoder", theta_l: "load encoder" };
 const TAGS = { assumed: "warn", "from the record": "", yours: "good", "the FMU's own": "" };
+
+// What was changed of the chosen model file and is not saved, in words.
+export function unsaved() {
+  const { parameters = {}, encoders = {} } = choices.edits[choices.model] ?? {};
+  return [...Object.keys(parameters), ...Object.keys(encoders).map((name) => ENCODERS[name])];
+}
 
 // The model file as fields: every value with unit, uncertainty and where it is from.
 export function build(panel, go) {
@@ -14,7 +20,6 @@ export function build(panel, go) {
   async function load() {
     if (shown === choices.model) return;
     const asked = shown = choices.model;
-    draft.names = [];
     said.say("");
     fill(body, make("p", { class: "note", role: "status" }, "Reading …"));  // no field of the model before is typed into
     try {
@@ -27,19 +32,23 @@ export function build(panel, go) {
   }
 
   function draw(model) {
-    const changed = {}, encoders = structuredClone(model.encoders);
+    const edits = structuredClone(choices.edits[shown] ?? {}), changed = edits.parameters ?? {};
+    const encoders = structuredClone({ ...model.encoders, ...edits.encoders });
     const main = model.parameters.filter((one) => one.linear);
     const rest = model.parameters.filter((one) => !one.linear);
     const named = new Set(model.effects.flatMap((effect) => effect.parameters));
     const state = make("p", { class: "note", role: "status" });
     const tell = () => {
-      const names = draft.names = [...Object.keys(changed), ...Object.keys(ENCODERS).filter((name) => JSON.stringify(encoders[name]) !== JSON.stringify(model.encoders[name])).map((name) => ENCODERS[name])];
-      choose({});
-      state.textContent = names.length ? `Changed and not saved: ${names.join(", ")}` : "";
+      const other = Object.keys(encoders).filter((name) => JSON.stringify(encoders[name]) !== JSON.stringify(model.encoders[name] ?? {}));
+      const parts = { parameters: changed, encoders: Object.fromEntries(other.map((name) => [name, encoders[name]])) };
+      const now = other.length || Object.keys(changed).length ? parts : null;
+      if (JSON.stringify(now) !== JSON.stringify(choices.edits[shown] ?? null)) choose({ edits: { [shown]: now } });
+      state.textContent = now ? `Changed and not saved: ${unsaved().join(", ")}` : "";
     };
 
     function row(one) {
-      const tag = make("span", { class: `tag ${TAGS[one.source]}` }, one.source);
+      const edited = changed[one.name], current = { ...one, ...edited };
+      const tag = make("span", { class: `tag ${edited ? "good" : TAGS[one.source]}` }, edited ? "yours" : one.source);
       const set = (key, number) => {
         changed[one.name] ??= { value: one.value, uncertainty: one.uncertainty };
         if (key === "value") {
@@ -51,10 +60,10 @@ export function build(panel, go) {
         tag.textContent = "yours";
         tell();
       };
-      const value = numberInput({ value: String(one.value), required: true, "aria-label": `${one.name}, value in ${one.unit || "1"}` }, (number) => set("value", number));
-      const share = one.value === 0 ? 0 : (100 * one.uncertainty) / Math.abs(one.value);
+      const value = numberInput({ value: String(current.value), required: true, "aria-label": `${one.name}, value in ${one.unit || "1"}` }, (number) => set("value", number));
+      const share = current.value === 0 ? 0 : (100 * current.uncertainty) / Math.abs(current.value);
       const off = numberInput({ value: digits(share), required: true, "aria-label": `${one.name}, off by at most, in percent` }, (number) => set("uncertainty", number), (number) => number >= 0);
-      off.disabled = one.value === 0;  // no share of nothing
+      off.disabled = current.value === 0;  // no share of nothing
       return make("tr", {}, make("td", {}, make("strong", {}, one.name), make("br"), make("span", { class: "note" }, one.meaning)),
         make("td", { class: "pair" }, value, " ", one.unit === "1" ? "" : one.unit), make("td", { class: "pair", "data-label": "off by at most" }, off, " %"),
         make("td", {}, tag, make("br"), make("span", { class: "note" }, one.said.replace(/^[^:]*: (?:[^;]*; )?(?=.)/, ""))));
@@ -92,15 +101,22 @@ export function build(panel, go) {
           const stem = (choices.model || "machine.toml").split("/").at(-1).replace(/(-yours)?(-\d+)?\.toml$/, "");
           const made = await post("models", { base: choices.model || null, name: `${stem}-yours.toml`, parameters: changed, encoders });
           shown = null;
-          choose({ model: made.file, saidIn: { ...choices.saidIn, [made.file]: choices.saidIn?.[choices.model] } });
+          choose({ model: made.file, edits: { [choices.model]: null }, saidIn: { [made.file]: choices.saidIn[choices.model] ?? null } });
         }, "main"),
         action("Go on to the gap", said, () => go("gap"))));
     tell();
   }
 
+  function take(file) {
+    const { kind, name } = session.files.find((one) => one.file === file);
+    if (kind === "model") choose({ model: file });
+    else if (kind === "settings") choose({ fields: { settings: file } });
+    if (kind !== "model") said.say(`${name} holds ${kind === "settings" ? "settings of a diagnosis: it is chosen in the tab Diagnosis" : "a scenario, and no model"}`);
+  }
+
   panel.append(
-    dropZone("Drop a model file here", isModel, (file) => choose({ model: file })),
-    make("div", { class: "row" }, fileChoice("Model file of this session", isModel, () => choices.model, (model) => choose({ model }), "the default machine")),
+    dropZone("Drop a model or settings file here", isModel, take),
+    make("div", { class: "row" }, fileChoice("Model file of this session", "model", () => choices.model, (model) => choose({ model }), "the default machine")),
     said.element, body);
   watch(load);
   load();

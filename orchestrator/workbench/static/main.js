@@ -12,6 +12,7 @@ import * as compare from "./compare.js";
 const TABS = [
   ["log", "Log", log], ["machine", "Machine", machine], ["gap", "Gap", gap], ["diagnosis", "Diagnosis", diagnosis], ["model", "Model", model], ["fmus", "FMUs", fmus], ["compare", "Compare", compare],
 ];
+await refresh();  // the work as it was
 const tabs = document.getElementById("tabs"), panels = document.getElementById("panels");
 
 function go(key, focus = true) {
@@ -50,11 +51,13 @@ let shown = "";
 watch(() => {
   document.getElementById("folder").textContent = session.folder;
   const jobs = session.jobs.filter((job) => !isOver(job));
-  const now = JSON.stringify([session.gone, jobs]);
+  const now = JSON.stringify([session.gone, session.unkept, jobs]);
   if (now === shown) return;
   shown = now;
   const held = running.contains(document.activeElement);
-  fill(running, session.gone ? make("p", { class: "message", role: "alert" }, "The workbench has ended: start it again; files and results are in its directory.") : null, jobs.map(jobLine));
+  const alarm = session.gone ? "The workbench has ended: start it again; files, choices and results are in its directory."
+    : session.unkept && `What you chose is not kept: ${session.unkept}`;
+  fill(running, alarm ? make("p", { class: "message", role: "alert" }, alarm) : null, jobs.map(jobLine));
   if (held && document.activeElement === document.body) tabs.querySelector("[aria-selected=true]").focus({ preventScroll: true });  // its Stop went with the job
 });
 
@@ -65,4 +68,3 @@ theme.addEventListener("click", () => { document.documentElement.dataset.theme =
 label();
 
 go(asked(), false);
-refresh();

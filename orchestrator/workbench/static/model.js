@@ -1,6 +1,6 @@
 import { fileAddress } from "./api.js";
 import { choice, field, fill, make } from "./dom.js";
-import { action, fileChoice, isFmu, jobView, message } from "./parts.js";
+import { action, fileChoice, jobView, message } from "./parts.js";
 import { sliders } from "./sliders.js";
 import { choose, isOver, latest, session, start, watch } from "./state.js";
 
@@ -27,7 +27,7 @@ export function build(panel) {
   watch(draw);
   draw();
   panel.append(list,
-    make("div", { class: "row" }, fileChoice("FMU or SSP file", isFmu, () => fmu, (file) => { fmu = file; choose({}); })),
+    make("div", { class: "row" }, fileChoice("FMU or SSP file", "fmu", () => fmu, (file) => { fmu = file; choose({}); })),
     said.element,
     make("div", { class: "row" }, action("Check it", said, async () => {
       if (!fmu) throw new Error("choose an FMU first");

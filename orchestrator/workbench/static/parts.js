@@ -1,19 +1,29 @@
 import { fileAddress, upload } from "./api.js";
 import { choice, fill, field, make, plain, wrongField } from "./dom.js";
-import { choices, choose, isOver, jobOf, refresh, session, stop, watch } from "./state.js";
+import { choices, choose, discard, isOver, jobOf, open, refresh, runAgain, session, stop, watch } from "./state.js";
 
 const NO_LOGS = /\.(toml|fmu|ssp|json|html|png)$/i;
-const OUTPUT = "output.txt";  // what a job has printed
 const PLACES = "logs go into the tab Log, model files (.toml) into Machine, FMUs and SSP files into FMUs";
 export const isLog = (name) => !NO_LOGS.test(name);
 export const isModel = (name) => /\.toml$/i.test(name);
 export const isFmu = (name) => /\.(fmu|ssp)$/i.test(name);
 
-// All files of the session of one kind, those of results too.
-export function filesOf(test) {
-  const uploads = session.files.filter((file) => test(file.name)).map((file) => [file.file, file.name]);
-  const results = session.jobs.flatMap((job) => job.files.filter((name) => test(name) && name !== OUTPUT).map((name) => [`results/${job.name}/${name}`, `${job.name}: ${name}`]));
+// All files of the session of one kind: model files and FMUs of results, too.
+export function filesOf(kind) {
+  const uploads = session.files.filter((file) => file.kind === kind && !choices.drawn[file.file]).map((file) => [file.file, file.name]);
+  const made = { model: isModel, fmu: isFmu }[kind] ?? (() => false);
+  const results = session.jobs.flatMap((job) => job.files.filter(made).map((name) => [`results/${job.name}/${name}`, `${job.name}: ${name}`]));
   return [...uploads, ...results];
+}
+
+// A control whose value the session keeps.
+export function kept(key, control, usual = "") {
+  const what = control.type === "checkbox" ? "checked" : "value";
+  const show = () => { if (control !== document.activeElement) control[what] = choices.fields[key] ?? usual; };
+  control.addEventListener("change", () => choose({ fields: { [key]: control[what] === usual ? null : control[what] } }));
+  watch(show);
+  show();
+  return control;
 }
 
 // A place to drop a file on, with a button for those who do not drag; `able` says which names are meant for it.
@@ -48,11 +58,11 @@ export function dropZone(text, able, taken, multiple = false) {
 }
 
 // A choice among files of the session that follows what comes and goes.
-export function fileChoice(text, test, value, picked, none = "none") {
+export function fileChoice(text, kind, value, picked, none = "none") {
   const place = make("div", { class: "field grows" });
   let shown = "";
   const draw = () => {
-    const options = [["", none], ...filesOf(test)];
+    const options = [["", none], ...filesOf(kind)];
     const now = JSON.stringify([options, value()]);
     if (now === shown) return;
     shown = now;
@@ -106,10 +116,21 @@ function finished(job) {
       make("strong", {}, job.name), make("span", { class: `tag ${STATES[job.state]}` }, job.state),
       make("span", { class: "note" }, seconds > 0 ? duration(seconds) : ""),
       make("span", { class: "note" }, job.files.length > 1 ? "" : job.state === "stopped" ? "no results were left" : "")),
+    jobButtons(job),
     words.map((text) => make("p", { class: job.state === "failed" ? "message" : "message calm" }, plain(text.replace(/^error: /, "").replaceAll("Ctrl-C", "Stop")))),
     make("code", {}, job.line),
     make("ul", { class: "files" }, job.files.map((name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`),
       ...(name.endsWith(".html") ? { target: "_blank", rel: "noopener" } : { download: name.split("/").at(-1) }) }, name)))));
+}
+
+// What can be done with a job that has ended; `more`: further buttons.
+export function jobButtons(job, more = null) {
+  const said = message(), named = (text, act) => {
+    const made = action(text, said, () => act(job));
+    made.setAttribute("aria-label", `${text}: ${job.name}`);
+    return made;
+  };
+  return make("div", {}, make("div", { class: "row" }, more === "open" ? named("Open", open) : null, named("Run again", runAgain), named("Remove", discard)), said.element);
 }
 
 function reportOf(job) {

@@ -1,33 +1,65 @@
 import { get, post } from "./api.js";
 
-// What this tab works on; other tabs of the browser have their own.
-const KEPT = "workbench";
-export const choices = { log: "", model: "", columns: {}, header: null, shown: {}, ...JSON.parse(sessionStorage.getItem(KEPT) ?? "{}") };
-export const session = { folder: "", files: [], jobs: [], largest_file: 0 };
-export const draft = { names: [] };  // what the tab Machine has changed and not saved
+// What the session keeps of the work, for every tab of the browser, after a restart, and at another port.
+const EMPTY = { log: "", model: "", given: "", logs: {}, fields: {}, shown: {}, before: {}, saidIn: {}, edits: {}, drawn: {} };
+const NOTHING = { columns: {}, header: null };
+export const choices = structuredClone(EMPTY);
+export const session = { folder: "", files: [], jobs: [], version: 0, gone: false, unkept: "" };
 const watchers = new Set();
+let pending = {}, sending = false;
 
 export function watch(act) { watchers.add(act); }
 
+function tell() { watchers.forEach((act) => act()); }
+
+const isTable = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
+
+// As the server does: a table entry by entry, anything else in place of what was there; null removes.
+function merge(table, changes) {
+  for (const [name, value] of Object.entries(changes)) {
+    table[name] = isTable(value) && isTable(table[name]) ? { ...table[name], ...value } : value;
+  }
+}
+
 export function choose(changes) {
-  Object.assign(choices, changes);
-  sessionStorage.setItem(KEPT, JSON.stringify(choices));
+  merge(choices, changes);
+  merge(pending, changes);
+  send();
   tell();
 }
 
-function tell() { watchers.forEach((act) => act()); }
+async function send() {
+  if (sending) return;
+  sending = true;
+  while (Object.keys(pending).length) {
+    const sent = pending;
+    pending = {};
+    try {
+      const { version } = await post("notes", sent, true);
+      if (version === session.version + 1) session.version = version;  // else another tab has kept something, too
+      session.unkept = "";
+    } catch (error) {
+      merge(sent, pending);
+      pending = sent;
+      session.unkept = error.message;
+      tell();
+      break;
+    }
+  }
+  sending = false;
+}
 
-// Another log: what was said of its columns is kept, should one come back to it.
-export function chooseLog(log, changes = {}) {
-  if (log === choices.log) return;
-  const kept = { ...choices.kept, [choices.log]: { columns: choices.columns, header: choices.header } };
-  choose({ columns: {}, header: null, ...kept[log], ...changes, log, kept });
+// What was said of the columns of the chosen log.
+export const stated = () => choices.logs[choices.log] ?? NOTHING;
+
+export function state(changes) {
+  choose({ logs: { [choices.log]: { ...stated(), ...changes } } });
 }
 
 // The model file that a command gets: the chosen one, with what the tab Log says of the columns now.
 export async function modelOfLog() {
-  const { log, columns, header, model } = choices, known = choices.saidIn?.[model];
-  const before = known?.log === log ? known : { columns: {}, header: null };
+  const { log, model } = choices, { columns, header } = stated(), known = choices.saidIn[model];
+  const before = known?.log === log ? known : NOTHING;
   if (JSON.stringify([before.columns, before.header]) === JSON.stringify([columns, header])) return model;
   if (!model) throw new Error("press “Look at this log” in the tab Log first: it drafts a model file that has what was said of the columns");
   const found = await get(`model?file=${encodeURIComponent(model)}`), merged = {};
@@ -36,10 +68,10 @@ export async function modelOfLog() {
     const entry = { ...kept, ...columns[name] };
     if (Object.keys(entry).length) merged[name] = entry;
   }
-  const stated = header ?? (before.header === null ? found.header : null);
-  if (JSON.stringify([merged, stated]) === JSON.stringify([found.columns, found.header])) return model;
+  const line = header ?? (before.header === null ? found.header : null);
+  if (JSON.stringify([merged, line]) === JSON.stringify([found.columns, found.header])) return model;
   const stem = model.split("/").at(-1).replace(/(-columns)?(-\d+)?\.[^.]*$/, "");
-  const made = await post("models", { base: model, name: `${stem}-columns.toml`, columns: merged, header: stated });
+  const made = await post("models", { base: model, name: `${stem}-columns.toml`, columns: merged, header: line });
   noteColumns(made.file);
   choose({ model: made.file });
   return made.file;
@@ -47,8 +79,7 @@ export async function modelOfLog() {
 
 // Note that a model file says of the columns what the tab Log does now.
 export function noteColumns(model) {
-  const { log, columns, header } = choices;
-  choose({ saidIn: { ...choices.saidIn, [model]: { log, columns, header } } });
+  choose({ saidIn: { [model]: { log: choices.log, ...stated() } } });
 }
 
 let timer = 0;
@@ -57,7 +88,14 @@ export async function refresh() {
   clearTimeout(timer);
   let busy = false;
   try {
-    Object.assign(session, await get("state"), { gone: false });
+    const { notes, version, ...found } = await get(`state?notes=${session.version}`);
+    Object.assign(session, found, { gone: false });
+    if (notes && version > session.version && !sending) {
+      session.version = version;
+      for (const name of Object.keys(choices)) delete choices[name];
+      Object.assign(choices, structuredClone(EMPTY), notes);
+      merge(choices, pending);
+    }
     busy = session.jobs.some((job) => !isOver(job));
   } catch {
     session.gone = true;
@@ -79,5 +117,39 @@ export async function start(command, inputs, options = {}) {
 
 export async function stop(name) {
   await post(`jobs/${encodeURIComponent(name)}/stop`);
+  await refresh();
+}
+
+// Where the results of a command are shown: the tab, and its view of a job.
+const PLACES = {
+  inspect: ["log", "log"], estimate: ["gap", "gap"], diagnose: ["diagnosis", "diagnosis"],
+  check: ["fmus", "fmu"], ssp: ["fmus", "fmu"], simulate: ["fmus", "fmus"],
+};
+
+// Show a result in its tab, beside the log and the model file that it was made of.
+export function open(job) {
+  const [tab, view] = PLACES[job.command], [log] = job.asked.inputs ?? [], { model = "" } = job.asked.options ?? {};
+  const ofLog = ["log", "gap", "diagnosis"].includes(tab) && log;
+  choose({ shown: { [view]: job.name }, ...(ofLog ? { log } : {}), ...(ofLog && tab !== "log" ? { model } : {}) });
+  location.hash = tab;
+}
+
+export async function runAgain(job) {
+  const name = await start(job.command, job.asked.inputs, job.asked.options);
+  if (choices.before[job.name]) choose({ before: { [name]: choices.before[job.name] } });
+  open(jobOf(name));
+}
+
+// Remove a result; nothing chosen is left that points into it.
+export async function discard(job) {
+  const users = session.jobs.filter((one) => JSON.stringify(one.asked).includes(`"results/${job.name}/`)).map((one) => one.name);
+  const more = users.length ? `\n${users.join(", ")} used files of it and cannot run again without them.` : "";
+  if (!confirm(`Remove ${job.name} and its files for good?${more}`)) return;
+  await post(`jobs/${encodeURIComponent(job.name)}/remove`);
+  const views = Object.keys(choices.shown).filter((view) => choices.shown[view] === job.name);
+  choose({
+    shown: Object.fromEntries(views.map((view) => [view, null])), before: { [job.name]: null },
+    ...(choices.model.startsWith(`results/${job.name}/`) ? { model: "" } : {}),
+  });
   await refresh();
 }
