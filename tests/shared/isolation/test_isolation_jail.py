@@ -210,7 +210,7 @@ def test_a_child_dies_with_its_parent_and_the_next_run_cleans_up() -> None:
     wait_until_gone([child])  # where no process reaps orphans it stays as a zombie
     place = Path(str(tempfile.tempdir))
     assert list(place.glob(f"{PREFIX}*"))
-    from orchestrator.shared.isolation import scratch
+    from orchestrator.shared import scratch
 
     scratch._swept.clear()
     with Scratch() as fresh:
