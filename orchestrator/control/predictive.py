@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,10 @@ from orchestrator.control.measures import bound_time
 from orchestrator.errors import DesignError, SlaveError
 from orchestrator.master.protocol import ModelInterface, Signals, Transfer, Value, Variable
 from orchestrator.master.system import Connection, Instance, System
-from orchestrator.plants.design import five_state_model, six_state_model
+from orchestrator.plants.design import discretise, five_state_model, six_state_model, solve_riccati
 from orchestrator.scenarios.definition import Scenario
 from pyfmu_sources.controllers.backlash_compensator import Tuning, impact_speed
 from pyfmu_sources.controllers.lqr import Estimate
-
-if TYPE_CHECKING:
-    from control import StateSpace
 
 Array = NDArray[np.float64]
 BLOCKS = 14  # held requests of a horizon
@@ -57,8 +54,6 @@ class PredictiveLaw:
     """The two programmes of a task, condensed: requests are their only unknowns."""
 
     def __init__(self, task: ControlTask) -> None:
-        import control
-
         daqp = require_solver()
         v, h = task.nominal, task.sample_time
         self.task = task
@@ -78,13 +73,12 @@ class PredictiveLaw:
         # On the flank.
         price = task.torque_weight * h
         keep = [0, 1, 2, 3, 5]
-        sampled = control.c2d(five_state_model(v), h)
+        sampled = discretise(five_state_model(v), h)
         weights = np.zeros((self._steps, 6, 6))
         weights[:, np.ix_(keep, keep)[0], np.ix_(keep, keep)[1]] = np.diag(task.state_weights) * h
-        weights[-1][np.ix_(keep, keep)] = control.dlqr(sampled, weights[-1][np.ix_(keep, keep)], price, method="scipy")[
-            1
-        ]
-        free, forced = predict(control.c2d(six_state_model(v), h), held)
+        _, to_go = solve_riccati(*sampled, weights[-1][np.ix_(keep, keep)], np.array([[price]]))
+        weights[-1][np.ix_(keep, keep)] = to_go
+        free, forced = predict(*discretise(six_state_model(v), h), held)
         weighed = np.einsum("kam,kab->mkb", forced, weights)
         H = np.einsum("mkb,kbn->mn", weighed, forced) + price * held.T @ held
         self._held_state = np.einsum("mkb,kbc->mc", weighed, free)
@@ -94,7 +88,7 @@ class PredictiveLaw:
         self._hold.setup(H, np.zeros(box.size), np.zeros((0, box.size)), box, -box)
 
         # In the gap; rows of the way and of its speed.
-        free, forced = predict(control.c2d(six_state_model(replace(v, k=0.0, c=0.0)), h), held)
+        free, forced = predict(*discretise(six_state_model(replace(v, k=0.0, c=0.0)), h), held)
         way = np.array([[1.0 / v.i, 0, -1.0, 0, 0, 0], [0, 1.0 / v.i, 0, -1.0, 0, 0]])
         free, forced = way @ free, way @ forced
         w, self._rate = QUICKNESS / bound, RATE / bound
@@ -159,9 +153,8 @@ class PredictiveLaw:
         return float(best[0]) * self.task.machine.torque_limit
 
 
-def predict(sampled: "StateSpace", held: Array) -> tuple[Array, Array]:
+def predict(A: Array, B: Array, held: Array) -> tuple[Array, Array]:
     """Return free response (steps, n, n) of the state and its response to the held requests (steps, n, blocks)."""
-    A, B = sampled.A, sampled.B
     free, forced = [A], [B @ held[:1]]
     for row in held[1:]:
         free.append(A @ free[-1])

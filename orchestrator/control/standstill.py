@@ -6,24 +6,18 @@ out the gap is small. It ends in rest or in the outermost cycle. So the motion i
 several starts, exactly between samples of the controller but for the instant of a contact, until it repeats.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.errors import ScenarioError
-from orchestrator.plants.design import DrivetrainValues, five_state_model, rank_report, six_state_model
+from orchestrator.plants.design import DrivetrainValues, LinearModel, five_state_model, rank_report, six_state_model
 from orchestrator.shared.results.regulator import ForecastFound
-
-if TYPE_CHECKING:
-    from control import StateSpace
 
 Array = NDArray[np.float64]
 
@@ -104,7 +98,7 @@ def forecast_rest(
     )
 
 
-def loop_margins(model: StateSpace, gains: tuple[float, ...], sample_time: float, delay: int = 0) -> Margins:
+def loop_margins(model: LinearModel, gains: tuple[float, ...], sample_time: float, delay: int = 0) -> Margins:
     """Return the margins of the loop at the request [states of ``model``].
 
     The sampled loop has poles near ``z = 1``, where the polynomials of ``control.stability_margins`` cancel: they say a
@@ -138,7 +132,7 @@ def loop_margins(model: StateSpace, gains: tuple[float, ...], sample_time: float
 
 
 def loop_response(
-    model: StateSpace, gains: tuple[float, ...], sample_time: float, delay: int
+    model: LinearModel, gains: tuple[float, ...], sample_time: float, delay: int
 ) -> Callable[[Array], NDArray[np.complex128]]:
     """Return ``L(z) = K (z - A)^-1 B z^-delay`` as a function of angles of ``z`` [rad], shape (n,)."""
     import control

@@ -2,24 +2,19 @@
 
 Models are those of the thesis with its errata mended: the regulator works on the controllable five-state model, the
 estimator on six states with the load torque as an integrated disturbance. All gains are for a sampled system whose
-input is held over a sample. Models, sampling and Riccati equations are python-control's. It is imported where it is
-used: worker processes design nothing, and it takes a second.
+input is held over a sample. scipy, which is imported where it is used, solves the Riccati equations: python-control
+would call the same function, and loads matplotlib.
 
 In all functions: ``sample_time`` [s].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import DesignError
-
-if TYPE_CHECKING:
-    from control import StateSpace
 
 Array = NDArray[np.float64]
 
@@ -41,6 +36,14 @@ class DrivetrainValues:
     b_l: float = 1.0
     i: float = 3.984
     tau: float = 1.0
+
+
+class LinearModel(NamedTuple):
+    """A linear model ``x' = A x + B u``, ``y = C x``."""
+
+    A: Array
+    B: Array
+    C: Array
 
 
 @dataclass(frozen=True)
@@ -82,10 +85,8 @@ class KalmanFilter:
     sample_time: float
 
 
-def six_state_model(values: DrivetrainValues) -> StateSpace:
+def six_state_model(values: DrivetrainValues) -> LinearModel:
     """Return the model of eq. 3.5 with states ``ESTIMATOR_STATES`` and outputs ``(theta_m, theta_l)``."""
-    import control
-
     v = values
     A = np.zeros((6, 6))
     A[0, 1] = A[2, 3] = 1.0
@@ -101,19 +102,17 @@ def six_state_model(values: DrivetrainValues) -> StateSpace:
     A[5, 5] = -1.0 / v.tau
     B = np.array([[0.0], [0.0], [0.0], [0.0], [0.0], [1.0 / v.tau]])
     C = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0]])
-    return control.ss(A, B, C, 0, states=ESTIMATOR_STATES)
+    return LinearModel(A, B, C)
 
 
-def five_state_model(values: DrivetrainValues) -> StateSpace:
+def five_state_model(values: DrivetrainValues) -> LinearModel:
     """Return the model without the load torque, states ``REGULATOR_STATES``: what a regulator can control."""
-    import control
-
     six = six_state_model(values)
     keep = [0, 1, 2, 3, 5]
-    return control.ss(six.A[np.ix_(keep, keep)], six.B[keep], six.C[:, keep], 0, states=REGULATOR_STATES)
+    return LinearModel(six.A[np.ix_(keep, keep)], six.B[keep], six.C[:, keep])
 
 
-def rank_report(model: StateSpace) -> RankReport:
+def rank_report(model: LinearModel) -> RankReport:
     """Return ranks, uncontrollable modes, stabilisability and detectability of ``model``.
 
     Ranks count the modes that pass the test of Popov, Belevitch and Hautus. The rank of python-control's ``ctrb`` is
@@ -121,9 +120,9 @@ def rank_report(model: StateSpace) -> RankReport:
     """
     stuck, hidden = _uncontrollable_modes(model.A, model.B), _uncontrollable_modes(model.A.T, model.C.T)
     return RankReport(
-        order=model.nstates,
-        controllable=model.nstates - len(stuck),
-        observable=model.nstates - len(hidden),
+        order=len(model.A),
+        controllable=len(model.A) - len(stuck),
+        observable=len(model.A) - len(hidden),
         uncontrollable=tuple(stuck),
         stabilisable=all(mode.real < -RANK_TOLERANCE for mode in stuck),
         detectable=all(mode.real < -RANK_TOLERANCE for mode in hidden),
@@ -140,14 +139,30 @@ def _uncontrollable_modes(A: Array, B: Array) -> list[complex]:
     return missed
 
 
-def design_regulator(model: StateSpace, Q: Array, R: float, sample_time: float) -> Regulator:
+def discretise(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
+    """Return (A, B) of ``model`` with its input held over a sample."""
+    from scipy.linalg import expm
+
+    n, m = model.B.shape
+    step = expm(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) * sample_time)
+    return step[:n, :n], step[:n, n:]
+
+
+def solve_riccati(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
+    """Return gains (inputs, states) and cost to go (states, states) of the sampled LQR ``u = -K x``."""
+    from scipy.linalg import solve_discrete_are
+
+    P = solve_discrete_are(A, B, Q, R)
+    gains: Array = np.linalg.solve(B.T @ P @ B + R, B.T @ P @ A)
+    return gains, P
+
+
+def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float) -> Regulator:
     """Return the sampled LQR of ``model`` for the continuous weights ``Q`` and ``R`` times the sample time.
 
     Args:
         Q: (states, states) weights of the states.
     """
-    import control
-
     report = rank_report(model)
     if not report.stabilisable:
         modes = ", ".join(f"{mode:.3g}" for mode in report.uncontrollable)
@@ -156,38 +171,37 @@ def design_regulator(model: StateSpace, Q: Array, R: float, sample_time: float) 
             f"no input moves the mode at {modes} 1/s; leave the uncontrollable states out of the regulator and "
             "feed their estimate forward"
         )
-    sampled = control.c2d(model, sample_time)
+    A, B = discretise(model, sample_time)
     try:
-        gains, _, poles = control.dlqr(sampled, Q * sample_time, np.array([[R * sample_time]]), method="scipy")
+        gains, _ = solve_riccati(A, B, Q * sample_time, np.array([[R * sample_time]]))
     except np.linalg.LinAlgError as error:
         raise DesignError(f"the regulator's Riccati equation has no solution: {error}") from None
+    poles = np.linalg.eigvals(A - B @ gains)
     if not np.all(np.abs(poles) < 1.0):
         raise DesignError("the regulator's Riccati equation has no stabilising solution for these weights")
     k = tuple(float(g) for g in np.ravel(gains))
     return Regulator(k, sample_time, tuple(complex(p) for p in poles))  # type: ignore[arg-type]
 
 
-def design_estimator(model: StateSpace, process: Array, measurement: Array, sample_time: float) -> KalmanFilter:
+def design_estimator(model: LinearModel, process: Array, measurement: Array, sample_time: float) -> KalmanFilter:
     """Return the stationary Kalman filter of ``model``.
 
     Args:
         process: intensities of the white noise on each state, 6 values, unit^2/s.
         measurement: variances of both encoders [rad2].
     """
-    import control
-
     if not rank_report(model).detectable:
         raise DesignError("`model` must be detectable, but a mode that does not decay reaches no output")
-    sampled = control.c2d(model, sample_time)
+    A, B = discretise(model, sample_time)
     Q = _noise_covariance(model.A, np.diag(process), sample_time)
     R = np.diag(measurement)
     try:
-        _, P, _ = control.dlqe(sampled.A, np.eye(model.nstates), model.C, Q, R, method="scipy")
+        _, P = solve_riccati(A.T, model.C.T, Q, R)
     except np.linalg.LinAlgError as error:
         raise DesignError(f"the estimator's Riccati equation has no solution: {error}") from None
     S = model.C @ P @ model.C.T + R
     L = P @ model.C.T @ np.linalg.inv(S)
-    return KalmanFilter(sampled.A, sampled.B[:, 0], L, np.linalg.inv(S), sample_time)
+    return KalmanFilter(A, B[:, 0], L, np.linalg.inv(S), sample_time)
 
 
 def _noise_covariance(A: Array, intensity: Array, h: float) -> Array:

@@ -67,7 +67,7 @@ def test_it_knows_the_move_ahead_and_the_torque_limit(law):
 def test_it_crosses_quickly_and_lands_softly(law, flank):
     task = law.task
     free = six_state_model(DrivetrainValues(tau=task.nominal.tau, k=0.0, c=0.0, b_m=0.0, b_l=0.0))
-    sampled = control.c2d(free, task.sample_time)
+    sampled = control.c2d(control.ss(*free, 0), task.sample_time)
     A, B = sampled.A, sampled.B
     x = at_rest(task, -flank * ALPHA, angle=-0.25 * flank)
     samples = 0

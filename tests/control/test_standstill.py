@@ -21,7 +21,7 @@ def gains_of(tau, weights):
 
 def spectral_radius(values, gains, delay):
     """Of the sampled loop whose request is late by whole samples."""
-    sampled = control.c2d(five_state_model(values), STEP)
+    sampled = control.c2d(control.ss(*five_state_model(values), 0), STEP)
     A, B = sampled.A, sampled.B
     n = 5 + delay
     whole = np.zeros((n, n))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from control import c2d
+from control import c2d, ss
 
 from orchestrator.plants.design import DrivetrainValues, six_state_model
 from pyfmu_sources.controllers.backlash_compensator import (
@@ -135,7 +135,7 @@ def test_too_quick_for_a_plan_it_brakes_and_does_not_turn_round():
 @pytest.mark.parametrize("tau", [5e-4, 1e-3, 5e-3, 1.0], ids="drive {:g}".format)
 def test_a_drive_as_quick_as_the_samples_lands_softly_too(tau, share):
     apart = six_state_model(DrivetrainValues(tau=tau, J_m=0.4 * share, k=0.0, c=0.0))
-    sampled = c2d(apart, 5e-5)
+    sampled = c2d(ss(*apart, 0), 5e-5)
     A, B = sampled.A, sampled.B
     x = np.array([-0.02 * 3.984, 0.0, 0.0, 0.0, 0.0, 0.0])
     state = start_state(tuple(x), 0.0, 3.984)
