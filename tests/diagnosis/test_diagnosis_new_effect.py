@@ -135,7 +135,7 @@ def edits_between(start: str, stop: str) -> list[str]:
 @pytest.mark.skipif(not have_compiler(), reason="no C compiler")
 def test_worked_example_adds_an_effect_to_every_plant_and_any_fmu(tmp_path: Path) -> None:
     copy_project(tmp_path)
-    edits = edits_between("## Adding an effect", "### Where an effect stands")
+    edits = edits_between("## Adding an effect", "### On which plants an effect acts")
     assert len(edits) == 6
     assert len({apply(edit, tmp_path) for edit in edits}) == 2
     assert sum("speed * speed * speed" in edit for edit in edits) == 1
