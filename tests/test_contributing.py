@@ -157,6 +157,18 @@ def apply(edit, root):
     return match[1]
 
 
+def test_the_tests_of_every_recipe_are_named_and_there():
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| (an? [\w ]+) \| (.+) \|$", page, re.MULTILINE))
+    assert rows.keys() == {"an effect", "a plant", *(title[0].lower() + title[1:] for title in PROGRAMS)}
+    for row in rows.values():
+        named = re.findall(r"`(tests/[\w/.]+)(?: -k (\w+))?`", row)
+        assert len(named) >= 2, row
+        for path, words in named:
+            assert (ROOT / path).exists(), path
+            assert not words or any(words in title.lower() for title in PROGRAMS), words
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("title", PROGRAMS)
 def test_a_recipe_works_on_a_copy(tmp_path, title):
