@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from orchestrator.building.build import ensure_built
-from orchestrator.building.interface_tables import PAGE, tables, with_tables
+from tools.interface_tables import PAGE, tables, with_tables
 
 
 def test_the_page_is_the_built_interfaces() -> None:
     page = PAGE.read_text(encoding="utf-8")
-    assert with_tables(page, tables(ensure_built())) == page, "run `python -m orchestrator.building.interface_tables`"
+    assert with_tables(page, tables(ensure_built())) == page, "run `python -m tools.interface_tables`"
 
 
 def test_a_change_of_an_interface_shows(fmus: dict[str, Path]) -> None:

@@ -1,6 +1,6 @@
-"""The interface tables of ``fmus/README.md``, made from the FMUs' own model descriptions.
+"""Write the interface tables of ``fmus/README.md``, made from the FMUs' own model descriptions.
 
-``python -m orchestrator.building.interface_tables`` writes them anew; a test holds the page to them.
+python -m tools.interface_tables
 """
 
 import re
@@ -11,9 +11,10 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.building.archive import read_archive
 from orchestrator.building.build import ROOT, ensure_built
+from tools import refuse_arguments
 
 PAGE = ROOT / "fmus" / "README.md"
-BEGIN = "<!-- interfaces: made by `python -m orchestrator.building.interface_tables` -->\n"
+BEGIN = "<!-- interfaces: made by `python -m tools.interface_tables` -->\n"
 END = "<!-- end of interfaces -->\n"
 SECTIONS = (("Inputs", "input"), ("Outputs", "output"), ("Parameters", "parameter"))
 
@@ -24,7 +25,7 @@ def tables(fmus: dict[str, Path]) -> str:
 
 
 def with_tables(page: str, text: str) -> str:
-    """Return the page with what stands between its two marks replaced by ``text``."""
+    """Return the page with the text between its two marks replaced."""
     before, rest = page.split(BEGIN)
     after = rest.split(END)[1]
     return f"{before}{BEGIN}\n{text}\n{END}{after}"
@@ -74,10 +75,6 @@ def _range(kind: dict[str, str]) -> str:
     return f"{_short(low or '')} … {_short(high or '')}"
 
 
-def main() -> None:
-    """Write the page's tables anew."""
-    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), tables(ensure_built())), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    refuse_arguments(__doc__)
+    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), tables(ensure_built())), encoding="utf-8")
