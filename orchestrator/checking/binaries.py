@@ -61,8 +61,8 @@ PLATFORMS: dict[Version, dict[str, BinaryPlatform]] = {
 }
 # FMI 2.0 has no name for these platforms and lets vendors add some; these are the names of FMI 3.0.
 WITHOUT_NAME = ("aarch64-linux", "aarch64-windows", "aarch32-linux", "riscv64-linux")
-# A static library may be in a folder that names the toolchain, too.
-_WITH_ABI = re.compile(rf"({'|'.join(_TUPLES)})-[a-z][a-z0-9_]*")
+# Architectures of FMI 3.0 without a check of their own; a static library may name the toolchain, too.
+_OTHERS = re.compile(rf"({'|'.join(_MACHINES)}|riscv32|riscv64|ppc32|ppc64)-({'|'.join(_SYSTEMS)})(-[a-z][a-z0-9_]*)?")
 
 _COMMON = (
     "GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode "
@@ -142,14 +142,15 @@ def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
         if absent:
             message = f"source files must be in sources/, but are not: {list_names([f'`{s}`' for _, s in absent])}"
             yield Finding("file.source-missing", xpath(absent[0][0], "name"), message)
+    known = [f for f in folders if f in PLATFORMS[version]]
+    others = [f for f in folders if (f in WITHOUT_NAME if version == "2.0" else _OTHERS.fullmatch(f))]
     for folder in folders:
-        other = folder in WITHOUT_NAME if version == "2.0" else _WITH_ABI.fullmatch(folder)
-        if folder not in PLATFORMS[version] and not other:
+        if folder not in known and folder not in others:
             message = f"a folder of binaries must be one of {', '.join(PLATFORMS[version])}, but is `{folder}`"
             yield Finding("binary.folder", f"binaries/{folder}", message)
-    known = [f for f in folders if f in PLATFORMS[version]]
-    if not folders and not any(n.startswith("sources/") for n in names):
-        yield Finding("binary.none", "binaries", "an FMU must have binaries or sources, but has neither")
+    if not known and not others and not any(n.startswith("sources/") for n in names):
+        has = "binaries for no platform that FMI names" if folders else "neither"
+        yield Finding("binary.none", "binaries", f"an FMU must have binaries or sources, but has {has}")
     elif here(version) not in known:
         has = ", ".join(known) or ("none (sources only)" if not folders else "none that is known")
         message = f"nothing can be run here ({here(version)}): the FMU has binaries for {has}"

@@ -52,7 +52,6 @@ limits.memory | E | * | * | memory stays below the memory limit | look for a lea
 limits.output | E | * | * | printed text and files stay small | print only when logging is on
 run.crash | E | * | * | no call ends the process | run the call named under a debugger
 run.failed | E | * | * | the checks can be carried out | report this with the FMU
-run.no-platform | E | * | * | the FMU has a binary for a platform that FMI names | name the folder in `binaries/` as FMI does, or add sources
 run.not-executed | W | * | * | the FMU is executed, unless that is not asked for | check it where its binaries run, or ask for the static checks only
 run.skipped | I | * | * | all checks can be carried out | mend the other findings first
 [load]

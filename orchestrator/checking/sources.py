@@ -1,13 +1,12 @@
 """Sources that an FMU brings: a compiler reads them, with the macros and folders of the build description.
 
-Nothing is linked and nothing of it is run. Headers of FMI are those of the sources, or of FMPy where it is installed;
-what misses another header is not judged, for it may be that of a target.
+Nothing is linked and nothing of it is run; the compiler sees its own files and those of the FMU alone. Headers of FMI
+are those of the sources, or of FMPy where it is installed; what misses another header is not judged from there on, for
+that may be the header of a target.
 """
 
 import importlib.util
-import os
 import posixpath
-import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,11 @@ from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.rules import declare
-from orchestrator.shared.machine_code import compiler_environment, local_compiler
+from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
+from orchestrator.shared.isolation.programs import run_program
+from orchestrator.shared.isolation.surroundings import environment, system_folders
+from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.machine_code import local_compiler
 from orchestrator.shared.scratch import Scratch
 
 declare("""
@@ -26,10 +29,13 @@ declare("""
 build.compiles | W | 2.3 | 2.5.1.3 | a compiler takes the sources | mend them; hosts without a binary for their platform compile them
 """)  # noqa: E501
 
-_SECONDS = 20.0
+_LIMITS = Limits(time=20.0, memory=MEBIBYTE << 9, output=MEBIBYTE, total=20.0)
 _MOST = 40  # files
 _LARGEST = 16 << 20
-_MEMORY = 1 << 30
+_FOLDERS = ("bin", "include", "lib", "lib32", "lib64", "libexec")
+"""What a compiler is made of, beside and above its own folder."""
+_NOT_JUDGED = ("No such file", "Permission denied")
+"""Said of a header that is not here: it may be that of a target."""
 _LONGEST = 200  # letters of a message
 _LANGUAGES = ("C", "C90", "C99", "C11", "C17")
 
@@ -47,25 +53,32 @@ class SourceSet:
     words: tuple[str, ...]
 
 
-def check_sources(d: Description, files: FmuFiles) -> tuple[list[Finding], str]:
-    """Let a compiler read the sources. Return the findings, and why they are not judged, or nothing."""
-    sets = list(_sets(d, files))
+def check_sources(d: Description, files: FmuFiles, walls: bool = True) -> tuple[list[Finding], str]:
+    """Let a compiler read the sources. Return the findings, and why they are not judged, or nothing.
+
+    Args:
+        walls: whether the compiler must be kept from files that are neither its own nor of the FMU.
+    """
+    sets = [s for s in _sets(d, files) if s.files]
     compiler = local_compiler()
-    if not any(s.files for s in sets):
+    if not sets:
         return [], "the FMU brings no sources in C"
     if compiler is None:
         return [], "there is no compiler"
+    if walls and not support().landlock:
+        return [], "this system cannot keep a compiler from files of the user, which sources may include"
     with Scratch("sources") as scratch:
         for path in (n for n in files.names() if n.startswith("sources/")):
             target = scratch.path / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(files.read(path, _LARGEST))
-        chosen = [(name, one.words) for one in sets for name in one.files]
-        for name, words in chosen[:_MOST]:
-            message = _compile(compiler, scratch.path / "sources", name, words)
-            if message:
-                text = f"a compiler must take the sources, but does not take `{name}`: {message}"
-                return [Finding("build.compiles", f"sources/{name}", text)], ""
+        for one in sets:
+            done = _compile(compiler, scratch.path / "sources", one, walls)
+            if done is None:
+                return [], "the compiler reads them for too long"
+            if done:
+                text = f"a compiler must take the sources, but does not: {done}"
+                return [Finding("build.compiles", "sources", text)], ""
     return [], ""
 
 
@@ -97,27 +110,20 @@ def _sets(d: Description, files: FmuFiles) -> Iterator[SourceSet]:
             yield SourceSet(tuple(n for n in chosen if posixpath.normpath(f"sources/{n}") in names), tuple(words))
 
 
-def _limit() -> None:
-    """Bound the memory of a compiler."""
-    import resource
-
-    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
-
-
-def _compile(compiler: str, folder: Path, name: str, words: tuple[str, ...]) -> str:
-    """What a compiler says against a file; empty where it takes it or cannot judge it."""
+def _compile(compiler: str, folder: Path, one: SourceSet, walls: bool) -> str | None:
+    """What a compiler says against sources; empty where it takes or cannot judge them, None where it does not end."""
     found = importlib.util.find_spec("fmpy")
-    headers = [f"-I{Path(found.origin).parent / 'c-code'}"] if found is not None and found.origin else []
-    command = [compiler, "-fsyntax-only", "-w", "-I.", *words, *headers, f"./{posixpath.normpath(name)}"]
+    headers = [Path(found.origin).parent / "c-code"] if found is not None and found.origin else []
+    names = [f"./{posixpath.normpath(name)}" for name in one.files[:_MOST]]
+    command = [compiler, "-fsyntax-only", "-w", "-I.", *one.words, *(f"-I{path}" for path in headers), *names]
+    home = Path(compiler).resolve().parents[1]
+    read = [*system_folders(), Path(compiler).resolve().parent, *(home / name for name in _FOLDERS), *headers]
+    read += [Path("/usr") / name for name in _FOLDERS] + [Path("/usr/local/include")]
+    own = environment(folder, walls) | {"LC_ALL": "C"}
     try:
-        run = subprocess.run(
-            command, cwd=folder, capture_output=True, timeout=_SECONDS, check=False, stdin=subprocess.DEVNULL,
-            preexec_fn=_limit if os.name == "posix" else None,
-            env=compiler_environment(folder) | {"LC_ALL": "C"},
-        )  # fmt: skip
-    except (subprocess.TimeoutExpired, OSError):
+        done = run_program(command, folder, read, own, _LIMITS, walls)
+    except OSError:
         return ""
-    lines = run.stderr.decode("utf-8", "replace").splitlines()
-    errors = [line for line in lines if "error:" in line]
-    missing = any("No such file" in line for line in errors)
-    return "" if run.returncode == 0 or missing or not errors else errors[0].strip()[:_LONGEST]
+    lines = [] if done is None or done[0] == 0 else [line for line in done[1].splitlines() if "error:" in line]
+    errors = [line for line in lines if not any(word in line for word in _NOT_JUDGED)]
+    return None if done is None else errors[0].strip()[:_LONGEST] if errors else ""

@@ -145,7 +145,6 @@ NOT_IN_THE_CORPUS = {
     "resources.leak",
     "run.failed",
     "run.moved-crash",
-    "run.no-platform",
     "run.not-executed",
     "value.order",
     "value.sequence",

@@ -73,9 +73,9 @@ def limit_process(limits: Limits) -> None:
     )
 
 
-def enclose(read: tuple[str, ...], write: tuple[str, ...]) -> Walls:
-    """Put up every wall that this kernel has, for good."""
+def enclose(read: tuple[str, ...], write: tuple[str, ...], programs: bool = False) -> Walls:
+    """Put up every wall that this kernel has, for good; ``programs``: but that against further processes."""
     if not sys.platform.startswith("linux"):
         return Walls(0, seccomp=False)
     seccomp.forbid_privileges()
-    return Walls(landlock.restrict((*read, *_OWN), write), seccomp.restrict())
+    return Walls(landlock.restrict((*read, *_OWN), write), seccomp.restrict(programs))
