@@ -66,8 +66,8 @@ class Column:
         back_emf_constant: [V.s/rad], for ``V``; None: the torque constant, which is the same in SI.
         inductance: of the winding [H], for ``V``; None: none.
         relative_uncertainty: of the scale of ``u``, as a share: of the torque constant, for instance.
-        modulo: value at which the file's numbers start again from zero [unit]; None: they do not. Of a torque what the
-            file's numbers have in addition where they are negative, such as 65536.
+        modulo: value at which an angle or a time starts again from zero [unit]; None: it does not. Of a torque what the
+            file's numbers have in addition, before ``factor``, where they are negative, such as 65536.
         sign_bit: what the file's numbers have in addition where they are negative, such as 32768; None: nothing.
         rate: samples per second, where the time is a sample number.
     """

@@ -23,8 +23,10 @@ LEAST_ROWS_NEAR = 10  # rows on either side of missing ones that say how fast th
 LEAST_JUMP = 0.25  # of the largest value: what a sign bit adds is at least half of it
 
 
-def decode_sign(values: Array, column: Column, label: str, source: str) -> Array:
-    """Return values with the sign that a bit of the file's numbers says."""
+def decode_sign(values: Array, name: str, column: Column, label: str, source: str) -> Array:
+    """Return the file's numbers with the sign that a bit of them says, of a torque as a two's complement too."""
+    if name == "u" and column.modulo is not None:
+        values = np.asarray((values + 0.5 * column.modulo) % column.modulo - 0.5 * column.modulo)
     if column.sign_bit is None:
         return values
     bad = np.flatnonzero((values < 0.0) | (values >= 2.0 * column.sign_bit))
@@ -102,13 +104,6 @@ def _is_small(signed: Array, bit: float) -> bool:
     """Return whether numbers of both signs stay near zero, about as far on either side."""
     high, low = float(signed.max()), -float(signed.min())
     return max(high, low) <= 0.25 * bit and min(high, low) >= 0.25 * max(high, low)
-
-
-def wrap_signed(values: Array, column: Column) -> Array:
-    """Return a torque whose negative numbers are written as two's complements, as its ``modulo`` says."""
-    if column.modulo is None:
-        return values
-    return np.asarray((values + 0.5 * column.modulo) % column.modulo - 0.5 * column.modulo)
 
 
 def check_whole(values: Array, name: str, label: str, source: str) -> None:

@@ -21,7 +21,7 @@ from orchestrator.records.columns import (
     scale_values,
     unit_of,
 )
-from orchestrator.records.counters import check_sign, check_whole, check_wraps, decode_sign, unwrap, wrap_signed
+from orchestrator.records.counters import check_sign, check_whole, check_wraps, decode_sign, unwrap
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, find_channels
@@ -245,7 +245,7 @@ def _convert(
         check_whole(raw, name, label, where)
     if column.sign_bit is None and column.modulo is None:
         check_sign(raw, name, label, where)
-    values = scale_values(decode_sign(raw, column, label, where), column.factor, column.offset)
+    values = scale_values(decode_sign(raw, name, column, label, where), column.factor, column.offset)
     del raw
     spoken = f"{label} in {(column.unit or written) if unit is not None else SI[KINDS[name][0]]}"
     if unit is None and not written and not column.unit:
@@ -261,9 +261,7 @@ def _convert(
             np.where(np.isfinite(values), values, 0.0) * scale * np.where(np.isfinite(steps), steps, 0.0)
         )
         return summed, f"{spoken}, summed to an angle"
-    if name == "u":
-        values = wrap_signed(values, column)
-    elif np.all(np.diff(time[np.isfinite(time)]) > 0.0):  # else the time is what is wrong
+    if name != "u" and np.all(np.diff(time[np.isfinite(time)]) > 0.0):  # else the time is what is wrong
         values = unwrap(values, column, time, label, where)
         turn = column.counts_per_rev if unit is not None and unit.kind == "counts" else None
         check_wraps(values, name, label, where, turn)

@@ -230,15 +230,21 @@ def _content(raw: dict[str, Any], where: str) -> _Content:
 
 
 def _check_keys(table: Entry, known: tuple[str, ...], prefix: str, content: _Content) -> None:
-    for key in table:
+    for key, value in table.items():
         if key not in known:
-            raise content.wrong(f"{prefix}{key}", f"be one of {', '.join(prefix + name for name in known)}")
+            must = f"be one of {', '.join(prefix + name for name in known)}"
+            if not prefix and type(value) in (int, float):
+                must += f"; of a parameter say `[parameters.{key}]` and below it `value = {value}`"
+            raise content.wrong(f"{prefix}{key}", must)
 
 
 def _check_kind(value: object, kind: type, key: str, content: _Content) -> None:
     found = float if type(value) is int else type(value)
     if found is not kind:
-        raise content.wrong(key, f"be {_KINDS[kind]}, but is {_KINDS.get(found, 'a date or time')}")
+        cure = (
+            f": say `[{key}]` and below it `value = {value}`" if key.startswith("parameters.") and kind is dict else ""
+        )
+        raise content.wrong(key, f"be {_KINDS[kind]}, but is {_KINDS.get(found, 'a date or time')}{cure}")
     if type(value) is int and abs(value) > LARGEST_WHOLE_NUMBER:
         raise content.wrong(key, "be a number of at most 18 digits, but is longer")
 

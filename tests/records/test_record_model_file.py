@@ -1,5 +1,6 @@
 """Model files: values and uncertainties that are read, mistakes that are named with their place."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -56,7 +57,7 @@ def test_a_model_file_is_read(tmp_path: Path) -> None:
         ("fmu = 3", "`fmu` in {} must be text, but is a number"),
         ("fum = 3", "`fum` in {} must be one of fmu, header, record, parameters, encoders, columns"),
         ("parameters = []", "`parameters` in {} must be a table, but is a list"),
-        ("parameters.J_m = 3", "`parameters.J_m` in {} must be a table, but is a number"),
+        ("parameters.J_m = 3", "`parameters.J_m` in {} must be a table, but is a number: say `[parameters.J_m]` "),
         ("[parameters.J_q]\nvalue = 1", "`parameters.J_q` in {} must be a parameter of Drivetrain, but no such name"),
         ("[parameters.J_m]\nvalue = nan", "`parameters.J_m.value` in {} must be in [1e-09, 1e+12] kg.m2, but is nan"),
         ("[parameters.J_m]\nvalue = -1", "`parameters.J_m.value` in {} must be in"),
@@ -89,6 +90,14 @@ def test_mistakes_are_named(tmp_path: Path, text: str, expected: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         _read(tmp_path, text)
     assert expected.format(tmp_path / "model.toml") in str(caught.value)
+
+
+@pytest.mark.parametrize("written", ["i = 20", "[parameters]\ni = 20"])
+def test_the_lines_that_are_told_for_a_bare_number_are_read(tmp_path: Path, written: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        _read(tmp_path, written)
+    section, line = re.findall("`([^`]*)`", str(caught.value))[-2:]
+    assert _read(tmp_path, f"{section}\n{line}").parameters["i"].value == 20.0
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
