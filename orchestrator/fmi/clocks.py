@@ -74,7 +74,9 @@ def read_clocks(variables: Variables) -> Clocks:
         elif kind == "triggered":
             triggered[name] = TriggeredClock(_members(variables, reference), reference)
         elif kind in {"constant", "fixed", "tunable"} and (interval := clock_interval(clock)) is not None:
-            periodic[name] = PeriodicClock(interval, _shift(clock), _members(variables, reference), reference)
+            periodic[name] = PeriodicClock(
+                interval, clock_shift(clock) or Fraction(0), _members(variables, reference), reference
+            )
             told += [] if kind == "constant" else [name]
         elif kind in {"fixed", "tunable", "changing", "countdown"}:
             timed[name] = (reference, kind)
@@ -113,10 +115,11 @@ def clock_interval(clock: etree._Element, name: str | None = None) -> Fraction |
     return interval
 
 
-def _shift(clock: etree._Element) -> Fraction:
-    named = f"shift of its clock {clock.get('name')!r}"
-    shift = _seconds(clock, "shift", named) or Fraction(0)
-    if shift < 0:
+def clock_shift(clock: etree._Element, name: str | None = None) -> Fraction | None:
+    """Return a clock's shift in seconds, where it is declared; ``name`` as in :func:`clock_interval`."""
+    named = f"shift of its clock {name or clock.get('name')!r}"
+    shift = _seconds(clock, "shift", named)
+    if shift is not None and shift < 0:
         raise ValueError(f"the {named} must not be negative, but is {float(shift):g} s")
     return shift
 

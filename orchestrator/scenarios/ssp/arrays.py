@@ -22,6 +22,10 @@ def expand_arrays(structure: Structure, descriptions: Mapping[str, FmuDescriptio
         if own is not None and None not in sizes and own != sizes:
             text = f"must have the sizes of the FMU's variable, {_shown(own)}, but has {_shown(sizes)}"
             structure.problems.append(Problem(f"$.{_named(node)}", text, mismatch=True))
+    for node, (array, place) in structure.elements.items():
+        if array[0] not in descriptions and place not in places.get(array, ()):
+            text = f"must be an element of {array[1]}, but is none"
+            structure.problems.append(Problem(f"$.{_named(node)}", text, mismatch=True))
     _expand_drivers(structure, places)
     for node, elements in places.items():
         kind, unit = structure.kinds.pop(node, None), structure.connector_units.pop(node, None)

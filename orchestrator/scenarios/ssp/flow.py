@@ -31,10 +31,11 @@ class Structure:
         components: file of each component.
         exchanged: names of the components that are to be run as model exchange.
         kinds: kind of each connector.
+        elements: for each element of an array that a connection names, the array and its place in it.
         connector_units: of those that state one.
         sizes: of the dimensions of those that are arrays; None where the file does not say.
         without_number: ``Clock`` or ``Binary``, for connectors of these types.
-        intervals: of the connectors of type ``Clock`` that state one [s].
+        clock_times: ``interval`` and ``shift`` of the connectors of type ``Clock``, where they are stated [s].
         drivers: for each connector that is fed: what feeds it, factor and offset.
         given: values of parameter bindings.
         remarks: what is passed over.
@@ -46,10 +47,11 @@ class Structure:
     components: dict[str, Path] = field(default_factory=dict)
     exchanged: set[str] = field(default_factory=set)
     kinds: dict[Node, str] = field(default_factory=dict)
+    elements: dict[Node, tuple[Node, str]] = field(default_factory=dict)
     connector_units: dict[Node, Unit] = field(default_factory=dict)
     sizes: dict[Node, tuple[int | None, ...]] = field(default_factory=dict)
     without_number: dict[Node, str] = field(default_factory=dict)
-    intervals: dict[Node, Fraction] = field(default_factory=dict)
+    clock_times: dict[Node, dict[str, Fraction]] = field(default_factory=dict)
     drivers: dict[Node, tuple[Node, float, float]] = field(default_factory=dict)
     given: dict[Node, Given] = field(default_factory=dict)
     remarks: list[RunRemark] = field(default_factory=list)

@@ -109,12 +109,11 @@ def _content(element: etree._Element, name: str, space: str, where: str, place: 
     if kind != FILE_TYPES[space]:
         place.refuse(f"{where}.type", f"must be {FILE_TYPES[space]}, but is {kind!r}")
         return None
+    inline = element.find(tag(space, name) if space == "ssm" else f"{tag('ssd', 'ParameterValues')}/{tag(space, name)}")
+    if (source is None) == (inline is None):
+        place.refuse(where, f"must have a source or hold a {name}, but has {'neither' if inline is None else 'both'}")
+        return None
     if source is None:
-        inline = element.find(
-            tag(space, name) if space == "ssm" else f"{tag('ssd', 'ParameterValues')}/{tag(space, name)}"
-        )
-        if inline is None:
-            place.refuse(where, f"must have a source or hold a {name}, but has neither")
         return inline
     try:
         content = _read_source(source, element.get("sourceBase") == "component", place)

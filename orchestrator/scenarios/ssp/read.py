@@ -8,7 +8,7 @@ from pathlib import Path
 from lxml import etree
 
 from orchestrator.errors import FmuError, ScenarioError
-from orchestrator.fmi.clocks import clock_interval, names_in_words
+from orchestrator.fmi.clocks import clock_interval, clock_shift, names_in_words
 from orchestrator.fmi.instances import FmuFactory, read_configured
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.ours import is_ours
@@ -152,11 +152,12 @@ def _connectors(element: etree._Element, path: str, structure: Structure) -> Non
         if kind is not None:
             structure.without_number[node] = kind
             try:
-                interval = clock_interval(connector.find(tag("ssc", kind)), node[1])
+                stated = connector.find(tag("ssc", kind))
+                times = {"interval": clock_interval(stated, node[1]), "shift": clock_shift(stated, node[1])}
             except ValueError as error:
                 structure.problems.append(Problem(f"$.{'.'.join(filter(None, node))}", str(error)))
                 continue
-            structure.intervals |= {} if interval is None else {node: interval}
+            structure.clock_times[node] = {what: time for what, time in times.items() if time is not None}
             continue
         structure.kinds[node] = str(connector.get("kind"))
         real = next((r for r in map(connector.find, _REALS) if r is not None), None)
@@ -228,8 +229,10 @@ def _connection(element: etree._Element, path: str, place: str, structure: Struc
             return
         gives = kind in _GIVERS if child is not None else kind in ("input", "parameter", "structuralParameter")
         if indices := element.get(f"{side}Indices"):
-            connector = f"{connector}[{','.join(indices.split())}]"
+            whole, place_in = connector, f"[{','.join(indices.split())}]"
+            connector += place_in
             structure.kinds[owner, connector] = kind
+            structure.elements[owner, connector] = (owner, whole), place_in
         ends.append(((owner, connector), gives))
     if ends[0][1] == ends[1][1]:
         text = "must join what gives a value and what takes one, but both ends do the same"
@@ -292,11 +295,12 @@ def _check_names(structure: Structure, models: Mapping[str, FmuDescription]) -> 
         if owner not in models and (owner, variable) not in structure.kinds:
             text = f"must name a component's parameter or a system's connector, but {variable!r} of "
             structure.problems.append(Problem("$.ParameterBindings", f"{text}{owner or 'the system'} is none"))
-    for (owner, clock), interval in structure.intervals.items():
+    for (owner, clock), times in structure.clock_times.items():
         own = models[owner].model.clocks.get(clock) if owner in models else None
-        if own is not None and own.interval != interval:
-            text = f"must have the interval of the FMU's clock, {own.interval} s, but has {interval} s"
-            structure.problems.append(Problem(f"$.{owner}.Connectors", f"{clock} {text}", mismatch=True))
+        for what, time in times.items():
+            if own is not None and getattr(own, what) != time:
+                text = f"must have the {what} of the FMU's clock, {getattr(own, what)} s, but has {time} s"
+                structure.problems.append(Problem(f"$.{owner}.Connectors", f"{clock} {text}", mismatch=True))
 
 
 def _pass_over(structure: Structure, description: FmuDescription, owner: str, variable: str, what: str) -> None:
