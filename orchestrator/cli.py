@@ -9,7 +9,7 @@ from pathlib import Path
 
 from orchestrator.commands._completion import add_completion_argument
 from orchestrator.commands._outcome import exit_code
-from orchestrator.commands._parser import Parser, flags_of
+from orchestrator.commands._parser import Parser, flags_of, word_unknown
 from orchestrator.commands._progress_lines import add_progress_argument, choose_progress
 from orchestrator.shared.version import __version__
 
@@ -30,6 +30,9 @@ COMMANDS = {
     "workbench": "all of it in the browser, on this machine alone",
     "report": "rebuild the HTML report of a result directory",
 }
+OWN_PLACE = frozenset(
+    {"build", "report"}
+)  # FMUs have places of their own; a report's is the directory that it is given
 PICTURED = frozenset({"simulate", "inspect", "estimate", "diagnose"})
 
 
@@ -54,7 +57,7 @@ def build_parser(command: str | None, every: bool = False) -> argparse.ArgumentP
         if name in PICTURED:
             text = f"draw the plots of the page into {name}.png too"
             sub.add_argument("--pictures", action="store_true", help=text)
-        if name != "report":  # it writes into the directory that it is given
+        if name not in OWN_PLACE:
             sub.add_argument(
                 "--out",
                 type=Path,
@@ -75,7 +78,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a home that cannot be written is no news to the user
     command = next((w for w in words if not w.startswith("-")), None)
-    arguments = build_parser(command).parse_args(words)
+    parser = build_parser(command)
+    arguments, rest = parser.parse_known_args(words)
     flags = vars(arguments).pop("flags")
+    if rest:
+        help_text = f"; see {parser.prog} {arguments.command} --help"
+        parser.error(word_unknown(rest[0], arguments.command, flags) + help_text)
     choose_progress(vars(arguments).pop("progress"))
     return exit_code(lambda: arguments.run(arguments), flags)

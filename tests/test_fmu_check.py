@@ -50,8 +50,8 @@ def user(tmp_path):
 
 def fmu_of_version_3(folder):
     """Build one of our FMUs of FMI 3.0."""
-    words = ["build", "LqrController", "--native", "--fmi", "3", "--directory", folder]
-    done = run([sys.executable, "-m", "orchestrator", *words, "--out", folder / "out"], ROOT)
+    words = ["build", "LqrController", "--native", "--fmi", "3", "--out", folder]
+    done = run([sys.executable, "-m", "orchestrator", *words], ROOT)
     assert done.returncode == 0, done.stderr
     return folder / "LqrController.fmu"
 

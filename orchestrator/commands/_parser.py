@@ -1,6 +1,7 @@
 """A parser of command lines whose complaints read like all others: "`--alpha` must ..., but is ...", on one line."""
 
 import argparse
+import difflib
 import math
 import re
 import sys
@@ -35,10 +36,10 @@ class Parser(argparse.ArgumentParser):
             self.register("type", kind, reader)
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where help is, and exit with 2."""
-        self.exit(
-            2, fold(f"error: {shorten(plain_text(_word_message(message)))}; see {self.prog} --help", sys.stderr) + "\n"
-        )
+        """Say what is wrong and where help is, unless the message says so, and exit with 2."""
+        text = shorten(plain_text(_word_message(message)))
+        text += "" if " --help" in message else f"; see {self.prog} --help"
+        self.exit(2, fold(f"error: {text}", sys.stderr) + "\n")
 
 
 def _whole(text: str) -> int:
@@ -74,6 +75,17 @@ def flags_of(parser: argparse.ArgumentParser) -> dict[str, str]:
     """Return what the command line calls each argument, by its name in Python."""
     actions = parser._actions  # argparse has no public list of them
     return {a.dest: a.option_strings[-1] if a.option_strings else str(a.metavar or a.dest) for a in actions}
+
+
+def word_unknown(word: str, command: str, flags: Mapping[str, str]) -> str:
+    """Return the complaint about a word that a command does not take: the option that is meant, and where help is."""
+    if not word.startswith("-"):
+        takers = [f": say `{flags[name]} {word}`" for name in ("scenario", "model") if name in flags]
+        return f"`{word}` must be left out of `{command}`, but is given{''.join(takers[:1])}"
+    option = word.partition("=")[0]
+    near = difflib.get_close_matches(option, [flag for flag in flags.values() if flag.startswith("--")], 1)
+    meant = f": perhaps `{near[0]}`" if near else ""
+    return f"`{option}` must be an option of `{command}`, but is none{meant}"
 
 
 def word_error(error: BaseException, flags: Mapping[str, str]) -> str:

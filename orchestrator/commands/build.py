@@ -10,17 +10,15 @@ from orchestrator.commands._console import print_blocks
 from orchestrator.commands._stages import Stages
 from orchestrator.shared.output import stage_output
 
+RESULTS = Path("results") / "build"
+FLAGS = {"directory": "--out"}
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments."""
     parser.add_argument("names", nargs="*", metavar="FMU", help="which FMUs (default: all)")
-    parser.add_argument(
-        "--directory",
-        type=Path,
-        default=None,
-        metavar="DIR",
-        help=f"where FMUs go (default: {short_path(default_directory())}, --native: {short_path(native_directory())})",
-    )
+    usual = f"{short_path(default_directory())}, --native: {short_path(native_directory())}, report: {RESULTS}"
+    parser.add_argument("--out", type=Path, metavar="DIR", help=f"where FMUs and the report go (default: {usual})")
     parser.add_argument(
         "--native", action="store_true", help="translate to C and compile: FMUs that need no Python at run time"
     )
@@ -47,11 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Build what is missing or stale and say what this machine cannot give."""
-    with stage_output(args.out) as folder, Stages() as stages:
+    with Stages() as stages:
         stages.begin("building", 0.0)
         result = build(
             args.names,
-            directory=args.directory,
+            directory=args.out,
             force=args.force,
             native=args.native,
             platforms=args.platforms,
@@ -59,6 +57,8 @@ def run(args: argparse.Namespace) -> int:
             real_outputs=args.real_outputs,
             progress=stages.at,
         )
-        result.write(folder, args.out)
+    place = args.out or RESULTS
+    with stage_output(place) as folder:
+        result.write(folder, place)
     print_blocks(result.blocks())
     return 0

@@ -45,7 +45,7 @@ def run(project: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 def build_native(project: Path, name: str) -> subprocess.CompletedProcess[str]:
-    words = ("build", "--native", name, "--platforms", "here", "--directory", "native", "--out", "out")
+    words = ("build", "--native", name, "--platforms", "here", "--out", "native")
     return run(project, "-m", "orchestrator", *words)
 
 
@@ -107,7 +107,7 @@ def test_hidden_state_must_not_be_called_as_what_every_slave_has(project: Path, 
     other = project / "pyfmu_sources" / "controllers" / "odd_slave.py"
     other.write_text(text.replace("    _y: float", f"    _y: float\n    {name}: float").replace("LowPass", "Odd"))
     try:
-        built = run(project, "-m", "orchestrator", "build", *native, "Odd", "--directory", "x")
+        built = run(project, "-m", "orchestrator", "build", *native, "Odd", "--out", "x")
     finally:
         other.unlink()
     assert built.returncode == 2
@@ -142,9 +142,7 @@ def test_what_is_outside_the_subset_is_refused_with_file_and_line(project: Path,
     assert changed != text.replace("LowPass", "Odd")
     other.write_text(changed, encoding="utf-8")
     try:
-        built = run(
-            project, "-m", "orchestrator", "build", "--native", "Odd", "--platforms", "here", "--directory", "x"
-        )
+        built = run(project, "-m", "orchestrator", "build", "--native", "Odd", "--platforms", "here", "--out", "x")
     finally:
         other.unlink()
     assert built.returncode == 2

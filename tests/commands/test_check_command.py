@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
+from orchestrator.checking.findings import Execution, FmuFindings
+from orchestrator.checking.formats.text import _extent
 from orchestrator.cli import main
 from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
 
@@ -125,3 +127,9 @@ def test_works_as_a_program_and_prints_no_traceback(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert "archive.not-a-zip" in done.stdout
     assert done.stderr == ""
+
+
+def test_stages_that_did_not_run_are_named():
+    stages = {"load": "", "steps": "", "reset": "the FMU says nothing of it", "state": "it cannot save its state"}
+    report = FmuFindings("a.fmu", (), executions=(Execution("CoSimulation", stages),))
+    assert _extent(report) == "executed, CoSimulation: 2 of 4 stages, not reset, state"

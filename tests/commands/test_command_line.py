@@ -19,13 +19,15 @@ from orchestrator.cli import COMMANDS, main
         (["sweep", "--out", ""], "`--out` must be a path, but is empty"),
         (["sweep", "--seeds"], "`--seeds` must be followed by a value, but is not"),
         (["sweep", "--resume=yes"], "`--resume` must be given without a value, but has 'yes'"),
-        (["sweep", "--nothing", "new\nline"], r"unrecognized arguments: --nothing new\nline"),
+        (["sweep", "--no\nthing"], r"`--no\nthing` must be an option of `sweep`, but is none"),
+        (["estimate", "log.csv", "--modle", "m.toml"], "but is none: perhaps `--model`; see "),
+        (["simulate", "loop.toml"], "`loop.toml` must be left out of `simulate`, but is given: say `--scenario loop"),
         (["check", "--memory-limit", "0"], "`--memory-limit` must be positive"),
         (["check", ""], "`FMU` must be a path, but is empty"),
         (["estimate", "--method", "guess"], "`--method` must be one of maximum_likelihood, ekf"),
         (["diagnose"], "`DATA` must be given"),
         (["report", "--command", "x"], "`DIR` must be given"),
-        (["regulator", "--torque-weight", "-1e-3", "--seed"], "unrecognized arguments: --seed"),
+        (["regulator", "--torque-weight", "-1e-3", "--seed"], "`--seed` must be an option of `regulator`, but is none"),
         (["regulator", "--gains", "--delay", "1"], "`--gains` must be followed by a value, but is not"),
         (["swep"], "`COMMAND` must be one of build, check"),
         ([], "`COMMAND` must be given"),
@@ -40,6 +42,14 @@ def test_wrong_words_are_one_line(capsys, words, complaint):
     assert told.err.startswith("error: ")
     assert complaint in told.err
     assert told.err.count("\n") == 1
+
+
+def test_a_wrong_option_points_to_the_help_of_its_own_command(capsys):
+    with pytest.raises(SystemExit):
+        main(["simulate", "--stopp", "3"])
+    told = capsys.readouterr().err.strip()
+    assert told.endswith(" simulate --help")
+    assert main(["simulate", "--scenario", "missing.toml"]) == 2  # what the other advice says is an option
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -29,7 +29,7 @@ OF_ONE_SYSTEM = {
 }
 COMMANDS = (
     "--help",
-    "build LqrController --directory built --force",
+    "build LqrController --out built --force",
     "simulate --alpha 0.02",
     "sweep --sizes 0.01,0.02 --noise 1e-4 --seeds 1 --workers 1",
     "inspect machine.csv",

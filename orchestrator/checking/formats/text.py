@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from orchestrator.checking.findings import SEVERITIES, Finding, FmuFindings, list_names
+from orchestrator.checking.findings import SEVERITIES, Execution, Finding, FmuFindings, list_names
 from orchestrator.checking.rules import RULES, TEXTS, Severity
 from orchestrator.checking.verdict import Issue, Verdict, without_particulars
 from orchestrator.plain_text import plain_text
@@ -27,8 +27,14 @@ def _extent(report: FmuFindings) -> str:
     """How far the FMU was executed, in a few words."""
     if not report.executed:
         return f"not executed: {report.not_executed}" if report.not_executed else "not executed"
-    runs = (f"{e.interface}: {len(e.stages_run)} of {len(e.stages)} stages" for e in report.executions)
-    return f"executed, {', '.join(runs)}"
+    return f"executed, {', '.join(map(_run_text, report.executions))}"
+
+
+def _run_text(execution: Execution) -> str:
+    """How many stages of an interface ran, and the names of the others."""
+    left = [stage for stage, reason in execution.stages.items() if reason]
+    text = f"{execution.interface}: {len(execution.stages_run)} of {len(execution.stages)} stages"
+    return f"{text}, not {list_names(left, _MOST_PLACES)}" if left else text
 
 
 def as_lines(verdict: Verdict) -> list[str]:
