@@ -57,7 +57,7 @@ def require_machine(
     if doubts and not force:
         raise ScenarioError(
             f"{'; '.join(doubts)}. A controller of it may hit its flanks or not be stable: record again "
-            "(`design` proposes how), or give `force`",
+            "(`estimate` with `design` proposes how), or give `force`",
             "model",
             "force",
         )

@@ -25,6 +25,10 @@ DELAY, LIMIT, FILTER = (
     f"effects.{name}" for name in ("input_delay.delay", "torque_saturation.limit", "drive_filter.time_constant")
 )
 OFFSETS = tuple(f"effects.sensor_offset.{body}.offset" for body in ("motor", "load"))
+OTHER_PLANTS = {
+    "ServoAxis": ": a single axis has no gap to cross",
+    "TwoStageTrain": ": its two gaps are crossed one after the other, which no controller here knows",
+}
 LARGEST_CHANGE = 3.0  # of the logarithm of a drawn parameter
 
 
@@ -145,55 +149,49 @@ class Machine:
         return min(max(moved, p.minimum), p.maximum)
 
 
-def machine_of(
-    model: Model, *, alpha: float | None = None, deviation: float | None = None, torque_limit: float | None = None
-) -> Machine:
+def machine_of(model: Model, *, alpha: float | None = None, torque_limit: float | None = None) -> Machine:
     """Return the machine of a model that a record was fitted to.
 
     Args:
-        alpha: half-gap in place of the model's [rad].
-        deviation: of that, standard [rad] (default: a hundredth of it).
+        alpha: half-gap in place of the model's [rad]; as uncertain as the record's, or known to 1 % where it has none.
         torque_limit: in place of the model's, or of the record's largest request [N.m].
 
     Raises:
-        ScenarioError: the model has no gap, one encoder, or nothing that says its limit of the torque.
+        ScenarioError: the model has no gap or two, one encoder, or nothing that says its limit of the torque.
     """
+    record, parameters, source = model.record, model.parameters, model.source
     if model.fmu != "Drivetrain":
         raise ScenarioError(
-            f"{model.source}: `fmu` must be Drivetrain for a compensator, but is {model.fmu}: no gap", "model"
+            f"{source}: `fmu` must be Drivetrain, one gap between motor and load, but is {model.fmu}"
+            f"{OTHER_PLANTS.get(model.fmu, '')}",
+            "model",
         )
-    record, parameters = model.record, model.parameters
     if record is None:
         raise ScenarioError(
-            f"{model.source}: `model` must have a table [record]: give the corrected.toml that `diagnose` or "
+            f"{source}: `model` must have a table [record]: give the corrected.toml that `diagnose` or "
             "`estimate` wrote",
             "model",
         )
     if len(record.noise) != 2 or len(record.counts) != 2:
-        raise ScenarioError(f"{model.source}: `model` must be of a record with both encoders, but has one", "model")
+        raise ScenarioError(f"{source}: `model` must be of a record with both encoders, but has one", "model")
     size = parameters["alpha"].value if alpha is None else alpha
     if not size > 0.0:
         raise ScenarioError(
-            f"{model.source}: `model` must have a gap to be crossed, but `alpha` is {size:g}: give the half-gap, "
+            f"{source}: `model` must have a gap to be crossed, but `alpha` is {size:g}: give the half-gap, "
             "or use `regulator` for an LQR of this machine",
             "model",
             "alpha",
         )
     limit = torque_limit or min(parameters[LIMIT].value, record.torque if parameters[LIMIT].value >= BIG else BIG)
-    unknowns = tuple(name for name in record.unknowns if name != "alpha" or alpha is None)
-    keep = [record.unknowns.index(name) for name in unknowns]
-    covariance = np.array(record.covariance, dtype=float).reshape(len(record.unknowns), len(record.unknowns))
-    covariance = covariance[np.ix_(keep, keep)]
-    covered = {*unknowns, "alpha"}
-    half = {name: p.uncertainty for name, p in parameters.items() if p.uncertainty > 0.0 and name not in covered}
+    unknowns = record.unknowns
+    covariance = np.array(record.covariance, dtype=float).reshape(len(unknowns), len(unknowns))
+    half = {name: p.uncertainty for name, p in parameters.items() if p.uncertainty > 0.0} | (
+        {} if alpha is None else {"alpha": 0.01 * size}
+    )
+    half = {name: width for name, width in half.items() if name not in unknowns}
+    deviation = half.get("alpha", 0.0) / NORMAL_95
     if "alpha" in unknowns:
-        place = unknowns.index("alpha")
-        deviation = math.sqrt(covariance[place, place])
-    else:
-        own = parameters["alpha"].uncertainty / NORMAL_95 if alpha is None else 0.01 * size
-        deviation = own if deviation is None else deviation
-        unknowns = (*unknowns, "alpha")
-        covariance = np.block([[covariance, np.zeros((len(keep), 1))], [np.zeros((1, len(keep))), deviation**2]])
+        deviation = math.sqrt(covariance[unknowns.index("alpha"), unknowns.index("alpha")])
     return Machine(
         record.source, parameters, size, deviation, limit, (record.noise[0], record.noise[1]),
         (record.counts[0], record.counts[1]), unknowns, covariance, half,

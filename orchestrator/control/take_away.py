@@ -51,25 +51,16 @@ def write_loop(folder: Path, name: str, task: ControlTask, native: bool, fmi: in
         for kind, start in task.settings().items()
     )
     (folder / "controller.toml").write_text("\n".join(tables), encoding="utf-8")
-    if fmi == 2:  # SSP 1.0 is for FMI 2.0
-        write_ssp(folder / "loop.ssp", step_scenario(task, paths), "1.0")
+    write_ssp(folder / "loop.ssp", step_scenario(task, paths), f"{fmi - 1}.0")  # SSP 1.0 is for FMI 2.0
     for file, text in c_files(name, task).items():
         (folder / file).write_text(text, encoding="utf-8")
 
 
-def file_names(name: str, native: bool, fmi: int) -> tuple[str, ...]:
+def file_names(name: str) -> tuple[str, ...]:
     """Return the names of the files that :func:`write_loop` writes."""
-    fmus = tuple(f"{kind}_{name}.fmu" for kind in ("Drivetrain", *CONTROLLERS))
-    ssp = ("loop.ssp",) if fmi == 2 else ()
-    return (
-        *fmus,
-        "loop.toml",
-        "reference.csv",
-        "controller.toml",
-        *ssp,
-        f"controller_{name}.h",
-        f"controller_{name}.c",
-    )
+    fmus = (f"{kind}_{name}.fmu" for kind in ("Drivetrain", *CONTROLLERS))
+    code = (f"controller_{name}.{end}" for end in ("h", "c"))
+    return (*fmus, "loop.toml", "reference.csv", "controller.toml", "loop.ssp", *code)
 
 
 def recipes_for(name: str, task: ControlTask) -> dict[str, Recipe]:

@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -15,7 +16,7 @@ from orchestrator.cli import main
 from orchestrator.control.loops import FMUS, make_task
 from orchestrator.control.machine import machine_of, thesis_machine
 from orchestrator.control.measures import measure_loop
-from orchestrator.control.take_away import c_files, file_names
+from orchestrator.control.take_away import c_files, file_names, write_loop
 from orchestrator.control.weights import choose_weights
 from orchestrator.errors import ScenarioError
 from orchestrator.records.fitted_record import FittedRecord
@@ -111,7 +112,7 @@ def test_a_model_that_cannot_be_trusted_is_refused_with_the_reason(tmp_path, cap
     error = capsys.readouterr().err
     assert told in error
     assert "--force" in error
-    assert "`design` proposes how" in error
+    assert "`estimate` with `design` proposes how" in error
     assert not (tmp_path / "out").exists()
 
 
@@ -122,6 +123,50 @@ def test_a_half_gap_that_the_record_excludes_is_refused(tmp_path, capsys):
     words = ["compensate", "--model", str(write_model(tmp_path)), "--alpha", "0.0178", "--out", str(tmp_path / "out")]
     assert main(words) == 2
     assert "must be what the record says" in capsys.readouterr().err
+
+
+def test_a_given_half_gap_is_no_better_known_than_the_record_knows_it(tmp_path):
+    doubtful = replace_record(covariance=tuple(map(tuple, np.diag([1e-5, 1e-3, 0.002**2]).tolist())))
+    machine = machine_of(read_model(write_model(tmp_path, doubtful)), alpha=0.0178)
+    assert (machine.alpha, machine.deviation) == (0.0178, pytest.approx(0.002))
+    drawn = [machine.draw(np.random.default_rng(n))["alpha"] for n in range(400)]
+    assert np.std(drawn) == pytest.approx(0.002, rel=0.15)
+    assert np.median(drawn) == pytest.approx(0.0178, rel=0.03)
+
+
+@pytest.mark.parametrize("fmu", ["ServoAxis", "TwoStageTrain"])
+def test_plants_without_one_gap_between_motor_and_load_are_refused_by_name(tmp_path, capsys, fmu):
+    path = tmp_path / "axis.toml"
+    path.write_text(f'fmu = "{fmu}"\n', encoding="utf-8")
+    assert main(["compensate", "--model", str(path), "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert f"`fmu` must be Drivetrain, one gap between motor and load, but is {fmu}" in told
+    assert ("has no gap to cross" if fmu == "ServoAxis" else "two gaps") in told
+
+
+@pytest.mark.skipif(not have_compiler(), reason="Python FMUs take half a minute")
+def test_unstable_plants_are_refused_with_what_makes_them_so_and_no_file_is_written(tmp_path, capsys):
+    doubtful = replace_record(covariance=tuple(map(tuple, np.diag([1e-5, 12.0**2, 1e-10]).tolist())))
+    words = ["compensate", "--model", str(write_model(tmp_path, doubtful)), "--plants", "12"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert "no plant that the record allows may be unstable under the compensator, but so are 2 of 12" in told
+    assert "these differ in `J_l`" in told
+    assert "`estimate` with `design` proposes how" in told
+    assert not (tmp_path / "out").exists()
+    found = oc.compensate(model=write_model(tmp_path, doubtful), plants=12, force=True)
+    assert found.laws[-1].unstable == 2
+    assert "Do not run this controller" in found.doubts[0]
+
+
+@pytest.mark.skipif(not have_compiler(), reason="Python FMUs take half a minute")
+def test_hard_landings_on_plants_that_the_record_allows_are_told(tmp_path):
+    doubtful = replace_record(covariance=tuple(map(tuple, np.diag([0.15**2, 1e-3, 1e-10]).tolist())))
+    found = oc.compensate(model=write_model(tmp_path, doubtful), plants=12)
+    assert found.laws[-1].unstable == 0
+    (told,) = found.doubts
+    assert re.match(r"Teeth meet at more than 1.5 times the impact speed on plants, \d+ of 12: .*Record again", told)
+    assert oc.compensate(model=write_model(tmp_path), plants=3).doubts == ()
 
 
 @pytest.mark.parametrize(
@@ -176,7 +221,30 @@ def test_fmus_scenario_and_ssp_have_the_machines_values(taken):
     measured = measure_loop(simulate(replace(scenario, record=record)), task)
     assert measured.stable
     assert np.median(measured.impacts) < 1.5 * task.impact_speed
-    assert set(file_names("press", True, 2)) <= {path.name for path in taken.iterdir()}
+    assert set(file_names("press")) <= {path.name for path in taken.iterdir()}
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_ssp_file_is_a_step_of_the_loop_for_both_versions_of_fmi(taken, tmp_path, fmi):
+    folder, machine = taken, machine_of(read_model(write_model(tmp_path)))
+    task = replace(make_task(machine, 1e-3), state_weights=choose_weights(machine, 1e-3).weights, torque_weight=1.0)
+    if fmi == 3:
+        folder = tmp_path
+        write_loop(folder, "press", task, native=True, fmi=3)
+        description = fmpy.read_model_description(str(folder / "BacklashCompensator_press.fmu"))
+        assert description.fmiVersion == "3.0"
+        assert simulate(load_scenario(folder / "loop.toml"))["plant.theta_l"][-1] == pytest.approx(
+            task.height, rel=0.02
+        )
+    words = ["ssp", "run", str(folder / "loop.ssp"), "--jacobi", "--out", str(tmp_path / "run")]
+    assert main(words) == 0
+    rows = np.genfromtxt(tmp_path / "run" / "ssp.csv", delimiter=",", names=True, deletechars="")
+    assert rows["plant.theta_l"][-1] == pytest.approx(task.height, rel=0.02)
+    assert np.ptp(rows["plant.theta_l"][-1000:]) < 2e-3 * task.height
+    met = np.flatnonzero((np.diff(rows["plant.contact"]) != 0) & (rows["plant.contact"][1:] != 0))
+    speed = np.abs(rows["plant.omega_m"] / machine.nominal.i - rows["plant.omega_l"])
+    assert met.size
+    assert np.median(speed[met]) < 1.5 * task.impact_speed
 
 
 def test_plain_c_has_the_bits_of_the_native_fmus_and_no_heap(taken, tmp_path):

@@ -18,12 +18,15 @@ def build(source: ResultDocument) -> Report:
     quickest = Series("bound from rest", results.path_times, results.path)
     last = results.laws[-1]
     time = f"takes {median(last.times):.3f} s" if last.times else "is not made"
+    impact, plain = (
+        "not known" if law.impact is None else f"{law.impact:.3g} rad/s" for law in (last, results.laws[0])
+    )
     return Report(
         title="Laws across the gap",
         summary=(
             f"A traversal of the {last.law} {time}; none from rest that lands at {results.impact_speed:g} rad/s takes "
-            f"less than {results.bound:.4f} s. Its largest impact is {last.impact:.3g} rad/s, "
-            f"that of the {results.laws[0].law} {results.laws[0].impact:.3g} rad/s."
+            f"less than {results.bound:.4f} s. Its largest impact is {impact}, "
+            f"that of the {results.laws[0].law} {plain}."
         ),
         sections=(
             *laws_tables("Medians over plants", results.laws),

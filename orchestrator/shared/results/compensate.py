@@ -15,15 +15,16 @@ class LawFound(msgspec.Struct, frozen=True):
     """One law on all plants: medians, 95 % quantiles in ``upper``, and every traversal.
 
     ``error`` is that of the load during the move, ``rest`` its motion at the end, in counts of its encoder.
-    ``unstable`` plants leave the end of the move; they are in no other number. ``times`` [s] and ``impacts`` [rad/s]
+    ``unstable`` plants leave the end of the move; they are in no other number, and
+    where all are, there is none. ``times`` [s] and ``impacts`` [rad/s]
     are of all traversals; ``path_times`` [s] and ``path`` [rad] of one.
     """
 
     law: Annotated[str, Display("law")]
-    impact: Annotated[float, Display("largest impact", "rad/s", 3)]
-    error: Annotated[float, Display("rms error", "rad", 3)]
-    rest: Annotated[float, Display("rest, peak to peak", "counts", 3)]
-    contacts: Annotated[float, Display("contacts at rest", "1/s", 3)]
+    impact: Annotated[float | None, Display("largest impact", "rad/s", 3)]
+    error: Annotated[float | None, Display("rms error", "rad", 3)]
+    rest: Annotated[float | None, Display("rest, peak to peak", "counts", 3)]
+    contacts: Annotated[float | None, Display("contacts at rest", "1/s", 3)]
     unstable: Annotated[int, Display("unstable plants")] = 0
     upper: dict[str, float] = {}
     times: tuple[float, ...] = ()
