@@ -1,6 +1,7 @@
 """What a log holds and what each column of a record would be taken from, before anything is read in earnest."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -96,10 +97,22 @@ def preview_log(path: Path, columns: Mapping[str, Column], header: int | None = 
     Raises:
         RecordError: the file is no log at all, and no text whose lines could be looked at.
     """
-    lines = _raw_lines(path)
+    with ExitStack() as files:
+        return preview_opened(
+            lambda: files.enter_context(open_source(path, header)), path, columns, header, raw_lines(path)
+        )
+
+
+def preview_opened(
+    opened: Callable[[], RecordSource],
+    path: Path,
+    columns: Mapping[str, Column],
+    header: int | None,
+    lines: tuple[str, ...],
+) -> LogPreview:
+    """Return what ``preview_log`` does of a log that ``opened`` opens; ``lines``: its ``raw_lines``."""
     try:
-        with open_source(path, header) as source:
-            return _preview_source(source, path, columns, header, lines)
+        return _preview_source(opened(), path, columns, header, lines)
     except RecordError as error:
         if not any(lines) or not all(line.expandtabs().rstrip("\r").isprintable() for line in lines):
             raise
@@ -128,7 +141,7 @@ def _preview_source(
     )  # fmt: skip
 
 
-def _raw_lines(path: Path) -> tuple[str, ...]:
+def raw_lines(path: Path) -> tuple[str, ...]:
     """Return the first lines of a text; none of a file that is no text."""
     with path.open("rb") as file:
         if b"\x00\x00\x00" in file.read(4000):
@@ -204,9 +217,10 @@ def _has_numbers(values: NDArray[np.float64]) -> bool:
 def _channels(source: RecordSource, used: Mapping[int, str]) -> list[ChannelShown]:
     """Return the channels, the first of them with values."""
     shown = []
+    first = _first_rows(source, range(min(SHOWN_CHANNELS, len(source.heads))))
     for place, head in enumerate(source.heads):
         known = not head.unit or parse_unit(head.unit, tuple(kind for kinds in KINDS.values() for kind in kinds))
-        rows = _first_rows(source, place) if place < SHOWN_CHANNELS else ()
+        rows = first[place] if place < len(first) else ()
         shown.append(
             ChannelShown(
                 place, head.name, head.full or head.name or f"#{place + 1}", head.unit, bool(known), head.kind,
@@ -216,16 +230,18 @@ def _channels(source: RecordSource, used: Mapping[int, str]) -> list[ChannelShow
     return shown
 
 
-def _first_rows(source: RecordSource, place: int) -> tuple[str, ...]:
-    """Return the first values of a channel as text; of one that holds no numbers, none."""
+def _first_rows(source: RecordSource, places: Sequence[int]) -> list[tuple[str, ...]]:
+    """Return the first values of channels as text; of one that holds no numbers, none."""
     try:
-        part = source.within(slice(0, SHOWN_ROWS), source.heads[place].raster)
-        values: NDArray[Any] = part.load([place])[0]
+        found = source.within(slice(0, SHOWN_ROWS), source.heads[0].raster).load(places)
     except RecordError:
-        return ()
-    return tuple(
-        str(value) if values.dtype.kind == "M" else f"{value + 0.0:.10g}" for value in values[:SHOWN_ROWS].tolist()
-    )
+        return [()] if len(places) == 1 else [rows for place in places for rows in _first_rows(source, [place])]
+    return [
+        tuple(
+            str(value) if values.dtype.kind == "M" else f"{value + 0.0:.10g}" for value in values[:SHOWN_ROWS].tolist()
+        )
+        for values in found
+    ]
 
 
 __all__ = ["ChannelShown", "ColumnTaken", "LogPreview", "preview_log"]

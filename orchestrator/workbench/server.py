@@ -13,6 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -20,14 +21,18 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
-from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.errors import InputError, OrchestratorError, RecordError
+from orchestrator.records.model_file import read_model
+from orchestrator.records.preview import LogPreview
 from orchestrator.reporting import render
 from orchestrator.reporting.plots import SCRIPTS
 from orchestrator.shared.output import write_whole
 from orchestrator.workbench.command_lines import command_line
 from orchestrator.workbench.compare import compare_results
+from orchestrator.workbench.curves import CurvesAsked, CurvesShown, LookAsked
 from orchestrator.workbench.guard import PAGE_POLICY, Guard
 from orchestrator.workbench.jobs import Jobs
+from orchestrator.workbench.log_readers import LogReaders
 from orchestrator.workbench.model_fields import model_fields, model_text
 from orchestrator.workbench.notes import Notes
 from orchestrator.workbench.scenario_text import scenario_text
@@ -54,6 +59,7 @@ class Workbench:
     jobs: Jobs
     models: SliderModels
     notes: Notes
+    readers: LogReaders
 
     async def state(self, request: Request) -> Response:
         """Return files and jobs of the session, and the notes where the page has those of another version."""
@@ -84,19 +90,38 @@ class Workbench:
     async def columns(self, request: Request) -> Response:
         """Return what a log holds and what its columns would be taken from, with the choices of the page."""
         asked = await self._asked(request)
-        words = ["inspect", "--columns"]
-        log = command_line(self.session, "inspect", [asked.get("file")], {})[-1]
-        if Path(log).suffix.lower() in (".fmu", ".ssp"):
-            raise InputError(f"`file` must be a log, but {log} is an FMU or SSP file")
+        log = self._log(asked)
         chosen = self._scratch(model_text(None, {key: asked[key] for key in ("columns", "header") if key in asked}))
         try:
-            code, out, said = await self.jobs.answer([*words, "--model", str(chosen), log])
-            said = said.replace(f" in {chosen}", "")  # a file that nobody has written
+            model = await run_in_threadpool(read_model, chosen)
+        except OrchestratorError as error:
+            return _problem(str(error).replace(f" in {chosen}", ""), 422)  # a file that nobody has written
         finally:
             chosen.unlink(missing_ok=True)
-        if code:
-            return _problem(said.removeprefix("error: "), 422)
-        return Response(out, media_type="application/json")
+        return await self._read(log, LookAsked(model.columns, model.header), LogPreview)
+
+    async def curves(self, request: Request) -> Response:
+        """Return channels of a log by level of detail, as far as they were read."""
+        asked = await self._asked(request)
+        try:
+            wanted = msgspec.convert(asked, CurvesAsked)
+        except msgspec.ValidationError as error:
+            raise InputError(f"curves must be asked for by places of channels and rows, but: {error}") from None
+        return await self._read(self._log(asked), wanted, CurvesShown)
+
+    def _log(self, asked: Mapping[str, Any]) -> Path:
+        """Return the log that a page speaks of."""
+        log = self.session.path_of(str(asked.get("file")))
+        if kind_of(log) == "fmu":
+            raise InputError(f"`file` must be a log, but {self.session.reference_of(log)} is an FMU or SSP file")
+        return log
+
+    async def _read(self, log: Path, asked: LookAsked | CurvesAsked, answer: type[Any]) -> Response:
+        try:
+            found = await self.readers.ask(log, asked, answer)
+        except RecordError as error:
+            return _problem(str(error), 422)
+        return Response(msgspec.json.encode(found), media_type="application/json")
 
     async def cost(self, request: Request) -> Response:
         """Return what an estimate would take, in words."""
@@ -272,11 +297,14 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
     """Return the application behind the guard; jobs end with it."""
     jobs = Jobs(session, settings)
     models = SliderModels(settings.slider_models)
-    workbench = Workbench(session, settings, jobs, models, Notes(session.folder, settings.largest_notes))
+    notes, readers = Notes(session.folder, settings.largest_notes), LogReaders(session.folder, settings)
+    workbench = Workbench(session, settings, jobs, models, notes, readers)
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        readers.warm()
         yield
+        readers.close()
         await jobs.close()
         models.close()
 
@@ -287,6 +315,7 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
         Route("/notes", _answer_in_words(workbench.keep), methods=["POST"]),
         Route("/upload/{name:path}", _answer_in_words(workbench.upload), methods=["PUT"]),
         Route("/columns", _answer_in_words(workbench.columns), methods=["POST"]),
+        Route("/curves", _answer_in_words(workbench.curves), methods=["POST"]),
         Route("/cost", _answer_in_words(workbench.cost), methods=["POST"]),
         Route("/model", _answer_in_words(workbench.read_fields)),
         Route("/models", _answer_in_words(workbench.write_model), methods=["POST"]),

@@ -16,6 +16,7 @@ class WorkbenchSettings:
         largest_notes: bytes of what the pages keep of their work: choices and a scenario of some hundred FMUs.
         jobs_at_once: further ones wait: each of them keeps a core busy.
         answer_seconds: that a look at a file or a model may take.
+        logs_open: logs whose channels are drawn without reading them anew: each holds a process.
         slider_models: models that stay ready under sliders: each holds an instance of an FMU.
         stop_seconds: that jobs have to clean up when the server ends.
         longest_message: characters of a line that a job writes to standard error.
@@ -28,6 +29,7 @@ class WorkbenchSettings:
     largest_notes: int = 4 * MEBIBYTE
     jobs_at_once: int = 4
     answer_seconds: float = 120.0
+    logs_open: int = 3
     slider_models: int = 3
     stop_seconds: float = 10.0
     longest_message: int = 2000

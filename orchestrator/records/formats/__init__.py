@@ -3,6 +3,7 @@
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 
 from orchestrator.errors import RecordError
@@ -44,11 +45,12 @@ FORMATS = "CSV, Parquet, MDF4, MAT or NumPy"
 
 
 @contextmanager
-def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]:
+def open_source(path: Path, header: int | None = None, apart: bool = True) -> Iterator[RecordSource]:
     """Open a file for a ``with`` statement; its first bytes decide on the reader, not its name.
 
     Args:
         header: line of the names in a text, from 1; 0: it has none; None: found.
+        apart: read binary formats in a child process; False: this one is such a child itself.
 
     Yields:
         Its channels, read when they are asked for.
@@ -68,9 +70,11 @@ def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]
         yield split_lengths(text.open_file(path, header))
     elif module == "numpy_file":
         yield split_lengths(numpy_file.open_file(path))
-    else:
+    elif apart:
         with open_apart(module, path) as source:
             yield split_lengths(source)
+    else:
+        yield split_lengths(import_module(f"{__name__}.{module}").open_file(path))
 
 
 def _is_mat_4(head: bytes) -> bool:

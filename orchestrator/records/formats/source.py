@@ -1,6 +1,6 @@
 """What every reader of a format gives: named channels with units, and their values on demand."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -57,6 +57,18 @@ class RecordSource(Protocol):
     def times(self, place: int) -> NDArray[Any]:
         """Return a channel as ``load`` does, with NaN or NaT where a text has no value."""
         return self.load([place])[0]
+
+    def pieces(self, places: Sequence[int], most: int | None = None) -> Iterator[tuple[int, int, list[NDArray[Any]]]]:
+        """Yield the numbers of channels of one raster piece by piece, NaN where a text has none.
+
+        Args:
+            most: rows of each piece; the others are passed over.
+
+        Yields:
+            Number of the first row, how many rows the channels have at most, and the values.
+        """
+        values = self.load(places)
+        yield 0, len(values[0]) if values else 0, values
 
     def within(self, rows: slice, raster: int) -> "RecordSource":
         """Return the same file with some rows of one raster alone."""

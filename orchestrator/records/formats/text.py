@@ -2,7 +2,8 @@
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,14 @@ class TextSource(RecordSource):
     def times(self, place: int) -> NDArray[Any]:
         """Return a column as ``load`` does, with NaN or NaT where there is no value."""
         return self._read([place], strict=False)[0]
+
+    def pieces(self, places: Sequence[int], most: int | None = None) -> Iterator[tuple[int, int, list[NDArray[Any]]]]:
+        """Yield numbers block by block."""
+        for whole in self._rows.blocks(self._part):
+            block = whole
+            if most is not None and whole.count > most:
+                block = replace(whole, text="\n".join(whole.text.split("\n", most)[:most]), count=most)
+            yield block.first, self._rows.most, list(self.numbers(block, places, strict=False))
 
     def within(self, rows: slice, raster: int) -> RecordSource:
         """Return some rows; what stands in others is not looked at, and rows keep their numbers in messages."""

@@ -1,5 +1,6 @@
 /* global Units */
-import { check, digits, fill, make, plain, withInterval } from "./dom.js";
+import { plain } from "./advice.js";
+import { check, digits, fill, make, withInterval } from "./dom.js";
 import { inputs, needLog, reading, trustTag } from "./gap.js";
 import { action, fileChoice, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, jobOf, modelOfLog, start } from "./state.js";

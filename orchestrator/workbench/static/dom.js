@@ -81,6 +81,3 @@ export function withInterval(value, interval, factor = 1) {
   const words = ends.map((end) => (end === null ? "any size" : digits(end, most)));
   return [value === null ? "none" : digits(factor * value, most), words.join(" to ")];
 }
-
-// A line of the commands as a page says it: with quotation marks in place of those of code, without a terminal's option.
-export const plain = (text) => text.replace(/\s*\(`(--)?model`\)/g, "").replace(/`([^`]*)`/g, "“$1”");

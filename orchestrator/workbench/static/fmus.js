@@ -1,5 +1,6 @@
 import { fileAddress, get, post, upload } from "./api.js";
-import { check, choice, digits, field, fill, make, numberIn, numberInput, plain } from "./dom.js";
+import { plain } from "./advice.js";
+import { check, choice, digits, field, fill, make, numberIn, numberInput } from "./dom.js";
 import { Graph, fits, inputsOf, outputsOf, place, shape } from "./graph.js";
 import { action, dropZone, fileChoice, isFmu, isLog, jobView, kept as remembered, message } from "./parts.js";
 import { choices, choose, refresh, start, watch } from "./state.js";

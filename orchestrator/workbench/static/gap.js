@@ -1,6 +1,7 @@
 /* global Units */
 import { post } from "./api.js";
-import { check, digits, field, make, numberIn, numberInput, plain, withInterval } from "./dom.js";
+import { plain } from "./advice.js";
+import { check, digits, field, make, numberIn, numberInput, withInterval } from "./dom.js";
 import { action, fileChoice, jobView, kept, message, resultOf } from "./parts.js";
 import { choices, choose, modelOfLog, start, watch } from "./state.js";
 import { unsaved } from "./machine.js";

@@ -1,5 +1,6 @@
 import { fileAddress, upload } from "./api.js";
-import { choice, fill, field, make, plain, wrongField } from "./dom.js";
+import { plain } from "./advice.js";
+import { choice, fill, field, make, wrongField } from "./dom.js";
 import { choices, choose, discard, isOver, jobOf, open, refresh, runAgain, session, stop, watch } from "./state.js";
 
 const NO_LOGS = /\.(toml|fmu|ssp|json|html|png)$/i;

@@ -1,0 +1,283 @@
+"""What the page draws of a log: every channel by level of detail. It runs in a child process behind walls.
+
+Of a channel the smallest and the largest value of each stretch of ``STRETCH`` rows are kept, not its rows. A large
+text is first drawn of a few rows of each of its blocks, and is read whole meanwhile: ``SLICE`` seconds a request.
+"""
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.columns import Column
+from orchestrator.records.formats import open_source
+from orchestrator.records.formats.source import RecordSource
+from orchestrator.records.formats.text import TextSource
+from orchestrator.records.preview import LogPreview, preview_opened, raw_lines
+
+STRETCH = 64  # rows
+SLICE = 0.1  # s of a request that go into reading on
+LARGE = 4_000_000  # bytes of a log of which a few rows are drawn first
+FEW = 30  # rows of each block, then
+Array = NDArray[np.float64]
+
+
+class CurveShown(msgspec.Struct, frozen=True):
+    """A channel in view: stretches of rows, and what is known of all of it.
+
+    Attributes:
+        rows: first row of each stretch.
+        low, high: its smallest and largest value; None where all are missing.
+        least, most: of the channel; None where it has no numbers.
+        at_least, at_most: share of its rows that have exactly these values: what is cut off shows there.
+        missing: share of its rows without a number.
+        whole: whether all rows were read.
+        problem: why there is no curve.
+    """
+
+    place: int
+    rows: tuple[int, ...] = ()
+    low: tuple[float | None, ...] = ()
+    high: tuple[float | None, ...] = ()
+    least: float | None = None
+    most: float | None = None
+    at_least: float = 0.0
+    at_most: float = 0.0
+    missing: float = 0.0
+    whole: bool = False
+    problem: str = ""
+
+
+class CurvesShown(msgspec.Struct, frozen=True):
+    """Curves of channels, the share of the log that was read for them, and the rows that it has."""
+
+    share: float
+    rows: int
+    curves: tuple[CurveShown, ...]
+
+
+class LookAsked(msgspec.Struct, frozen=True):
+    """What is stated of the columns; the answer is a ``LogPreview``."""
+
+    columns: Mapping[str, Column]
+    header: int | None
+
+
+class CurvesAsked(msgspec.Struct, frozen=True):
+    """Places of channels, first and last row in view, and how many stretches a curve may have; see ``CurvesShown``."""
+
+    places: Annotated[tuple[int, ...], msgspec.Meta(max_length=100)]
+    header: int | None = None
+    first: Annotated[int, msgspec.Meta(ge=0)] = 0
+    last: int = 2**50
+    stretches: Annotated[int, msgspec.Meta(ge=1, le=2000)] = 300
+
+
+class Trace:
+    """A channel as stretches of rows."""
+
+    def __init__(self) -> None:
+        self._parts: list[tuple[NDArray[np.int64], Array, Array]] = []
+        self._rest, self.rows, self.missing = np.zeros(0), 0, 0
+        self.least, self.most, self.at_least, self.at_most = np.inf, -np.inf, 0, 0
+        self.problem, self.whole = "", False
+
+    def add(self, values: Array, first: int | None = None) -> None:
+        """Take the next rows; or, with ``first``, a few rows of many as one stretch."""
+        self._count(values)
+        if first is not None:
+            self._parts.append((np.array([first]), np.fmin.reduce(values)[None], np.fmax.reduce(values)[None]))
+            return
+        start = self.rows - self._rest.size
+        self.rows += values.size
+        self._rest = np.concatenate([self._rest, values])
+        whole = self._rest.size // STRETCH * STRETCH
+        self._keep(start, self._rest[:whole].reshape(-1, STRETCH))
+        self._rest = self._rest[whole:].copy()
+
+    def finish(self) -> None:
+        """Take what is left as a stretch of its own."""
+        if self._rest.size:
+            self._keep(self.rows - self._rest.size, self._rest[None, :])
+            self._rest = np.zeros(0)
+        self.whole = True
+
+    def _keep(self, start: int, table: Array) -> None:
+        starts = start + STRETCH * np.arange(len(table))
+        self._parts.append((starts, np.fmin.reduce(table, axis=1), np.fmax.reduce(table, axis=1)))
+
+    def _count(self, values: Array) -> None:
+        known = values[~np.isnan(values)]
+        self.missing += values.size - known.size
+        if not known.size:
+            return
+        low, high = float(known.min()), float(known.max())
+        if low < self.least:
+            self.least, self.at_least = low, 0
+        if high > self.most:
+            self.most, self.at_most = high, 0
+        self.at_least += int(np.count_nonzero(known == self.least))
+        self.at_most += int(np.count_nonzero(known == self.most))
+
+    def show(self, place: int, first: int, last: int, stretches: int) -> CurveShown:
+        """Return what lies in view."""
+        self._parts = [tuple(np.concatenate(part) for part in zip(*self._parts, strict=True))] if self._parts else []  # type: ignore[misc]
+        starts, low, high = self._parts[0] if self._parts else (np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+        begin = max(int(np.searchsorted(starts, first, side="right")) - 1, 0)
+        end = int(np.searchsorted(starts, last, side="right"))
+        edges = np.unique(np.linspace(begin, end, stretches + 1).astype(int)[:-1]) if end > begin else np.zeros(0, int)
+        parts = [np.zeros(0)] * 2
+        if edges.size:
+            parts = [np.fmin.reduceat(low[:end], edges), np.fmax.reduceat(high[:end], edges)]
+        found = self.most >= self.least
+        count = max(self.rows, 1)
+        return CurveShown(
+            place, tuple(starts[edges].tolist()), _plain(parts[0]), _plain(parts[1]),
+            self.least if found else None, self.most if found else None,
+            self.at_least / count if self.whole else 0.0, self.at_most / count if self.whole else 0.0,
+            self.missing / count if self.whole else 0.0, self.whole, self.problem,
+        )  # fmt: skip
+
+
+def _plain(values: Array) -> tuple[float | None, ...]:
+    return tuple(float(f"{value:.7g}") if math.isfinite(value) else None for value in values.tolist())
+
+
+class LogReader:
+    """A log that was opened for the page."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._lines = path, raw_lines(path)
+        self._files = ExitStack()
+        self._source: RecordSource | None = None
+        self._header: int | None = None
+        self._forget()
+
+    def _forget(self) -> None:
+        self._traces: dict[int, Trace] = {}
+        self._sampled: dict[int, Trace] = {}
+        self._pass: Iterator[float] | None = None
+        self._share = 1.0
+
+    def answer(self, asked: Any) -> Any:
+        """Answer a request of the page."""
+        if isinstance(asked, LookAsked):
+            return self._look(asked)
+        return self._curves(asked)
+
+    def _open(self, header: int | None) -> RecordSource:
+        if self._source is None or header != self._header:
+            self._files.close()
+            self._forget()
+            self._source, self._header = None, header
+            self._source = self._files.enter_context(open_source(self._path, header, apart=False))
+        return self._source
+
+    def _look(self, asked: LookAsked) -> LogPreview:
+        return preview_opened(lambda: self._open(asked.header), self._path, asked.columns, asked.header, self._lines)
+
+    def _curves(self, asked: CurvesAsked) -> CurvesShown:
+        source = self._open(asked.header)
+        heads, stretches = source.heads, asked.stretches
+        places = [place for place in asked.places if 0 <= place < len(heads) and heads[place].kind == "number"]
+        unread = [place for place in places if place not in self._traces]
+        fresh = [place for place in unread if place not in self._sampled]
+        if fresh and isinstance(source, TextSource) and self._path.stat().st_size > LARGE:
+            self._sampled |= self._sample(source, fresh)
+        if self._pass is None and unread:
+            self._pass, self._share = self._read(source, unread), 0.0
+        self._read_on()
+        shown = {}
+        for place in places:
+            trace = self._traces.get(place) or self._sampled.get(place) or Trace()
+            shown[place] = trace.show(place, asked.first, asked.last, stretches)
+        close = [place for place in shown if 0 < self._rows_in_view(place, asked) < STRETCH * stretches]
+        for group in _groups(source, close):
+            shown |= _closer(shown, source, group, asked)
+        rows = max((trace.rows for trace in self._traces.values()), default=0)
+        return CurvesShown(self._share, rows, tuple(shown.values()))
+
+    def _rows_in_view(self, place: int, asked: CurvesAsked) -> int:
+        """Return how many rows of a channel that was read lie in view."""
+        return min(self._traces[place].rows, asked.last + 1) - asked.first if place in self._traces else 0
+
+    def _sample(self, source: RecordSource, places: list[int]) -> dict[int, Trace]:
+        traces = {place: Trace() for place in places}
+        for first, _, values in source.pieces(places, FEW):
+            for place, part in zip(places, values, strict=True):
+                traces[place].add(part, first)
+        return traces
+
+    def _read(self, source: RecordSource, places: list[int]) -> Iterator[float]:
+        """Read channels to their end; yield the share that is done, piece by piece."""
+        groups = _groups(source, places)
+        for n, group in enumerate(groups):
+            traces = {place: Trace() for place in group}
+            try:
+                for first, count, values in source.pieces(group):
+                    for place, part in zip(group, values, strict=True):
+                        traces[place].add(part)
+                    yield (n + first / max(count, 1)) / len(groups)
+            except RecordError as error:
+                for trace in traces.values():
+                    trace.problem = str(error)
+            for trace in traces.values():
+                trace.finish()
+            self._traces |= traces
+
+    def _read_on(self) -> None:
+        end = time.monotonic() + SLICE
+        while self._pass is not None and time.monotonic() < end:
+            self._share = next(self._pass, 1.0)
+            if self._share == 1.0:
+                self._pass = None
+
+
+def _groups(source: RecordSource, places: list[int]) -> list[list[int]]:
+    """Return which channels are read together: those of a text, whose rows are passed through once."""
+    together = isinstance(source, TextSource)
+    return [places] if together and places else [[place] for place in places]
+
+
+def _closer(
+    shown: Mapping[int, CurveShown], source: RecordSource, places: list[int], asked: CurvesAsked
+) -> dict[int, CurveShown]:
+    """Return curves of the rows themselves, which are few in view."""
+    part = source.within(slice(asked.first, asked.last + 1), source.heads[places[0]].raster)
+    pieces = [values for _, _, values in part.pieces(places)]
+    found = {}
+    for n, place in enumerate(places):
+        values = np.concatenate([np.zeros(0), *(piece[n] for piece in pieces)])
+        edges = np.unique(np.linspace(0, values.size, asked.stretches + 1).astype(int)[:-1]) if values.size else []
+        if len(edges):
+            ends = [_plain(reduce(values, edges)) for reduce in (np.fmin.reduceat, np.fmax.reduceat)]
+            rows = tuple((asked.first + edges).tolist())
+            found[place] = msgspec.structs.replace(shown[place], rows=rows, low=ends[0], high=ends[1])
+    return found
+
+
+def reader(folder: str) -> Callable[[tuple[str, Any]], Any]:
+    """Return what answers requests, in the child: the name of a log in its folder, and what is asked of it.
+
+    What the first log needs is imported here, while nobody waits.
+    """
+    opened: dict[str, LogReader] = {}
+    Path("warm.csv").write_text("time [s],u [N.m],theta_m [rad]\n" + "0.0,1,2\n0.1,3,4\n" * 30)
+    LogReader(Path("warm.csv")).answer(LookAsked({}, None))
+    os.chdir(folder)  # logs go by their names, in messages too
+
+    def answer(request: tuple[str, Any]) -> Any:
+        name, asked = request
+        if name not in opened:
+            opened[name] = LogReader(Path(name))
+        return opened[name].answer(asked)
+
+    return answer
