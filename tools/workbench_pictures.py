@@ -31,7 +31,7 @@ def main() -> None:
         set_screen(driver, WIDTH, HEIGHT, "light")
         said = {"columns": columns, "header": None}
         served.ask("POST", "notes", {"log": log, "model": machine, "logs": {log: said}, "given": inspected})
-        driver.get(served.address)
+        driver.get(f"{served.address}#log")
         _wait(driver, "#panel-log .card")
         _save(driver, "log", 980)
         _tab(driver, "machine", "#panel-machine td")

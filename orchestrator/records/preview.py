@@ -24,6 +24,7 @@ SHOWN_LINES = 20
 SHOWN_CHANNELS = 60  # whose first rows are read; the names of all are listed
 LINE_LENGTH = 400  # characters of a raw line
 RANGED_ROWS = 20_000  # whose least and most value are shown in SI
+RANGED_CELLS = 1_000_000  # of these rows: of a wide file fewer are looked at
 # What a unit needs besides, by its kind.
 NEEDED = {
     "counts": ("counts_per_rev",),
@@ -180,7 +181,8 @@ def _convert(
 ) -> tuple[list[ColumnTaken], tuple[str, ...], str]:
     """Return the columns with their range in SI, what was assumed, and what keeps the log from being read."""
     rastered = len({head.raster for head in source.heads}) > 1
-    part = source if rastered else source.within(slice(0, RANGED_ROWS), source.heads[0].raster)
+    ranged_rows = max(min(RANGED_ROWS, RANGED_CELLS // len(source.heads)), SHOWN_ROWS)
+    part = source if rastered else source.within(slice(0, ranged_rows), source.heads[0].raster)
     problem = ""
     try:
         loaded = load(part, path, columns, (), Reading(torque_needed=False))
@@ -205,7 +207,7 @@ def _convert(
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
         ranged.append(msgspec.structs.replace(one, si=SI[kind], least=low, most=high))
     empty = [name for name in ("time", "u", "theta_m") if name in loaded.table and not _has_numbers(loaded.table[name])]
-    if empty and not problem and loaded.table["time"].size < RANGED_ROWS:
+    if empty and not problem and loaded.table["time"].size < ranged_rows:
         problem = f"column `{loaded.labels[empty[0]]}` must hold numbers, but is empty in all rows"
     return ranged, () if problem else loaded.notes, problem
 

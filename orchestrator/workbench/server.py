@@ -45,7 +45,8 @@ from orchestrator.workbench.uploads import UploadTooLargeError, save_upload
 _SHOWN = {".html": "text/html; charset=utf-8", ".png": "image/png", ".json": "application/json",
           ".txt": "text/plain; charset=utf-8", ".toml": "text/plain; charset=utf-8"}  # fmt: skip
 _RESULT_POLICY = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 'self'"
-_KINDS = {".css": "text/css", ".js": "text/javascript", ".html": "text/html", ".svg": "image/svg+xml"}
+_KINDS = {".css": "text/css", ".js": "text/javascript", ".html": "text/html", ".svg": "image/svg+xml",
+          ".csv": "text/csv; charset=utf-8"}  # fmt: skip
 _OPTION_IN_ADVICE = re.compile(r"\s*\(`(--)?model`\)")
 Answer = Callable[[Request], Awaitable[Response]]
 

@@ -101,7 +101,7 @@ def workbench(folder: Path, *words: str, environment: Mapping[str, str] | None =
         process.communicate(timeout=HANGS)
 
 
-def drive_log(path: Path, rows: int = 3000, unknown: str = "Achse B [deg]") -> Path:
+def drive_log(path: Path, rows: int = 3000, unknown: str = "Achse B [deg]", said: str = "Export of a drive") -> Path:
     """Write the log of a simulated drive in amperes and degrees; its second encoder has a name that nobody knows.
 
     Ratio 10, torque constant 0.5 N.m/A, half-gap 5 mrad and dry friction of 0.05 N.m at the motor; 500 Hz.
@@ -125,7 +125,7 @@ def drive_log(path: Path, rows: int = 3000, unknown: str = "Achse B [deg]") -> P
             motor += step / inner * speed_m
             load += step / inner * speed_l
     degrees = np.rad2deg(angles) + rng.normal(0.0, (0.01, 0.003), (rows, 2))
-    lines = ["Export of a drive", "Device;D7", f"Time [ms];Current setpoint [A];Motor position [deg];{unknown}"]
+    lines = [said, "Device;D7", f"Time [ms];Current setpoint [A];Motor position [deg];{unknown}"]
     table = np.column_stack([time * 1e3, current, degrees])
     path.write_text("\n".join([*lines, *(f"{t:.0f};{u:.4f};{m:.4f};{q:.4f}" for t, u, m, q in table)]) + "\n")
     return path

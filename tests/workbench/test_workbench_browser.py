@@ -58,7 +58,7 @@ def wait_for_text(driver: Any, place: str, text: str) -> None:
 def open_workbench(driver: Any, served: Served, width: int = 1280, scheme: str = "light") -> None:
     set_screen(driver, width, 900, scheme)
     driver.get("about:blank")
-    driver.get(served.address)
+    driver.get(f"{served.address}#log")
     wait(driver, lambda d: d.execute_script("return document.getElementById('folder')?.textContent"))
 
 
@@ -155,10 +155,28 @@ def test_a_line_that_names_no_unit_becomes_no_button(page: Any, served: Served, 
     status, found = served.ask("POST", "columns", {"file": served.upload(log), "columns": {}})
     assert (status, "[columns.theta_m] unit" in found["problem"]) == (200, True)
     open_workbench(page, served)
-    advice = call(page, "log.js", "adviceOf", found["problem"])
+    advice = call(page, "advice.js", "adviceOf", found["problem"])
     assert (advice["column"], advice["key"], advice.get("value")) == ("theta_m", "unit", None)
     line = 'say `[columns.theta_m] unit = "deg"` (`model`)'
-    assert call(page, "log.js", "adviceOf", line)["value"] == "deg"
+    assert call(page, "advice.js", "adviceOf", line)["value"] == "deg"
+
+
+def test_advice_names_fields_and_names_keep_their_brackets(page: Any, served: Served) -> None:
+    open_workbench(page, served)
+    said = {
+        'say `[columns.u] unit = "..."` (`model`)': "say “Unit in the file” of “Torque asked for”",
+        "or state `[columns.time] rate = 500`": "or state “samples per second” of “Time”: 500",
+        "reads with --rate 200 in 3 s": "reads with “Samples per second”: 200 in 3 s",
+        "`k` must be positive": "“k” must be positive",
+    }
+    for line, words in said.items():
+        assert call(page, "advice.js", "plain", line) == words
+    names = {
+        "a.b.c": ["a", "b", "c"], "der(a.b)": ["der(a.b)"], "der(der(a.b))": ["der(der(a.b))"], "a[1.2].b": ["a[1.2]", "b"],
+        "a.'x.y'.z": ["a", "'x.y'", "z"], "u": ["u"], "...": ["..."],
+    }  # fmt: skip
+    for name, parts in names.items():
+        assert call(page, "tree.js", "partsOf", name) == parts
 
 
 def test_channels_that_look_alike_become_a_button_each(page: Any, served: Served, tmp_path: Path) -> None:
@@ -167,11 +185,11 @@ def test_channels_that_look_alike_become_a_button_each(page: Any, served: Served
     file = served.upload(log)
     problem = served.ask("POST", "columns", {"file": file, "columns": {}})[1]["problem"]
     open_workbench(page, served)
-    rivals = call(page, "log.js", "rivalsOf", problem)
+    rivals = call(page, "advice.js", "rivalsOf", problem)
     assert rivals == {"column": "theta_m", "names": ["phi1", "phi2"]}
     columns = {"theta_m": {"name": "phi1"}, "theta_l": {"name": "phi2"}}
     problem = served.ask("POST", "columns", {"file": file, "columns": columns})[1]["problem"]
-    assert call(page, "log.js", "rivalsOf", problem) is None
+    assert call(page, "advice.js", "rivalsOf", problem) is None
 
 
 def test_an_estimate_says_whether_a_gap_is_seen(page: Any, served: Served) -> None:
@@ -214,6 +232,30 @@ def test_a_log_goes_in_and_its_columns_are_named_by_clicks(inspected: Any, serve
     assert torque["unit"] == "N.m"
     assert torque["most"] < 2.0
     assert severe(inspected) == []
+
+
+def test_every_channel_is_drawn_and_found_by_its_name(inspected: Any) -> None:
+    drawn = """return [...document.querySelectorAll('#panel-log .curve')].map((one) =>
+        [one.label, one.querySelector('path').getAttribute('d')?.length > 100, one.querySelector('figcaption').textContent])"""
+    find(inspected, "#panel-log .channels").location_once_scrolled_into_view  # noqa: B018 - scrolls
+    wait(inspected, lambda d: all(one[1] for one in d.execute_script(drawn)))
+    curves = inspected.execute_script(drawn)
+    assert [one[0] for one in curves[:4]] == ["Time", "Torque asked for", "Motor angle", "Load angle"]
+    assert len(curves) == 8  # beside the cards, and in the list
+    assert curves[0][2] == "0 to 5998 ms"
+    assert curves[1][2].endswith(" A")
+    type_into = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))"
+    for text, count in (("achse", 1), ("load angle", 1), ("[deg]", 2), ("none", 0), ("", 4)):
+        inspected.execute_script(type_into, find(inspected, "[data-key=find-channel]"), text)
+        assert len(inspected.find_elements("css selector", "#panel-log .channel")) == count
+    press(inspected, "Zoom in")
+    wait_for_text(inspected, "panel-log", "rows 751 to 2,250")
+    press(inspected, "All rows")
+    wait_for_text(inspected, "panel-log", "rows 1 to 3,000")
+    choose_tab(inspected, "start")
+    wait_for_text(inspected, "panel-start", "✓ done drive.csv was looked at")
+    wait_for_text(inspected, "panel-start", "to do press “Estimate the gap”")
+    choose_tab(inspected, "log")
 
 
 def test_the_page_of_a_result_is_shown_in_a_sandbox(inspected: Any) -> None:
@@ -301,6 +343,15 @@ def test_outputs_are_dragged_to_inputs_of_the_same_quantity(inspected: Any, serv
     assert served.job("simulate-1")["state"] == "done"
     assert severe(inspected) == []
     set_screen(inspected, 1280, 900, "light")
+
+
+def test_an_fmu_runs_alone_with_one_click(inspected: Any, served: Served) -> None:
+    wait_for_text(inspected, "panel-fmus", "Sampled-data Kalman filter of the drivetrain")
+    wait_for_text(inspected, "panel-fmus", "backlash-cosim with PythonFMU")
+    press(inspected, "Run this FMU")
+    find(inspected, "#panel-fmus iframe[title='Page of simulate-2']")
+    scenario = load_scenario(served.folder / "files" / "KalmanEstimator-alone.toml")
+    assert (scenario.stop, [one.name for one in scenario.system.instances]) == (2.0, ["model"])
 
 
 def renamed_log(served: Served, names: str) -> str:

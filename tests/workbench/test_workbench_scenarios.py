@@ -80,6 +80,8 @@ def test_a_name_stays_a_name(session) -> None:
 def test_the_interface_of_an_fmu(session) -> None:
     seen = preview_fmu(session.files / "plant.fmu")
     shown = {one.name: one for one in seen.variables}
+    assert (seen.name, seen.tool.split()[0], seen.stop) == ("Drivetrain", "backlash-cosim", 2.0)
+    assert {"linux64", "win64"} <= set(seen.platforms)
     assert (seen.version, seen.kind, shown["u"].causality, shown["u"].unit) == ("2.0", "co-simulation", "input", "N.m")
     assert shown["u"].quantity == shown["T_shaft"].quantity != shown["theta_m"].quantity
     assert "nordin" in shown["backlash_model"].items

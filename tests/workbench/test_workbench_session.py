@@ -11,7 +11,7 @@ from orchestrator.cli import main
 from orchestrator.errors import InputError
 from orchestrator.workbench.notes import Notes
 from orchestrator.workbench.session import kind_of, open_session
-from tests.support.workbench import workbench
+from tests.support.workbench import ROOT, drive_log, workbench
 
 pytest.importorskip("starlette")
 pytest.importorskip("uvicorn")
@@ -89,3 +89,12 @@ def test_a_job_under_way_is_not_removed(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="stop it first"):
         asyncio.run(found.remove(folder.name))
     assert folder.is_dir()
+
+
+EXAMPLE = "Simulated drive: 0.5 N.m/A, ratio 10, half-gap 5 mrad, dry friction 0.05 N.m at the motor"
+
+
+def test_the_example_record_is_the_one_that_can_be_made_again(tmp_path: Path) -> None:
+    made = drive_log(tmp_path / "drive.csv", unknown="Load position [deg]", said=EXAMPLE)
+    example = ROOT / "orchestrator" / "workbench" / "static" / "example-drive.csv"
+    assert example.read_text() == made.read_text()

@@ -1,10 +1,10 @@
-import { field, fill, make } from "./dom.js";
+import { field, fill, make, table } from "./dom.js";
 import { duration, jobButtons, message } from "./parts.js";
 import { isOver, session, watch } from "./state.js";
 
 // Two results of one command side by side, and the history of the session.
 export function build(panel) {
-  const said = message(), page = make("div", {}), table = make("div", {});
+  const said = message(), page = make("div", {}), place = make("div", {});
   const first = make("select", {}), second = make("select", {});
   let shown = "";
   const whole = () => session.jobs.filter((job) => isOver(job) && job.files.includes(`${job.command}.json`));
@@ -22,13 +22,7 @@ export function build(panel) {
     const before = first.value;
     first.replaceChildren(...whole().map((job) => make("option", { value: job.name, selected: job.name === before }, job.name)));
     alike();
-    fill(table, jobs.length ? make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "History" }, make("table", { class: "stack" },
-      make("thead", {}, make("tr", {}, ["job", "ended", "state", "took", "command line", "actions"].map((text) => make("th", { scope: "col" }, text)))),
-      make("tbody", {}, jobs.toReversed().map((job) => make("tr", {},
-        make("td", {}, job.files.includes("report.html") ? make("a", { href: `file/results/${job.name}/report.html`, target: "_blank", rel: "noopener" }, job.name) : job.name),
-        make("td", {}, job.ended ? new Date(1000 * job.ended).toLocaleString() : ""), make("td", {}, job.state),
-        make("td", {}, job.ended > job.begun ? duration(job.ended - job.begun) : ""), make("td", { class: "long" }, make("code", {}, job.line)), make("td", {}, jobButtons(job, "open")))))))
-      : make("p", {}, "No job has ended yet."));
+    fill(place, jobs.length ? table("Results", ["result", "ended", "state", "took", "command line", "actions"], jobs.toReversed().map(row)) : make("p", {}, "No result is here yet: a job leaves one."));
   });
   const show = () => {
     said.say("");
@@ -40,5 +34,11 @@ export function build(panel) {
   panel.append(
     make("div", { class: "row" }, field("One result", first, "grows"), field("Another of the same command", second, "grows"),
       make("button", { type: "button", class: "main", onclick: show }, "Compare them")),
-    said.element, page, make("h2", {}, "History of this session"), table);
+    said.element, page, make("h2", {}, "All results of this session"), place);
+}
+
+function row(job) {
+  const page = make("a", { href: `file/results/${job.name}/report.html`, target: "_blank", rel: "noopener" }, job.name);
+  return [job.files.includes("report.html") ? page : job.name, job.ended ? new Date(1000 * job.ended).toLocaleString() : "", job.state,
+    job.ended > job.begun ? duration(job.ended - job.begun) : "", make("td", { class: "long" }, make("code", {}, job.line)), make("td", {}, jobButtons(job, "open"))];
 }

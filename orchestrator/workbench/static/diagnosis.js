@@ -1,6 +1,6 @@
 /* global Units */
 import { plain } from "./advice.js";
-import { check, digits, fill, make, withInterval } from "./dom.js";
+import { check, digits, fill, make, table, withInterval } from "./dom.js";
 import { inputs, needLog, reading, trustTag } from "./gap.js";
 import { action, fileChoice, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, jobOf, modelOfLog, start } from "./state.js";
@@ -33,35 +33,6 @@ export function build(panel, go) {
       ...misfits(found, earlier),
       refit(job, found), back,
       (found.notes ?? []).length ? make("div", {}, make("h3", {}, "To know"), found.notes.map((text) => make("p", {}, plain(text)))) : null);
-  }
-
-  function effects(found) {
-    const words = (label) => found.library?.[label]?.words ?? label.replaceAll("_", " ").replace("@", " at ");
-    const size = ([key, one]) => {
-      const { factor, name } = Units.shown(one.unit, found.angle_unit);
-      const [value, between] = withInterval(one.value, one.interval, factor);
-      return `${SIZES[key] ?? key.replaceAll("_", " ")} ${value} ${name && name !== "1" ? name : ""}${between ? ` (${between})` : ""}`;
-    };
-    const inLog = (found.nuisances ?? []).map((one) => ({ ...one, said: `${one.name.replaceAll("_", " ")} (in the log)` }));
-    return make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Effects" }, make("table", { class: "stack" },
-      make("thead", {}, make("tr", {}, ["effect", "grade", "size, 95 %", "not told apart from"].map((text) => make("th", { scope: "col" }, text)))),
-      make("tbody", {}, [...found.effects, ...inLog].map((one) => make("tr", {},
-        make("td", {}, one.said ?? words(`${one.name}@${one.site ?? ""}`)), make("td", { "data-label": "grade" }, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
-        make("td", { "data-label": "size, 95 %" }, Object.entries(one.parameters).map(size).join("; ")), make("td", { "data-label": "not told apart from" }, (one.family ?? []).map(words).join(", ") || "none"))))));
-  }
-
-  // Rms of free runs on test data, beside that of the model before effects were ticked.
-  function misfits(found, earlier) {
-    const rows = found.test.flatMap((test, n) => Object.entries(test.misfit).map(([signal, one]) => {
-      const { factor, name } = Units.shown(one.unit, found.angle_unit);
-      const before = earlier?.test[n]?.misfit[signal]?.final;
-      const cells = [one.nominal, one.parameters, ...(earlier ? [before] : []), one.final, one.noise];
-      return [SIGNALS[signal] ?? signal, ...cells.map((value) => (value === null || value === undefined ? "none" : `${digits(factor * value)} ${name}`))];
-    }));
-    const heads = ["signal", "as given", "re-fitted", ...(earlier ? ["before"] : []), "with effects", "noise"];
-    return rows.length ? [make("h3", {}, "Misfit on test data (rms)"), make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Misfit on test data" }, make("table", { class: "stack" },
-      make("thead", {}, make("tr", {}, heads.map((text) => make("th", { scope: "col" }, text)))),
-      make("tbody", {}, rows.map((row) => make("tr", {}, row.map((text, n) => make("td", { "data-label": n ? heads[n] : null }, text)))))))] : [];
   }
 
   // The model fitted again by `diagnose --effects`, with exactly the effects that are ticked.
@@ -97,4 +68,29 @@ export function build(panel, go) {
       action("Diagnose", said, async () => { needLog(); view.show(await start("diagnose", [choices.log], await options())); }, "main"),
       action("Go on to the model", said, () => go("model"))),
     view.element);
+}
+
+function effects(found) {
+  const words = (label) => found.library?.[label]?.words ?? label.replaceAll("_", " ").replace("@", " at ");
+  const size = ([key, one]) => {
+    const { factor, name } = Units.shown(one.unit, found.angle_unit);
+    const [value, between] = withInterval(one.value, one.interval, factor);
+    return `${SIZES[key] ?? key.replaceAll("_", " ")} ${value} ${name && name !== "1" ? name : ""}${between ? ` (${between})` : ""}`;
+  };
+  const inLog = (found.nuisances ?? []).map((one) => ({ ...one, said: `${one.name.replaceAll("_", " ")} (in the log)` }));
+  return table("Effects", ["effect", "grade", "size, 95 %", "not told apart from"], [...found.effects, ...inLog].map((one) => [
+    one.said ?? words(`${one.name}@${one.site ?? ""}`), make("td", { "data-label": "grade" }, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
+    Object.entries(one.parameters).map(size).join("; "), (one.family ?? []).map(words).join(", ") || "none"]));
+}
+
+// Rms of free runs on test data, beside that of the model before effects were ticked.
+function misfits(found, earlier) {
+  const rows = found.test.flatMap((test, n) => Object.entries(test.misfit).map(([signal, one]) => {
+    const { factor, name } = Units.shown(one.unit, found.angle_unit);
+    const before = earlier?.test[n]?.misfit[signal]?.final;
+    const cells = [one.nominal, one.parameters, ...(earlier ? [before] : []), one.final, one.noise];
+    return [SIGNALS[signal] ?? signal, ...cells.map((value) => (value === null || value === undefined ? "none" : `${digits(factor * value)} ${name}`))];
+  }));
+  const heads = ["signal", "as given", "re-fitted", ...(earlier ? ["before"] : []), "with effects", "noise"];
+  return rows.length ? [make("h3", {}, "Misfit on test data (rms)"), table("Misfit on test data", heads, rows)] : [];
 }

@@ -70,6 +70,14 @@ export function fill(element, ...children) {
   }
 }
 
+// A table that scrolls where it is too wide; a row is a list of its cells, texts or `td`s.
+export function table(name, heads, rows, kind = "stack") {
+  const cell = (one, n) => (one instanceof Node ? one : make("td", { "data-label": n ? heads[n] : null }, one));
+  return make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": name }, make("table", { class: kind },
+    make("thead", {}, make("tr", {}, heads.map((text) => make("th", { scope: "col" }, text)))),
+    make("tbody", {}, rows.map((row) => make("tr", {}, row.map(cell))))));
+}
+
 export const digits = (value, most = 4) =>
   value === null || value === undefined ? "none" : String(Number(Number(value).toPrecision(most)));
 

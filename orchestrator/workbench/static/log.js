@@ -82,7 +82,7 @@ class LogTab {
   }
 
   clear() {
-    this.busy.textContent = choices.log ? "" : "No log is chosen yet: drop one, or begin with the example on the page Start.";
+    this.busy.textContent = choices.log ? "" : "No log is chosen yet: drop one, or begin with the example in the tab Start.";
     [this.body, this.raw].forEach((place) => fill(place));
     this.channels.show(null);
   }

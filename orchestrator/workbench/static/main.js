@@ -1,6 +1,7 @@
 import { fill, make } from "./dom.js";
 import { isOver, refresh, session, watch } from "./state.js";
 import { jobLine } from "./parts.js";
+import * as begin from "./start.js";
 import * as log from "./log.js";
 import * as machine from "./machine.js";
 import * as gap from "./gap.js";
@@ -10,7 +11,8 @@ import * as fmus from "./fmus.js";
 import * as compare from "./compare.js";
 
 const TABS = [
-  ["log", "Log", log], ["machine", "Machine", machine], ["gap", "Gap", gap], ["diagnosis", "Diagnosis", diagnosis], ["model", "Model", model], ["fmus", "FMUs", fmus], ["compare", "Compare", compare],
+  ["start", "Start", begin], ["log", "Log", log], ["machine", "Machine", machine], ["gap", "Gap", gap], ["diagnosis", "Diagnosis", diagnosis],
+  ["model", "Model", model], ["fmus", "FMUs", fmus], ["compare", "Results", compare],
 ];
 await refresh();  // the work as it was
 const tabs = document.getElementById("tabs"), panels = document.getElementById("panels");
@@ -26,7 +28,7 @@ function go(key, focus = true) {
   if (location.hash !== `#${key}`) history[focus ? "pushState" : "replaceState"](null, "", `#${key}`);
 }
 
-const asked = () => (TABS.some(([name]) => name === location.hash.slice(1)) ? location.hash.slice(1) : "log");
+const asked = () => (TABS.some(([name]) => name === location.hash.slice(1)) ? location.hash.slice(1) : "start");
 addEventListener("popstate", () => go(asked(), false));  // Back: to the tab before
 
 for (const [name, title, part] of TABS) {

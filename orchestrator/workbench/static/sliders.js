@@ -44,28 +44,7 @@ export async function sliders(job) {
     if (again) { again = false; begun = performance.now(); run(); }
   }
 
-  const controls = model.sliders.map((slider) => {
-    const shown = make("output", {});
-    const input = make("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${slider.name}: ${slider.meaning}` });
-    const show = (value) => {
-      const { factor, name } = Units.shown(slider.unit);
-      shown.textContent = `${digits(factor * value)} ${name === "1" ? "" : name}`;
-      input.setAttribute("aria-valuetext", shown.textContent);
-    };
-    const home = () => {
-      input.value = String(Math.round((STEPS * (slider.value - slider.low)) / (slider.high - slider.low)));
-      delete values[slider.name];
-      show(slider.value);
-    };
-    input.addEventListener("input", () => {
-      values[slider.name] = slider.low + ((slider.high - slider.low) * Number(input.value)) / STEPS;
-      show(values[slider.name]);
-      run();
-    });
-    home();
-    Units.listeners.push(() => show(values[slider.name] ?? slider.value));
-    return { home, element: make("div", { class: "field" }, make("span", {}, slider.name.startsWith("effects.") ? slider.name.slice(8).replace(/[._]/g, " ") : slider.name), shown, input) };
-  });
+  const controls = model.sliders.map((slider) => control(slider, values, run));
   const units = choice(["rad", "deg", "arcmin", "turns"].map((unit) => [unit, unit]), Units.chosen, (unit) => Units.choose(unit));
   const place = make("div", {});
   fill(place,
@@ -75,4 +54,28 @@ export async function sliders(job) {
     plots.map(({ title, figure }) => [make("h3", {}, title), figure]).flat());
   await run();
   return place;
+}
+
+// A slider and its number; `home` brings it back to the result's value.
+function control(slider, values, run) {
+  const shown = make("output", {}), isEffect = slider.name.startsWith("effects.");
+  const input = make("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${slider.name}: ${slider.meaning}` });
+  const show = (value) => {
+    const { factor, name } = Units.shown(slider.unit);
+    shown.textContent = `${digits(factor * value)} ${name === "1" ? "" : name}`;
+    input.setAttribute("aria-valuetext", shown.textContent);
+  };
+  const home = () => {
+    input.value = String(Math.round((STEPS * (slider.value - slider.low)) / (slider.high - slider.low)));
+    delete values[slider.name];
+    show(slider.value);
+  };
+  input.addEventListener("input", () => {
+    values[slider.name] = slider.low + ((slider.high - slider.low) * Number(input.value)) / STEPS;
+    show(values[slider.name]);
+    run();
+  });
+  home();
+  Units.listeners.push(() => show(values[slider.name] ?? slider.value));
+  return { home, element: make("div", { class: "field" }, make("span", {}, isEffect ? slider.name.slice(8).replace(/[._]/g, " ") : slider.name), shown, input) };
 }

@@ -1,0 +1,264 @@
+import { fileAddress, post, upload } from "./api.js";
+import { check, choice, digits, field, fill, make, numberInput } from "./dom.js";
+import { interfaceOf } from "./fmus.js";
+import { Graph, fits, inputsOf, outputsOf, place, shape } from "./graph.js";
+import { action, fileChoice, message } from "./parts.js";
+import { choices, choose, refresh, start, watch } from "./state.js";
+
+const KINDS = {
+  constant: [["value", "value", 0]],
+  step: [["before", "before", 0], ["after", "after", 1], ["time", "at [s]", 0.1]],
+  sine: [["amplitude", "amplitude", 1], ["frequency", "frequency [Hz]", 1], ["offset", "offset", 0]],
+  square: [["amplitude", "amplitude", 1], ["period", "period [s]", 1], ["offset", "offset", 0]],
+  table: [],
+  drawn: [],
+};
+const WORDS = { constant: "constant", step: "step", sine: "sine", square: "square wave", table: "a table of the session", drawn: "drawn by hand" };
+const MASTERS = [["gauss_seidel", "one after the other"], ["jacobi", "side by side"], ["iterated", "iterated"], ["adaptive", "adaptive steps"]];
+const EMPTY = { nodes: {}, connections: [], sources: [], unwanted: [], run: { stop: 1, step: 0.001, algorithm: "gauss_seidel" } };
+
+// A scenario of several FMUs: drawn, fed, written, run. The session keeps it; `variables` of its FMUs are read anew.
+export class Scenario {
+  constructor(panel, options, show) {
+    Object.assign(this, structuredClone(EMPTY), { options, show, last: "", restoring: false, drawings: [] });
+    [this.said, this.graphSaid] = [message(), message()];
+    this.editor = make("div", {});
+    this.written = make("p", { class: "note", role: "status" });
+    this.graph = new Graph((from, to) => this.connect(from, to), () => this.keep());
+    this.element = make("div", {},
+      make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Graph of the scenario" }, this.graph.svg), this.graphSaid.element, this.editor, this.said.element,
+      make("div", { class: "row" }, action("Write it as TOML", this.said, () => this.write()), action("Run the scenario", this.said, () => this.simulate(), "main")), this.written);
+    panel.addEventListener("change", () => this.keep());
+    watch(() => this.follow());
+    this.draw();
+    this.follow();
+  }
+
+  plain() {
+    const nodes = Object.fromEntries(Object.entries(this.nodes).map(([name, { variables, ...node }]) => [name, node]));
+    return { nodes, connections: this.connections, sources: this.sources, unwanted: this.unwanted, run: this.run };
+  }
+
+  keep() {
+    const now = this.plain(), text = JSON.stringify(now);
+    if (this.restoring || text === this.last || (!this.last && !Object.keys(now.nodes).length)) return;
+    this.last = text;
+    choose({ scenario: structuredClone(now) });
+  }
+
+  // What the session keeps: of an earlier day, or of another tab of the browser.
+  follow() {
+    const text = choices.scenario ? JSON.stringify(choices.scenario) : "";
+    if (text === this.last) return;
+    this.last = text;
+    this.restore(structuredClone(choices.scenario ?? EMPTY), text).catch((error) => {
+      this.restoring = false;
+      this.said.say(`The scenario cannot be shown: ${error.message}`);
+    });
+  }
+
+  async restore(kept, text) {
+    this.restoring = true;  // what stands here is not yet what the session keeps
+    for (const node of Object.values(kept.nodes)) node.variables = (await interfaceOf(node.fmu)).variables;
+    if (text !== this.last) return;  // a later one is on its way
+    Object.assign(this, kept);
+    this.restoring = false;
+    this.draw();
+  }
+
+  async add(fmu) {
+    const { variables } = await interfaceOf(fmu);
+    const stem = fmu.split("/").at(-1).replace(/\.fmu$/i, "").replace(/[^A-Za-z0-9_]+/g, "_").toLowerCase();
+    let name = stem;
+    for (let n = 2; this.nodes[name]; n++) name = `${stem}${n}`;
+    this.nodes[name] = { fmu, parameters: {}, ...place(Object.keys(this.nodes).length), variables };
+    this.draw();
+  }
+
+  keys(of) {
+    return Object.entries(this.nodes).flatMap(([name, node]) => of(node).map((one) => `${name}.${one.name}`));
+  }
+
+  variable(key) {
+    const name = Object.keys(this.nodes).find((one) => key.startsWith(`${one}.`));
+    return this.nodes[name]?.variables.find((one) => `${name}.${one.name}` === key);
+  }
+
+  connect(from, to) {
+    this.graphSaid.say("");
+    const [out, into] = [this.variable(from), this.variable(to)];
+    if (!fits(out, into)) { this.graphSaid.say(`${from} [${out.unit || out.type}] and ${to} [${into.unit || into.type}] do not measure the same`); return; }
+    this.connections = this.connections.filter((one) => one.to !== to).concat({ from, to });
+    this.draw();
+  }
+
+  // What has the same name and measures the same; inputs that are fed already stay as they are.
+  connectAlike(outs, ins) {
+    const fed = new Set([...this.connections, ...this.sources].map((one) => one.to)), end = (key) => this.variable(key).name;
+    for (const to of ins.filter((key) => !fed.has(key))) {
+      const alike = outs.filter((key) => end(key) === end(to) && fits(this.variable(key), this.variable(to)));
+      if (alike.length === 1) this.connections.push({ from: alike[0], to });
+    }
+    this.draw();
+  }
+
+  draw() {
+    this.keep();
+    this.graphSaid.say("");
+    this.graph.draw(this.nodes, this.connections);
+    this.drawings = [];
+    const [outs, ins] = [this.keys(outputsOf), this.keys(inputsOf)], names = Object.keys(this.nodes);
+    const feed = () => { this.sources.push({ to: ins.find((key) => !this.sources.some((one) => one.to === key)) ?? ins[0], kind: "constant", value: 0 }); this.draw(); };
+    fill(this.editor,
+      names.length ? null : make("p", { class: "note" }, "No FMU stands here yet: choose one above and add it."),
+      outs.length && ins.length ? this.connecting(outs, ins) : null,
+      make("ul", { class: "files" }, this.connections.map((one) => make("li", {}, `${one.from} → ${one.to} `,
+        this.remover(`connection of ${one.from} to ${one.to}`, () => { this.connections = this.connections.filter((other) => other !== one); })))),
+      make("ul", { class: "files" }, names.map((name) => make("li", {}, `${name} `, this.remover(name, () => this.drop(name))))),
+      ins.length ? make("h3", {}, "Inputs") : null, this.sources.map((source) => this.sourceRow(source, ins)),
+      ins.length ? make("button", { type: "button", onclick: feed }, "Feed an input") : null,
+      Object.entries(this.nodes).map(([name, node]) => parametersOf(name, node)),
+      outs.length ? [this.recorded(outs), this.running()] : null);
+  }
+
+  connecting(outs, ins) {
+    let from = outs[0], to = "";
+    const targets = make("select", { onchange: () => { to = targets.value; } }), into = () => {
+      const able = ins.filter((key) => fits(this.variable(from), this.variable(key)));
+      to = able[0] ?? "";
+      targets.replaceChildren(...able.map((key) => make("option", { value: key }, key)));
+    };
+    into();
+    return make("div", { class: "row" },
+      field("From", choice(outs.map((key) => [key, key]), from, (key) => { from = key; into(); })), field("to an input of the same quantity", targets),
+      make("button", { type: "button", onclick: () => to && this.connect(from, to) }, "Connect"),
+      make("button", { type: "button", onclick: () => this.connectAlike(outs, ins) }, "Connect what has the same name"));
+  }
+
+  recorded(outs) {
+    const set = (key) => (event) => { this.unwanted = event.target.checked ? this.unwanted.filter((one) => one !== key) : [...this.unwanted, key]; };
+    return make("details", {}, make("summary", {}, `Recorded outputs (${outs.filter((key) => !this.unwanted.includes(key)).length} of ${outs.length})`),
+      make("div", { class: "row" }, outs.map((key) => check(key, !this.unwanted.includes(key), set(key)))));
+  }
+
+  running() {
+    return make("div", { class: "row" }, this.number("Stop [s]", this.run, "stop"), this.number("Step [s]", this.run, "step"),
+      field("Master", choice(MASTERS, this.run.algorithm, (value) => { this.run.algorithm = value; })));
+  }
+
+  drop(name) {
+    const inside = (key) => key.startsWith(`${name}.`);
+    delete this.nodes[name];
+    this.connections = this.connections.filter((one) => !inside(one.from) && !inside(one.to));
+    this.sources = this.sources.filter((one) => !inside(one.to));
+  }
+
+  remover(what, act) {
+    return make("button", { type: "button", "aria-label": `Remove ${what}`, onclick: () => { act(); this.draw(); } }, "Remove");
+  }
+
+  number(text, table, key) {
+    return field(text, numberInput({ value: table[key] ?? "", required: true }, (value) => {
+      table[key] = value;
+      this.drawings.forEach((show) => show());  // over another time
+    }));
+  }
+
+  sourceRow(source, ins) {
+    const kind = choice(Object.entries(WORDS), source.kind, (value) => {
+      source.kind = value;
+      for (const [key, , usual] of KINDS[value]) source[key] ??= usual;
+      this.draw();
+    });
+    const column = make("input", { value: source.column ?? "", placeholder: "name, or #2", onchange: () => { source.column = column.value.trim(); } });
+    return make("div", { class: "card" }, make("div", { class: "row" },
+      field("Input", choice(ins.map((key) => [key, key]), source.to, (value) => { source.to = value; })), field("is", kind),
+      KINDS[source.kind].map(([key, text]) => this.number(text, source, key)),
+      source.kind === "table" ? [fileChoice("Table", "log", () => source.file ?? "", (file) => { source.file = file; this.keep(); }), field("Column", column)] : null,
+      this.remover(`source of ${source.to}`, () => { this.sources = this.sources.filter((one) => one !== source); })),
+      source.kind === "drawn" ? this.drawing(source) : null);
+  }
+
+  // A curve by clicks into the field, or as lines of time and value.
+  drawing(source) {
+    const { run } = this;
+    source.points ??= [[0, 0], [run.stop / 2, 1], [run.stop, 0]];
+    const size = () => Math.max(1e-9, ...source.points.map(([, value]) => Math.abs(value))) * 1.25;
+    const box = shape("svg", { class: "draw", viewBox: "0 0 400 160", role: "img" });
+    let scale = size();
+    const text = make("textarea", { rows: 4, cols: 22, onchange: () => {
+      const points = text.value.split("\n").filter((line) => line.trim() !== "").map(pairOf), wrong = !points.length || points.includes(null);
+      text.setAttribute("aria-invalid", String(wrong));
+      if (wrong) return;
+      source.points = points.sort((a, b) => a[0] - b[0]);
+      show();
+    } });
+    const show = () => {
+      text.value = source.points.map(([t, v]) => `${t}, ${v}`).join("\n");
+      scale = Math.max(scale, size());
+      drawCurve(box, source.points, run.stop, scale);
+    };
+    box.addEventListener("click", (event) => {
+      const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(box.getScreenCTM().inverse());
+      const time = Number(((run.stop * x) / 400).toPrecision(4)), value = Number((((80 - y) * scale) / 75).toPrecision(3));
+      source.points = source.points.filter(([t]) => Math.abs(t - time) > run.stop / 200).concat([[time, value]]).sort((a, b) => a[0] - b[0]);
+      show();
+      this.keep();
+    });
+    this.drawings.push(show);
+    show();
+    return make("div", { class: "row" }, box, field("Time [s], value", text));
+  }
+
+  async write() {
+    if (!Object.keys(this.nodes).length) throw new Error("add an FMU first");
+    const { run } = this, sources = [];
+    for (const { points, ...source } of this.sources) {
+      const made = { to: source.to, kind: source.kind, ...Object.fromEntries(KINDS[source.kind].map(([key]) => [key, source[key]])) };
+      if (source.kind === "table") Object.assign(made, { file: source.file, ...(source.column ? { column: source.column } : {}) });
+      if (source.kind === "drawn") {
+        const { file } = await upload(new File([`time,value\n${points.map((pair) => pair.join(",")).join("\n")}\n`], "drawn.csv"));
+        choose({ drawn: { [file]: true } });  // no log
+        Object.assign(made, { kind: "table", file, column: "value" });
+      }
+      sources.push(made);
+    }
+    const record = this.keys(outputsOf).filter((key) => !this.unwanted.includes(key));
+    const instances = Object.fromEntries(Object.entries(this.nodes).map(([name, node]) => [name, { fmu: node.fmu, parameters: node.parameters }]));
+    const master = { algorithm: run.algorithm, ...(run.algorithm === "adaptive" ? {} : { step: run.step }) };
+    const made = await post("scenarios", { name: "scenario.toml", stop: run.stop, master, instances, connections: this.connections, sources, record });
+    await refresh();
+    fill(this.written, "Written: ", make("a", { href: fileAddress(made.file), download: made.name }, made.name));
+    return made.file;
+  }
+
+  async simulate() {
+    this.show(await start("simulate", [], { scenario: await this.write(), ...this.options() }));
+  }
+}
+
+function parametersOf(name, node) {
+  const open = node.variables.filter((one) => one.causality === "parameter" && ["Real", "Integer"].includes(one.type)).slice(0, 200);
+  if (!open.length) return null;
+  return make("details", {}, make("summary", {}, `Parameters of ${name} (${open.length})`), make("div", { class: "row" }, open.map((one) => {
+    const input = numberInput({ placeholder: String(one.start ?? ""), value: node.parameters[one.name] ?? "" }, (value) => {
+      if (value === null) delete node.parameters[one.name];
+      else node.parameters[one.name] = value;
+    });
+    return field(`${one.name}${one.unit && one.unit !== "1" ? ` [${one.unit}]` : ""}`, input);
+  })));
+}
+
+// Time and value of a line such as "0.5, 2" or "0,5; 2"; null: it does not hold two numbers.
+function pairOf(line) {
+  const parts = /[;\t]/.test(line) ? line.split(/[;\t]/).map((part) => part.trim().replace(",", ".")) : line.trim().split(/\s*,\s*|\s+/);
+  const numbers = parts.map((part) => (part === "" ? NaN : Number(part)));
+  return numbers.length === 2 && numbers.every(Number.isFinite) ? numbers : null;
+}
+
+function drawCurve(box, points, stop, scale) {
+  const line = shape("polyline", { points: points.map(([t, v]) => `${(400 * t) / stop},${80 - (75 * v) / scale}`).join(" ") });
+  const mark = (x, y, anchor, words) => Object.assign(shape("text", { x, y, "text-anchor": anchor }), { textContent: words });
+  box.setAttribute("aria-label", `Drawn curve of ${points.length} points from ${-scale} to ${scale}; the lines beside it are the same`);
+  box.replaceChildren(shape("line", { x1: 0, y1: 80, x2: 400, y2: 80 }), mark(4, 14, "start", digits(scale, 3)), mark(4, 155, "start", digits(-scale, 3)), mark(396, 76, "end", `${stop} s`), line);
+}
