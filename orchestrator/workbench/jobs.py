@@ -25,7 +25,8 @@ from orchestrator.workbench.settings import WorkbenchSettings
 PROGRAM = "backlash-cosim"  # as it is called on a command line
 JOB_FILE, OUTPUT_FILE = "job.json", "output.txt"
 _SHOWN = (
-    "name", "command", "asked", "state", "stage", "share", "left", "exit_code", "messages", "begun", "ended", "stops",
+    "name", "command", "asked", "state", "stage", "share", "left", "told", "exit_code", "messages", "begun", "ended",
+    "stops",
 )  # fmt: skip
 STOPPED = (130, 143, 129)  # exit codes after Ctrl-C, SIGTERM and SIGHUP
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
@@ -40,7 +41,7 @@ class Job:
         words: the command line behind the program's name.
         asked: ``inputs`` and ``options`` as the page asked for it.
         state: "waiting", "running", "done", "failed" or "stopped"; "ended" where the server went first.
-        stage, share, left: as ``--progress json`` tells them.
+        stage, share, left: as ``--progress json`` tells them; ``told``: when it did [s since 1970].
         messages: what it wrote to standard error besides.
         begun, ended: seconds since 1970, ``ended`` 0.0 while it runs.
         stops: how often it was asked to stop.
@@ -55,6 +56,7 @@ class Job:
     stage: str = ""
     share: float | None = None
     left: float | None = None
+    told: float = 0.0
     exit_code: int | None = None
     messages: list[str] = field(default_factory=list)
     begun: float = 0.0
@@ -208,6 +210,7 @@ class Jobs:
             with contextlib.suppress(ValueError, TypeError, AttributeError):
                 told = json.loads(text)
                 job.stage, job.share, job.left = str(told["stage"])[:200], _share(told["share"]), _share(told["left"])
+                job.told = time.time()
                 return
         if text:
             job.messages.append(plain_text(text[: self._settings.longest_message]))

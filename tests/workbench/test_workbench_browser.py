@@ -172,8 +172,8 @@ def test_advice_names_fields_and_names_keep_their_brackets(page: Any, served: Se
     for line, words in said.items():
         assert call(page, "advice.js", "plain", line) == words
     names = {
-        "a.b.c": ["a", "b", "c"], "der(a.b)": ["der(a.b)"], "der(der(a.b))": ["der(der(a.b))"], "a[1.2].b": ["a[1.2]", "b"],
-        "a.'x.y'.z": ["a", "'x.y'", "z"], "u": ["u"], "...": ["..."],
+        "a.b.c": ["a", "b", "c"], "der(a.b)": ["der(a.b)"], "der(der(a.b))": ["der(der(a.b))"],
+        "a[1.2].b": ["a[1.2]", "b"], "a.'x.y'.z": ["a", "'x.y'", "z"], "u": ["u"], "...": ["..."],
     }  # fmt: skip
     for name, parts in names.items():
         assert call(page, "tree.js", "partsOf", name) == parts
@@ -236,7 +236,7 @@ def test_a_log_goes_in_and_its_columns_are_named_by_clicks(inspected: Any, serve
 
 def test_every_channel_is_drawn_and_found_by_its_name(inspected: Any) -> None:
     drawn = """return [...document.querySelectorAll('#panel-log .curve')].map((one) =>
-        [one.label, one.querySelector('path').getAttribute('d')?.length > 100, one.querySelector('figcaption').textContent])"""
+        [one.label, one.path.getAttribute('d')?.length > 100, one.words.textContent])"""
     find(inspected, "#panel-log .channels").location_once_scrolled_into_view  # noqa: B018 - scrolls
     wait(inspected, lambda d: all(one[1] for one in d.execute_script(drawn)))
     curves = inspected.execute_script(drawn)

@@ -49,17 +49,23 @@ tabs.addEventListener("keydown", (event) => {
 
 // Jobs that run, whoever of the open tabs has started them.
 const running = document.getElementById("running");
+const lines = new Map();
 let shown = "";
 watch(() => {
   document.getElementById("folder").textContent = session.folder;
   const jobs = session.jobs.filter((job) => !isOver(job));
-  const now = JSON.stringify([session.gone, session.unkept, jobs]);
+  for (const name of lines.keys()) if (!jobs.some((job) => job.name === name)) lines.delete(name);
+  for (const job of jobs) {
+    if (!lines.has(job.name)) lines.set(job.name, jobLine(job));
+    lines.get(job.name).update(job);
+  }
+  const now = JSON.stringify([session.gone, session.unkept, [...lines.keys()]]);
   if (now === shown) return;
   shown = now;
   const held = running.contains(document.activeElement);
   const alarm = session.gone ? "The workbench has ended: start it again; files, choices and results are in its directory."
     : session.unkept && `What you chose is not kept: ${session.unkept}`;
-  fill(running, alarm ? make("p", { class: "message", role: "alert" }, alarm) : null, jobs.map(jobLine));
+  fill(running, alarm ? make("p", { class: "message", role: "alert" }, alarm) : null, [...lines.values()].map(({ element }) => element));
   if (held && document.activeElement === document.body) tabs.querySelector("[aria-selected=true]").focus({ preventScroll: true });  // its Stop went with the job
 });
 

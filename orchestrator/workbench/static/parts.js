@@ -97,16 +97,21 @@ export function jobView(key, result = () => []) {
   return { element: place, show(job) { shown = ""; choose({ shown: { ...choices.shown, [key]: job } }); }, name: () => choices.shown[key] };
 }
 
-export function jobLine(job) {
-  const bar = make("progress", { max: 1, "aria-label": `${job.name}: share that is done` });
-  if (job.share !== null) bar.value = job.share;
-  const left = job.left === null ? "" : `about ${duration(job.left)} left`;
-  const words = job.stops > 0 ? (job.stops > 1 ? "Kill" : "Stop at once") : "Stop";
-  return make("div", { class: "job" },
-    make("div", { class: "row" },
-      make("strong", {}, job.name), make("span", {}, job.stops ? "stopping" : job.stage || job.state), bar, make("span", {}, left),
-      make("button", { type: "button", "data-key": `stop-${job.name}`, "aria-label": `${words}: ${job.name}`, onclick: () => stop(job.name) }, words)),
-    make("code", {}, job.line));
+// A job that runs: its line stays, so that Stop can be pressed at any moment; `update` brings what it says up to date.
+export function jobLine({ name, line }) {
+  const bar = make("progress", { max: 1, "aria-label": `${name}: share that is done` }), [stage, time] = [make("span", {}), make("span", { "aria-live": "off" })];
+  const button = make("button", { type: "button", "data-key": `stop-${name}`, onclick: () => stop(name) });
+  const update = (job) => {
+    const now = Date.now() / 1000, left = job.left === null ? null : Math.round(job.left - Math.max(0, now - job.told));
+    const words = job.stops > 0 ? (job.stops > 1 ? "Kill" : "Stop at once") : "Stop";
+    stage.textContent = job.stops ? "stopping" : job.stage || job.state;
+    if (job.share === null) bar.removeAttribute("value");
+    else bar.value = job.share;
+    time.textContent = `${duration(Math.round(Math.max(0, now - job.begun)))} gone${left === null ? "" : left > 0 ? `, about ${duration(left)} left` : ", longer than was expected"}`;
+    button.textContent = words;
+    button.setAttribute("aria-label", `${words}: ${name}`);
+  };
+  return { update, element: make("div", { class: "job" }, make("div", { class: "row" }, make("strong", {}, name), stage, bar, time, button), make("code", {}, line)) };
 }
 
 function finished(job) {
@@ -142,7 +147,7 @@ function reportOf(job) {
 }
 
 export function duration(seconds) {
-  if (seconds < 10) return `${seconds.toFixed(1)} s`;
+  if (seconds < 10) return `${Number(seconds.toFixed(1))} s`;
   const whole = Math.round(seconds);
   return whole < 60 ? `${whole} s` : `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")} min`;
 }
