@@ -10,7 +10,8 @@ export function inputs() {
   const note = make("p", { class: "note", role: "status" });
   const tell = () => {
     note.textContent = unsaved().length ? `Changed in the tab Machine and not saved: ${unsaved().join(", ")}`
-      : choices.log && !choices.model ? "Without a model file the machine is the default one; “Look at this log” in the tab Log drafts one from the record." : "";
+      : !choices.log ? "No log is chosen yet: drop one in the tab Log, or take the example in the tab Start."
+      : !choices.model ? "Without a model file the machine is the default one; “Look at this log” in the tab Log drafts one from the record." : "";
   };
   watch(tell);
   tell();

@@ -40,7 +40,8 @@ function branch(variables, depth, open) {
 function leafTable(leaves) {
   const bound = (limit, words) => (limit === null || Math.abs(limit) > 1e11 ? "" : `${words} ${limit}`);
   const range = (one) => [bound(one.minimum, "from"), bound(one.maximum, "to")].join(" ").trim();
-  return table("Variables", HEADS, leaves.map((one) => [
+  const above = leaves[0].parts.slice(0, -1).join(".");
+  return table(above ? `Variables of ${above}` : "Variables", HEADS, leaves.map((one) => [
     one.name, one.causality, one.items.length ? one.items.join(", ") : one.type, make("td", { class: "number" }, one.start === null ? "" : String(one.start)),
     one.unit, range(one), make("td", { class: "long" }, one.description)]), "plain");
 }
