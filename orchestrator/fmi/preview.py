@@ -33,7 +33,7 @@ class FmuPreview(msgspec.Struct, frozen=True):
     """An FMU's interface.
 
     Attributes:
-        name, description: of the model.
+        description: of the model, in its author's words; empty: it has none.
         tool: that made it, as it says; empty: it does not.
         platforms: that it has binaries for, and "sources" where it has such.
         stop, step: of its default experiment [s]; None: it names none.
