@@ -37,6 +37,7 @@ class LogReaders:
         self._thread, self._maker = ThreadPoolExecutor(1, "logs"), ThreadPoolExecutor(1, "next-log")
         self._open: dict[Path, _Reader] = {}
         self._spare: _Reader | None = None
+        self._coming: _Reader | None = None
         self._closed = False
 
     def warm(self) -> None:
@@ -60,7 +61,7 @@ class LogReaders:
     def close(self) -> None:
         """End all of them."""
         self._closed = True
-        for one in (*self._open.values(), *filter(None, [self._spare])):
+        for one in (*self._open.values(), *filter(None, [self._spare, self._coming])):
             one.jail.interrupt()
         self._maker.shutdown()
         self._thread.submit(self._free)
@@ -83,13 +84,13 @@ class LogReaders:
     def _prepare(self) -> None:
         with contextlib.suppress(OrchestratorError):  # who asks for a log next is told
             if self._spare is None and not self._closed:
-                spare = _Reader(self._folder, self._settings)
+                spare = self._coming = _Reader(self._folder, self._settings)
                 try:
                     spare.jail.start()
                 except BaseException:
                     spare.close()
                     raise
-                self._spare = spare
+                self._spare, self._coming = spare, None
 
     def _free(self) -> None:
         for one in (*self._open.values(), *filter(None, [self._spare])):
