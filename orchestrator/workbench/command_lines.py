@@ -95,6 +95,10 @@ FORMS: dict[str, CommandForm] = {
     "calibrate": CommandForm((1, 1), {"fmu": _file, "map": _file}),
     "check": CommandForm((1, MOST_INPUTS), {"static": _flag, "time_limit": _number}),
     "simulate": CommandForm((0, 0), {"scenario": _file, "time_limit": _number}),
+    "compensate": CommandForm(
+        (0, 0), {"model": _file, "impact_speed": _number, "torque_limit": _number, "native": _flag, "force": _flag}
+    ),
+    "regulator": CommandForm((0, 0), {"model": _file}),
     "ssp": CommandForm((1, 1), {"time_limit": _number}, ("run",)),
 }  # fmt: skip
 

@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import InputError
+from orchestrator.workbench.command_lines import command_line
 from orchestrator.workbench.notes import Notes
 from orchestrator.workbench.session import kind_of, open_session
 from tests.support.workbench import ROOT, drive_log, workbench
@@ -98,3 +99,13 @@ def test_the_example_record_is_the_one_that_can_be_made_again(tmp_path: Path) ->
     made = drive_log(tmp_path / "drive.csv", unknown="Load position [deg]", said=EXAMPLE)
     example = ROOT / "orchestrator" / "workbench" / "static" / "example-drive.csv"
     assert example.read_text() == made.read_text()
+
+
+def test_a_controller_is_asked_for_by_a_model_file(tmp_path: Path) -> None:
+    session = open_session(tmp_path)
+    (session.files / "corrected.toml").write_text('fmu = "Drivetrain"')
+    options = {"model": "files/corrected.toml", "impact_speed": 0.2, "force": True}
+    words = command_line(session, "compensate", [], options)
+    assert words == ["compensate", "--model=files/corrected.toml", "--impact-speed=0.2", "--force"]
+    with pytest.raises(InputError, match="state_weights"):
+        command_line(session, "compensate", [], {"state_weights": "1,1,1,1,1"})

@@ -1,44 +1,71 @@
 import { fileAddress } from "./api.js";
-import { choice, field, fill, make } from "./dom.js";
-import { action, fileChoice, jobView, message } from "./parts.js";
+import { check, choice, field, fill, make, numberIn, numberInput } from "./dom.js";
+import { action, fileChoice, jobView, kept, message } from "./parts.js";
 import { sliders } from "./sliders.js";
-import { choose, isOver, latest, session, start, watch } from "./state.js";
+import { choices, choose, isOver, session, start, watch } from "./state.js";
 
-// What a diagnosis leaves: the corrected FMU, its model file, the check of it, and a simulation under sliders.
+const TAKEN_ALONG = /\.(fmu|ssp|toml)$/i, CORRECTED = /(^|\/)corrected\.toml$/;
+
 export function build(panel) {
-  const said = message(), list = make("div", {}), moving = make("div", {}), which = make("div", { class: "field grows" }), view = jobView("model");
-  let fmu = "", shown = "", simulated = "", wanted = "";
-  const able = () => session.jobs.filter((job) => isOver(job) && ["diagnose", "estimate"].includes(job.command) && job.files.includes(`${job.command}.csv`));
+  panel.append(models(), make("h2", {}, "Simulate it"), ...simulation(), make("h2", {}, "A controller for it"), ...controller());
+}
+
+// What diagnoses and estimates leave to take along.
+function models() {
+  const list = make("div", {});
+  let shown = "";
   const draw = () => {
-    const jobs = session.jobs.filter((job) => job.files.some((name) => /\.(fmu|ssp)$/i.test(name) || /(^|\/)corrected\.toml$/.test(name)));
-    const names = able().map((job) => job.name), now = JSON.stringify([jobs.map((job) => job.name), names]);
+    const jobs = session.jobs.filter((job) => job.files.some((name) => /\.(fmu|ssp)$/i.test(name) || CORRECTED.test(name)));
+    const now = JSON.stringify(jobs.map((job) => job.name));
     if (now === shown) return;
     shown = now;
-    const last = latest("diagnose")?.files.find((name) => /\.(fmu|ssp)$/i.test(name));
-    if (last) fmu = `results/${latest("diagnose").name}/${last}`;
+    const link = (job, name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name.split("/").at(-1) }, name));
     fill(list, jobs.length ? jobs.toReversed().map((job) => make("div", { class: "job" }, make("strong", {}, job.name),
-      make("ul", { class: "files" }, job.files.filter((name) => /\.(fmu|ssp|toml)$/i.test(name)).map((name) =>
-        make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name.split("/").at(-1) }, name))))))
-      : make("p", {}, "A diagnosis leaves the corrected model here."));
-    simulated = names.includes(wanted) ? wanted : names.at(-1) ?? "";
-    const made = choice(names.length ? names.map((name) => [name, name]) : [["", "none yet"]], simulated, (name) => { simulated = wanted = name; });
-    fill(which, ...field("Model of", made).children);
+      make("ul", { class: "files" }, job.files.filter((name) => TAKEN_ALONG.test(name)).map((name) => link(job, name)))))
+      : make("p", {}, "No corrected model is here yet: a diagnosis or an estimate leaves it. The tab FMUs checks and runs it."));
   };
   watch(draw);
   draw();
-  panel.append(list,
-    make("div", { class: "row" }, fileChoice("FMU or SSP file", "fmu", () => fmu, (file) => { fmu = file; choose({}); })),
+  return list;
+}
+
+// The model of a result under sliders.
+function simulation() {
+  const said = message(), moving = make("div", {}), which = make("div", { class: "field grows" });
+  const able = () => session.jobs.filter((job) => isOver(job) && ["diagnose", "estimate"].includes(job.command) && job.files.includes(`${job.command}.csv`)).map((job) => job.name);
+  const chosen = () => { const names = able(); return names.includes(choices.fields.sliders) ? choices.fields.sliders : names.at(-1) ?? ""; };
+  let shown = "";
+  const draw = () => {
+    const names = able(), now = JSON.stringify([names, chosen()]);
+    if (now === shown) return;
+    shown = now;
+    const options = names.length ? names.map((name) => [name, name]) : [["", "none yet"]];
+    fill(which, ...field("Model of", choice(options, chosen(), (name) => choose({ fields: { sliders: name } }))).children);
+  };
+  watch(draw);
+  draw();
+  return [make("div", { class: "row" }, which, action("Simulate under sliders", said, async () => {
+    if (!chosen()) throw new Error("a diagnosis or an estimate is needed first");
+    fill(moving, make("p", { class: "note", role: "status" }, "Building the FMU …"));
+    try { fill(moving, await sliders(chosen())); } catch (error) { fill(moving); throw error; }
+  }, "main")), said.element, moving];
+}
+
+// From the corrected model to a controller: one that crosses the gap softly, or the gains of a regulator.
+function controller() {
+  const said = message(), view = jobView("control"), force = check("go on with a model that cannot be trusted", false, () => {});
+  const speed = kept("control.impact_speed", numberInput({ placeholder: "by the machine" })), torque = kept("control.torque_limit", numberInput({ placeholder: "the model's" }));
+  const usual = () => session.jobs.flatMap((job) => job.files.filter((name) => CORRECTED.test(name)).map((name) => `results/${job.name}/${name}`)).at(-1) ?? "";
+  const model = () => choices.fields["control.model"] ?? usual();
+  const needed = () => { if (!model()) throw new Error("choose a model file first; a diagnosis or an estimate leaves corrected.toml"); return model(); };
+  kept("control.force", force.querySelector("input"), false);
+  return [
+    make("div", { class: "row" }, fileChoice("Model file", "model", model, (file) => choose({ fields: { "control.model": file } })),
+      field("Speed at which the teeth shall meet [rad/s]", speed), field("Torque limit of the drive [N.m]", torque), force),
     said.element,
-    make("div", { class: "row" }, action("Check it", said, async () => {
-      if (!fmu) throw new Error("choose an FMU first");
-      view.show(await start("check", [fmu]));
-    }, "main")),
-    view.element,
-    make("h2", {}, "Simulate it"), make("div", { class: "row" }, which,
-      action("Simulate under sliders", said, async () => {
-        if (!simulated) throw new Error("a diagnosis or an estimate is needed first");
-        fill(moving, make("p", { class: "note", role: "status" }, "Building the FMU …"));
-        try { fill(moving, await sliders(simulated)); } catch (error) { fill(moving); throw error; }
-      }, "main")),
-    moving);
+    make("div", { class: "row" },
+      action("Design a controller that crosses the gap", said, async () => view.show(await start("compensate", [], {
+        model: needed(), impact_speed: numberIn(speed), torque_limit: numberIn(torque), force: force.querySelector("input").checked })), "main"),
+      action("Design a regulator", said, async () => view.show(await start("regulator", [], { model: needed() })))),
+    view.element];
 }

@@ -106,7 +106,6 @@ export async function refresh() {
 
 export const isOver = (job) => !["waiting", "running"].includes(job.state);
 export const jobOf = (name) => session.jobs.find((job) => job.name === name);
-export const latest = (command) => session.jobs.filter((job) => job.command === command).at(-1);
 
 export async function start(command, inputs, options = {}) {
   const given = Object.fromEntries(Object.entries(options).filter(([, value]) => value !== null && value !== "" && value !== false));
@@ -124,6 +123,7 @@ export async function stop(name) {
 const PLACES = {
   inspect: ["log", "log"], estimate: ["gap", "gap"], diagnose: ["diagnosis", "diagnosis"],
   check: ["fmus", "fmu"], ssp: ["fmus", "fmu"], simulate: ["fmus", "fmus"],
+  compensate: ["model", "control"], regulator: ["model", "control"],
 };
 
 // Show a result in its tab, beside the log and the model file that it was made of.
