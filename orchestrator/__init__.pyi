@@ -1,4 +1,4 @@
-# What a type checker and an editor see of the package; the names are loaded lazily.
+# The public names: type checkers and editors read this stub, and so does __init__.py, which loads them lazily.
 from orchestrator.api.any_fmu import FmuDiagnosisResult as FmuDiagnosisResult
 from orchestrator.api.any_fmu import draft_map as draft_map
 from orchestrator.api.build import BuildResult as BuildResult

@@ -29,7 +29,6 @@ from orchestrator.diagnosis.result import TestMisfit
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.tables import column_names
 from orchestrator.shared.isolation.walls import support
-from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import ParameterFound
 from orchestrator.shared.results.fields import fields_table
@@ -111,14 +110,18 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
             workings = self.diagnosis.workings
             self.delivered[:] = [write_corrected(folder / "corrected.ssp", workings.problem, workings.final)]
 
-    def write_data(self, folder: Path) -> None:
-        """Write measured and simulated outputs as ``diagnose.csv``."""
+    def signals(self) -> Mapping[str, Array]:
+        """Return the test part: time [s], inputs, and each output, measured and simulated.
+
+        Returns:
+            Arrays of shape (n,) by name; ``NAME_STAGE`` is of the model of that stage.
+        """
         problem, stages, _ = self._stage_runs
         columns = {"time": problem.data.time} | dict(zip(problem.inputs, problem.data.inputs.T, strict=True))
         for k, name in enumerate(problem.outputs):
             columns[name] = problem.data.outputs[:, k]
             columns |= {f"{name}_{stage}": values[:, k] for stage, values in stages.items()}
-        write_columns(folder / "diagnose.csv", columns, "{:.9g}".format)
+        return columns
 
     @cached_property
     def _stage_runs(self) -> tuple[FmuProblem, dict[str, Array], int]:

@@ -121,8 +121,10 @@ class AnySweepResult(PlottedResult):
         return len(self.cases)
 
     def write_data(self, folder: Path) -> None:
-        """Write the tables."""
-        self.write_tables(folder)
+        """Write ``sweep.csv``, and where asked for ``sweep.parquet``."""
+        self.write_csv(folder / "sweep.csv")
+        if self.parquet:
+            self.write_parquet(folder / "sweep.parquet")
 
     @property
     def failed(self) -> int:
@@ -144,12 +146,6 @@ class AnySweepResult(PlottedResult):
     def columns(self) -> list[ColumnFound]:
         """Name the results of a case. Return name and unit of each column of results."""
         return [ColumnFound(c.name, c.unit) for c in self.sweep.columns]
-
-    def write_tables(self, folder: Path) -> None:
-        """Write ``sweep.csv``, and where asked for ``sweep.parquet``."""
-        self.write_csv(folder / "sweep.csv")
-        if self.parquet:
-            self.write_parquet(folder / "sweep.parquet")
 
 
 def format_varied(vary: Varied) -> tuple[str, ...]:

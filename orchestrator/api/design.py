@@ -1,6 +1,5 @@
 """The excitation that would show a gap."""
 
-import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,9 +11,9 @@ from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
 from orchestrator.api.estimable import require_linear
-from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, text_table
-from orchestrator.errors import OutputError, ScenarioError
+from orchestrator.errors import ScenarioError
 from orchestrator.estimation import design as designing
 from orchestrator.estimation.apply import UNSEEN
 from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, MachineLimits
@@ -46,13 +45,13 @@ class RequestUnit:
     factor: float
     offset: float
 
-    def number(self, torque: float) -> float:
-        """Return the number that asks for a torque [N.m]."""
+    def number(self, torque: Any) -> Any:
+        """Return the number that asks for a torque [N.m], or those of an array."""
         return (torque / self.scale - self.offset) / self.factor
 
 
 @dataclass(frozen=True, repr=False)
-class DesignResult(PlottedResult):
+class DesignResult(SampledResult):
     """Excitations for one gap, the best first.
 
     Attributes:
@@ -64,6 +63,8 @@ class DesignResult(PlottedResult):
     """
 
     command: ClassVar[str] = "estimate"
+    csv_name: ClassVar[str] = "design"
+    digits: ClassVar[int | None] = 9
     replaces: ClassVar[tuple[str, ...]] = ("estimate.png",)
     size: float
     time: NDArray[np.float64]
@@ -81,25 +82,15 @@ class DesignResult(PlottedResult):
         """Whether the best excitation shows a gap of this size: its bound is below half of it."""
         return self.best.bound <= 0.5 * self.size
 
-    def write_csv(self, path: Path | str) -> None:
-        """Write the best record: ``time`` [s], ``u`` [N.m], and the request as the drive takes it where that differs.
+    def signals(self) -> Mapping[str, NDArray[np.float64]]:
+        """Return the best record: ``time`` [s], ``u`` [N.m], and the request as the drive takes it where that differs.
 
-        Args:
-            path: of the CSV file to write.
-
-        Raises:
-            OutputError: it cannot be written.
+        Returns:
+            Arrays of shape (n,) by name.
         """
-        try:
-            with Path(path).open("w", newline="", encoding="utf-8") as file:
-                writer = csv.writer(file)
-                request = self.request
-                writer.writerow(("time", "u") if request is None else ("time", "u", request.label))
-                rows = zip(self.time.tolist(), self.best.u.tolist(), strict=True)
-                asked = (lambda u: ()) if request is None else (lambda u: (f"{request.number(u):.6g}",))
-                writer.writerows((f"{t:.9g}", f"{u:.6g}", *asked(u)) for t, u in rows)
-        except OSError as error:
-            raise OutputError(f"cannot write {path}: {error.strerror}") from None
+        columns = {"time": self.time, "u": self.best.u}
+        request = self.request
+        return columns if request is None else columns | {request.label: request.number(self.best.u)}
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the candidates."""
@@ -124,10 +115,6 @@ class DesignResult(PlottedResult):
     def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says of the design."""
         return EstimateFound(design=self.entries())
-
-    def write_data(self, folder: Path) -> None:
-        """Write ``design.csv``."""
-        self.write_csv(folder / "design.csv")
 
 
 def _entry(c: Excitation, more: str = "") -> ExcitationFound:

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
 from orchestrator.api.live import live_corrected_model
@@ -25,10 +27,11 @@ from orchestrator.diagnosis.report.summary import summarise
 from orchestrator.diagnosis.result import Diagnosis, TestMisfit
 from orchestrator.errors import OutputError
 from orchestrator.records.record import Record
-from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound
 from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.trust import Level
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
@@ -84,21 +87,17 @@ class DiagnosisResult(AnyDiagnosisResult):
         with numeric_errors(f"{self.record.source}: the corrected FMU cannot be run"):
             return before_and_after(self.diagnosis, fmu)
 
-    def write_csv(self, path: Path | str) -> None:
-        """Write what ``plot`` draws as CSV.
+    def signals(self) -> Mapping[str, Array]:
+        """Return the test part: time [s], request [N.m], and each angle, measured and simulated.
 
-        Args:
-            path: of the CSV file to write.
-
-        Raises:
-            OutputError: it cannot be written.
+        Returns:
+            Arrays of shape (n,) by name; ``NAME_before`` is of the nominal FMU, ``NAME_after`` of the corrected one.
         """
         runs = self.runs
         names: Sequence[str] = ("theta_m", "theta_l")[: runs.measured.shape[1]]
         shown = {"": runs.measured, "_before": runs.before, "_after": runs.after}
         columns = {"time": runs.time, "u": runs.u}
-        columns |= {f"{name}{k}": values[:, n] for n, name in enumerate(names) for k, values in shown.items()}
-        write_columns(Path(path), columns, "{:.9g}".format)
+        return columns | {f"{name}{k}": values[:, n] for n, name in enumerate(names) for k, values in shown.items()}
 
     def summary(self) -> Iterator[str]:
         """Yield what was found, one sentence a line.
@@ -146,7 +145,7 @@ class DiagnosisResult(AnyDiagnosisResult):
 
     def write_data(self, folder: Path) -> None:
         """Write ``diagnose.csv`` and ``corrected.toml``."""
-        self.write_csv(folder / "diagnose.csv")
+        super().write_data(folder)
         (folder / "corrected.toml").write_text(
             format_corrected_model(self.diagnosis.model, self.diagnosis, fitted_record_of(self.diagnosis)),
             encoding="utf-8",

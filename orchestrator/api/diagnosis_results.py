@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import ClassVar
 
-from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, text_table
 from orchestrator.diagnosis.report.json_results import misfit_found
 from orchestrator.diagnosis.result import DiagnosisOutcome, GradedEffect, TestMisfit
@@ -11,10 +11,11 @@ from orchestrator.shared.results.diagnose import misfit_tables
 from orchestrator.shared.trust import Trust
 
 
-class AnyDiagnosisResult(PlottedResult):
+class AnyDiagnosisResult(SampledResult):
     """Verdict, effects, misfits, trust and notes of a diagnosis."""
 
     command: ClassVar[str] = "diagnose"
+    digits: ClassVar[int | None] = 9
     diagnosis: DiagnosisOutcome
     validation: TestMisfit | None
 

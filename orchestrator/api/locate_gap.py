@@ -6,11 +6,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from orchestrator.api.estimate import EstimateResult
 from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
+from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, doubts_of, text_table
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.estimation.effort import Stop, never
@@ -25,17 +28,17 @@ from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
-from orchestrator.shared.output import write_columns
 from orchestrator.shared.results import GapFound
 from orchestrator.shared.results.estimate import EstimateFound, LocationFound, location_tables
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Trust
 
+Array = NDArray[np.float64]
 METHOD = "two_stages"
 
 
 @dataclass(frozen=True, repr=False)
-class LocationResult(PlottedResult):
+class LocationResult(SampledResult):
     """In which stage of a train the gap is, and how large it is in each.
 
     Attributes:
@@ -47,6 +50,8 @@ class LocationResult(PlottedResult):
     """
 
     command: ClassVar[str] = "estimate"
+    csv_name: ClassVar[str] = "stages"
+    digits: ClassVar[int | None] = 10
     replaces: ClassVar[tuple[str, ...]] = EstimateResult.replaces
     record: Record
     model: Model
@@ -134,9 +139,13 @@ class LocationResult(PlottedResult):
             settings=as_tables(self.settings),
         )
 
-    def write_data(self, folder: Path) -> None:
-        """Write ``stages.csv``: record, fit, twist and flank of each stage, one-step errors."""
-        write_columns(folder / "stages.csv", self.location.curves, lambda v: "" if math.isnan(v) else f"{v:.10g}")
+    def signals(self) -> Mapping[str, Array]:
+        """Return record, fit, twist and flank of each stage, and one-step errors.
+
+        Returns:
+            Arrays of shape (n,) by name.
+        """
+        return self.location.curves
 
 
 def locate_gap(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import choose_experiment, not_negative
-from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.errors import ScenarioError
@@ -21,7 +21,6 @@ from orchestrator.paired.calibration import GapEstimate
 from orchestrator.paired.cosimulation import FMUS, LoopRun
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.pair import PairRun, with_settings
-from orchestrator.shared.output import write_columns
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import GapFound, PairFound
 
@@ -29,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
-class PairResult(PlottedResult):
+class PairResult(SampledResult):
     """A paired run.
 
     Attributes:
@@ -84,17 +83,6 @@ class PairResult(PlottedResult):
         signals |= self.machine.signals
         return signals | {f"twin_{name}": values for name, values in self.twin.signals.items()}
 
-    def write_csv(self, path: Path | str) -> None:
-        """Write the signals as CSV.
-
-        Args:
-            path: of the CSV file to write.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
-        write_columns(Path(path), self.signals())
-
     def blocks(self) -> Sequence[Block]:
         """Return the table of the run."""
         machine, twin = self.machine, self.twin
@@ -136,10 +124,6 @@ class PairResult(PlottedResult):
             crossings=self.crossings,
             experiment=asdict(self.experiment),
         )
-
-    def write_data(self, folder: Path) -> None:
-        """Write ``simulate.csv``."""
-        self.write_csv(folder / "simulate.csv")
 
 
 def run_pair(

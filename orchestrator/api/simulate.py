@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, table
 from orchestrator.errors import ScenarioError
 from orchestrator.master import result as master
@@ -18,7 +18,6 @@ from orchestrator.scenarios.isolated import Safety, describe_walls
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.read import open_ssp
 from orchestrator.shared.operating_system import LIMITS
-from orchestrator.shared.output import write_columns
 from orchestrator.shared.results import EventsFound, RemarkFound, SignalFound, SignalsFound, WallsFound
 
 Array = NDArray[np.float64]
@@ -26,7 +25,7 @@ HEAD = ("signal", "unit", "first", "last", "smallest", "largest")
 
 
 @dataclass(frozen=True, repr=False)
-class SimulationResult(PlottedResult):
+class SimulationResult(SampledResult):
     """Recorded signals of one run; ``result["plant.theta_l"]`` is one of them, shape (n,).
 
     Attributes:
@@ -74,16 +73,13 @@ class SimulationResult(PlottedResult):
         """Communication steps."""
         return len(self.time) - 1
 
-    def write_csv(self, path: Path | str) -> None:
-        """Write times and signals as CSV.
+    def signals(self) -> Mapping[str, Array]:
+        """Return time [s] and the recorded signals.
 
-        Args:
-            path: of the CSV file to write.
-
-        Raises:
-            OutputError: it cannot be written.
+        Returns:
+            Arrays of shape (n,) by name.
         """
-        write_columns(Path(path), {"time": self.time} | {name: self[name] for name in self.names})
+        return {"time": self.time} | {name: self[name] for name in self.names}
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the signals, and what is to be known of the run."""
@@ -117,10 +113,6 @@ class SimulationResult(PlottedResult):
         took = self.run.statistics.events
         events = EventsFound(list(took.times), took.instants, took.ticks, list(took.late)) if took.instants else None
         return SignalsFound(signals=signals, steps=self.steps, events=events, remarks=remarks, isolation=self.isolation)
-
-    def write_data(self, folder: Path) -> None:
-        """Write the signals as CSV."""
-        self.write_csv(folder / f"{self.command}.csv")
 
 
 def simulate(
