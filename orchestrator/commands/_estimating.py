@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
 from orchestrator.api.estimable import plausible_record, require_linear
@@ -19,7 +17,6 @@ from orchestrator.api.locate_gap import TRAIN, complete_record, locate_gap, requ
 from orchestrator.api.shown import Block, write_page
 from orchestrator.commands._budget import Budget
 from orchestrator.commands._console import next_step, print_blocks
-from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
 from orchestrator.commands._reading import what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.errors import ScenarioError
@@ -81,8 +78,8 @@ def estimate_or_design(
             following = [*next_step(found.can_compensate, args.out / "estimate.json")]
         if args.design and not interrupted:
             size = args.size if args.size is not None else _design_size(found)
-            with _progress() as advance:
-                plan = design(model, size, **options, motor_only=args.motor_only, progress=advance)
+            with Stages() as stages:
+                plan = design(model, size, **options, motor_only=args.motor_only, progress=stages.counter("designing"))
             blocks += plan.blocks()
             if not plan.shows:
                 blocks.append(
@@ -175,19 +172,3 @@ def _show_stages(records: list[Record], seconds: float, budget: Budget) -> Itera
             stages.at(stage, share)
 
         yield show
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[int, int], None]]:
-    """Show a bar on a terminal; yield what is to be called with the pieces of work done, and all."""
-    console, lines = Console(file=sys.stderr), ProgressLines()
-    columns = (TextColumn("designing"), BarColumn(), MofNCompleteColumn())
-    hidden = is_for_programs() or not console.is_terminal
-    with Progress(*columns, console=console, disable=hidden, transient=True) as bar:
-        task = bar.add_task("", total=None)
-
-        def advance(done: int, total: int) -> None:
-            bar.advance(task)
-            lines.tell("designing", done / total if total else None, None)
-
-        yield advance

@@ -7,11 +7,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-from rich.progress import Progress as Bar
-
-from orchestrator.commands._progress_lines import ProgressLines, is_for_programs
+from orchestrator.commands._progress_lines import is_for_programs
+from orchestrator.commands._stages import Stages
 from orchestrator.engine import CaseLimits, Progress
 
 SECONDS_BETWEEN_LINES = 60.0
@@ -22,23 +19,23 @@ def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--workers``, ``--scheduler``, ``--resume``, ``--time-limit`` and ``--memory-limit``."""
     defaults = CaseLimits()
     parser.add_argument("--workers", type=int, metavar="N", help="worker processes (default: one per core)")
-    parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="run on this Dask cluster instead")
+    parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="run on this Dask cluster")
     for name, what in (("ca", "certificate of the authority"), ("cert", "certificate"), ("key", "private key")):
         parser.add_argument(f"--tls-{name}", type=Path, metavar="FILE", help=f"{what} for --scheduler tls://HOST:PORT")
-    parser.add_argument("--resume", action="store_true", help="go on with a run that was stopped")
+    parser.add_argument("--resume", action="store_true", help="continue a run that was stopped")
     parser.add_argument(
         "--time-limit",
         type=float,
         default=defaults.time,
         metavar="S",
-        help="wall time that a case may take (default: %(default)g)",
+        help="time limit of a case (default: %(default)g)",
     )
     parser.add_argument(
         "--memory-limit",
         type=int,
         default=defaults.memory // MIB,
         metavar="MIB",
-        help="memory that a case may take, 0 for any (default: %(default)s)",
+        help="memory limit of a case, 0 for none (default: %(default)s)",
     )
 
 
@@ -49,38 +46,29 @@ class CaseProgress:
     """
 
     def __init__(self, what: str, stream: IO[str] | None = None) -> None:
-        self._what = what
-        self._stream = stream or sys.stderr
-        self._start = time.monotonic()
-        self._last_line = self._start
-        self._bar = _bar(self._stream) if self._stream.isatty() and not is_for_programs() else None
-        self._lines = ProgressLines()
-        self._task = self._bar.add_task(what, total=None, rate="", failures="") if self._bar else None
+        self._what, self._stream = what, stream or sys.stderr
+        self._stages = Stages(self._stream)
+        self._start = self._last_line = time.monotonic()
 
     def __enter__(self) -> "CaseProgress":
-        if self._bar:
-            self._bar.start()
+        self._stages.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._bar:
-            self._bar.stop()
+        self._stages.__exit__(kind, error, trace)
 
     def update(self, progress: Progress) -> None:
         """Show where the run stands."""
         now = time.monotonic()
         fresh = progress.done - progress.resumed
         rate = fresh / max(now - self._start, 1e-9)
-        if self._bar is not None and self._task is not None:
-            failures = f"{progress.failed} failed" if progress.failed else ""
-            self._bar.update(
-                self._task, completed=progress.done, total=progress.total, rate=f"{rate:.1f}/s", failures=failures
-            )
-        elif is_for_programs():
-            left = (progress.total - progress.done) / rate if rate > 0.0 else None
-            self._lines.tell(self._what, progress.done / max(progress.total, 1), left)
+        if self._stream.isatty() or is_for_programs():
+            failed = f", {progress.failed} failed" if progress.failed else ""
+            counts = f": {progress.done} of {progress.total}, {rate:.1f}/s{failed}"
+            share = fresh / max(progress.total - progress.resumed, 1)
+            self._stages.at(self._what + ("" if is_for_programs() else counts), share)
         elif now - self._last_line >= SECONDS_BETWEEN_LINES:
             self._last_line = now
             self._stream.write(f"{self._what}: {line(progress, rate)}\n")
@@ -97,16 +85,3 @@ def _duration(seconds: float) -> str:
     minutes, second = divmod(round(seconds), 60)
     hours, minute = divmod(minutes, 60)
     return f"{hours}:{minute:02d}:{second:02d}"
-
-
-def _bar(stream: IO[str]) -> Bar:
-    return Bar(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        TextColumn("[red]{task.fields[failures]}"),
-        console=Console(file=stream),
-        transient=True,
-    )

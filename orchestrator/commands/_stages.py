@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import IO
 
@@ -59,6 +60,11 @@ class Stages:
         if share > 0.0:
             self._expected = (time.monotonic() - self._begun) / min(share, 1.0)
         self._lines.tell(stage, share, self.time_left() or None)
+
+    def counter(self, stage: str) -> Callable[[int, int], None]:
+        """Begin a piece of work; return what is to be called with its parts that are done, and all."""
+        self.begin(stage, 0.0)
+        return lambda done, total: self.at(stage, done / max(total, 1))
 
     def time_left(self) -> float:
         """Return the time that is left of the piece of work."""

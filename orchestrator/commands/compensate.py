@@ -7,6 +7,7 @@ from orchestrator.api.compensate import compensate
 from orchestrator.building.starts import SAMPLE_TIME
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import numbers_of
+from orchestrator.commands._stages import Stages
 from orchestrator.shared.output import stage_output
 
 
@@ -32,19 +33,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sample-time", type=float, default=SAMPLE_TIME, metavar="S", help="of the controller (default: %(default)s)"
     )
-    parser.add_argument("--plants", type=int, metavar="N", help="how many plants (default: 100, without a model 5)")
+    parser.add_argument("--plants", type=int, metavar="N", help="number of plants (default: 100, without a model 5)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of plants and noise (default: %(default)s)")
-    parser.add_argument("--mpc", action="store_true", help="a model predictive controller too (extra `mpc`)")
-    parser.add_argument("--native", action="store_true", help="write FMUs that need no Python at run time")
+    parser.add_argument("--mpc", action="store_true", help="also run a model predictive controller (extra `mpc`)")
+    parser.add_argument("--native", action="store_true", help="write native FMUs, which need no Python at run time")
     parser.add_argument(
         "--fmi", type=int, choices=(2, 3), default=2, help="of these FMUs (default: 2); those of 3 are native"
     )
-    parser.add_argument("--force", action="store_true", help="go on with a model that cannot be trusted")
+    parser.add_argument("--force", action="store_true", help="continue although the model cannot be trusted")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run all laws, print and write."""
-    with stage_output(arguments.out) as folder:
+    with stage_output(arguments.out) as folder, Stages() as stages:
         result = compensate(
             arguments.alpha,
             model=arguments.model,
@@ -60,6 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
             native=arguments.native,
             fmi=arguments.fmi,
             force=arguments.force,
+            progress=stages.counter("running the laws on the plants"),
         )
         result.write(folder, arguments.out)
     print_blocks(result.blocks())
