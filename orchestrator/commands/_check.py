@@ -46,20 +46,22 @@ def add_check_arguments(parser: argparse.ArgumentParser) -> None:
     add_trust(parser)
     parser.add_argument(
         "--policy", type=Path, metavar="FILE.toml",
-        help=f"which rules count, and how much (default: {FILE_NAME} where there is one)",
+        help=f"rules to apply and their severities (default: {FILE_NAME} if it exists)",
     )  # fmt: skip
     parser.add_argument("--fail-on", choices=SEVERITIES, help="the least severity that fails (default: error)")
-    parser.add_argument("--baseline", type=Path, metavar="FILE", help="known findings, which do not fail")
-    parser.add_argument("--write-baseline", type=Path, metavar="FILE", help="write all findings as known ones")
+    parser.add_argument("--baseline", type=Path, metavar="FILE", help="known findings, which do not cause a failure")
+    parser.add_argument(
+        "--write-baseline", type=Path, metavar="FILE", help="write all findings to a baseline of known findings"
+    )
     for name, (what, _) in _REPORTS.items():
         parser.add_argument(f"--{name}", type=Path, metavar="FILE", help=f"also write the findings as {what}")
     parser.add_argument(
-        "--fix", type=Path, metavar="DIR", help="mend FMUs into this folder, and check what was mended in their place"
+        "--fix", type=Path, metavar="DIR", help="write repaired FMUs to this folder, and check them instead"
     )
     parser.add_argument("--github", action="store_true", help="also print annotations and write the step's summary")
     limits, archive = Limits(), ArchiveLimits()
     for name, default, metavar, what in (
-        ("time", limits.time, "S", "wall time that one call may take"),
+        ("time", limits.time, "S", "wall time limit of one call"),
         ("total", TOTAL, "S", "time that all calls of an FMU may take; what that leaves out is named"),
         ("memory", limits.memory / MEBIBYTE, "MIB", "memory that the running FMU may take"),
         ("size", archive.total / MEBIBYTE, "MIB", "size that the unpacked FMU may have"),

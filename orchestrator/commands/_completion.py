@@ -38,7 +38,7 @@ def add_completion_argument(parser: argparse.ArgumentParser, build: Callable[[],
         build=build,
         choices=SHELLS,
         metavar="SHELL",
-        help="print what makes a shell (bash, zsh, tcsh) complete commands, options and files",
+        help="print a completion script for a shell (bash, zsh, tcsh)",
     )
 
 

@@ -15,7 +15,7 @@ def add_progress_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--progress",
         choices=["json"],
-        help="say stage, share (0 to 1) and time left [s] on standard error, a JSON object a line",
+        help="print stage, share (0 to 1) and time left [s] to standard error, as lines of JSON",
     )
 
 

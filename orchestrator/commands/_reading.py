@@ -21,12 +21,15 @@ def add_reading_arguments(parser: argparse.ArgumentParser, rate_too: str = "") -
     group.add_argument(
         "--resample",
         choices=RESAMPLING,
-        help="times that are not uniform: trust the rows and not their stamps, or interpolate (default: refuse them)",
+        help="if times are not uniform: treat the samples as uniform, or interpolate (default: decide by the motion)",
     )
     group.add_argument(
-        "--header", type=int, metavar="LINE", help="line of a text that holds the names; 0: none (default: found)"
+        "--header",
+        type=int,
+        metavar="LINE",
+        help="line of a text file with the column names; 0: none (default: detected)",
     )
-    text = "samples per second to come down to, through an anti-alias filter (default: all samples)"
+    text = "reduce to this sample rate with an anti-alias filter (default: all samples)"
     group.add_argument("--rate", type=float, metavar="HZ", help=f"{text}{rate_too}")
 
 

@@ -12,13 +12,13 @@ def add_safety_arguments(parser: argparse.ArgumentParser) -> None:
     add_trust(parser)
     parser.add_argument(
         "--time-limit", type=positive, metavar="S",
-        help=f"wall time of the run (default: {DEFAULT_TIME_LIMIT:g} with FMUs that are not ours, else none)",
+        help=f"wall time limit of the run (default: {DEFAULT_TIME_LIMIT:g} with third-party FMUs, else none)",
     )  # fmt: skip
     parser.add_argument(
         "--memory-limit", type=positive, default=DEFAULT_MEMORY_LIMIT / MEBIBYTE, metavar="MIB",
-        help="memory of a run in a process of its own (default: %(default)g)",
+        help="memory limit of a run in a separate process (default: %(default)g)",
     )  # fmt: skip
-    parser.add_argument("--allow-nonfinite", action="store_true", help="keep results with NaN or infinities")
+    parser.add_argument("--allow-nonfinite", action="store_true", help="keep results that contain NaN or infinity")
 
 
 def safety_of(arguments: argparse.Namespace) -> Safety:

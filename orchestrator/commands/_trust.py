@@ -12,7 +12,7 @@ from orchestrator.shared.operating_system import LIMITS
 def add_trust(parser: argparse.ArgumentParser) -> None:
     """Add ``--trust``."""
     parser.add_argument(
-        "--trust", action="store_true", help="run FMUs that are not ours with all rights of the user, without walls"
+        "--trust", action="store_true", help="run third-party FMUs without the sandbox, with the rights of the user"
     )
 
 

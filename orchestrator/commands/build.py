@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--platforms",
         choices=PLATFORMS,
         default=PLATFORMS[0],
-        help="of native FMUs: this machine's (default), or all that the compiler can make, which takes minutes",
+        help="platforms of native FMUs: this machine (default), or all (takes minutes)",
     )
     parser.add_argument(
         "--fmi",
@@ -38,9 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--real-outputs",
         action="store_true",
-        help="of native FMUs: no outputs but real numbers, for hosts that read all as such; into real/",
+        help="native FMUs with real outputs only, for hosts that read every output as Real; into real/",
     )
-    parser.add_argument("--force", action="store_true", help="build even what is up to date")
+    parser.add_argument("--force", action="store_true", help="build FMUs that are up to date too")
 
 
 def run(args: argparse.Namespace) -> int:

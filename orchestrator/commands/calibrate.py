@@ -13,7 +13,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("record", type=Path, metavar="DATA.csv", help="measured record")
     parser.add_argument("--fmu", type=Path, required=True, metavar="ANY.fmu", help="any FMU for co-simulation")
     parser.add_argument("--map", type=Path, required=True, metavar="MAP.toml", help="columns and uncertain parameters")
-    parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.toml", help="changed thresholds, in the groups of the result"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -22,13 +22,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "records", type=Path, nargs="+", metavar="DATA", help=f"measured records of one machine ({FORMATS})"
     )
-    parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the model it is compared with")
-    parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
+    parser.add_argument("--model", type=Path, metavar="FILE.toml", help="nominal model")
     parser.add_argument(
-        "--fmu", type=Path, metavar="ANY.fmu", help="any co-simulation FMU of FMI 2.0 or 3.0 instead of a model of ours"
+        "--settings", type=Path, metavar="FILE.toml", help="changed thresholds, in the groups of the result"
     )
     parser.add_argument(
-        "--scenario", type=Path, metavar="LOOP.toml", help="several FMUs that a scenario connects, instead of one"
+        "--fmu",
+        type=Path,
+        metavar="ANY.fmu",
+        help="any co-simulation FMU of FMI 2.0 or 3.0, instead of a plant of this project",
+    )
+    parser.add_argument(
+        "--scenario", type=Path, metavar="LOOP.toml", help="several FMUs connected by a scenario, instead of one"
     )
     parser.add_argument(
         "--map", type=Path, metavar="MAP.toml", help="with an FMU: columns, uncertain parameters, ports"
@@ -36,22 +41,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--draft-map",
         action="store_true",
-        help="with an FMU: write a first map.toml from its units and causality, and stop",
+        help="with an FMU: write a draft map.toml from its units and causality, and stop",
     )
-    parser.add_argument("--validate", type=Path, metavar="OTHER", help="a second record, to show the misfit on")
+    parser.add_argument("--validate", type=Path, metavar="OTHER", help="a second record on which to report the misfit")
     parser.add_argument(
-        "--test", type=Path, metavar="OTHER", help="a record that is test data, in place of the last rows"
+        "--test", type=Path, metavar="OTHER", help="a record to use as test data instead of the last rows"
     )
     parser.add_argument(
-        "--no-search", action="store_true", help="re-fit and judge the model as it stands (a corrected.toml)"
+        "--no-search", action="store_true", help="re-fit and judge the given model (a corrected.toml), without a search"
     )
     parser.add_argument(
         "--effects",
         type=_labels,
         metavar="NAME@SITE,...",
-        help="fit exactly these effects, whatever they gain, and look for no others; none: fit no effect",
+        help="fit exactly these effects, without a search for others; none: fit no effect",
     )
-    parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="end the search then, with what it has")
+    parser.add_argument(
+        "--time-limit", type=float, metavar="SECONDS", help="end the search after this time, with the result so far"
+    )
     add_reading_arguments(parser)
 
 

@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model",
         type=Path,
         metavar="FILE.toml",
-        help="the model it is compared with (default: the thesis's values, 5 %% each)",
+        help="nominal model (default: the thesis's values, 5 %% each)",
     )
     listed = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
     parser.add_argument(
@@ -55,18 +55,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=[*METHODS, "all"],
         help=f"{listed} (default: {FITTED}; {WITHOUT_TORQUE} without a torque)",
     )
-    parser.add_argument("--motor-only", action="store_true", help="leave the load encoder out")
-    parser.add_argument("--time-limit", type=float, metavar="S", help="give up after this time (default: never)")
-    parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
+    parser.add_argument("--motor-only", action="store_true", help="ignore the load encoder")
+    parser.add_argument(
+        "--time-limit", type=float, metavar="S", help="stop without a result after this time (default: never)"
+    )
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.toml", help="changed thresholds, in the groups of the result"
+    )
     add_reading_arguments(parser, "; with --design also those of the proposed record (default: 200)")
     parser.add_argument(
-        "--no-diagnose", action="store_true", help="stop where the model does not explain the record; name nothing"
+        "--no-diagnose", action="store_true", help="run no diagnosis if the model does not explain the record"
     )
-    parser.add_argument("--cost", action="store_true", help="say what the fit would take, and stop")
+    parser.add_argument("--cost", action="store_true", help="print the expected time of the fit, and stop")
     group = parser.add_argument_group("design of an experiment")
-    group.add_argument("--design", action="store_true", help="propose a torque record that shows the gap best")
+    group.add_argument("--design", action="store_true", help="propose a torque record that reveals the gap best")
     group.add_argument(
-        "--size", type=float, metavar="RAD", help=f"half-gap to be seen (default: the estimate, or {DEFAULT_SIZE:g})"
+        "--size", type=float, metavar="RAD", help=f"half-gap to detect (default: the estimate, or {DEFAULT_SIZE:g})"
     )
     for option in DESIGN_OPTIONS[:-1]:
         text = f"{option.meaning} (default: {option.default:g})"

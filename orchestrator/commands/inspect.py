@@ -20,8 +20,10 @@ USUAL = 10.0  # s
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument("record", type=Path, metavar="DATA", help=f"measured record ({FORMATS})")
-    parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the machine, as far as it is known")
-    text = "print what each column would be taken from, or the variables of an FMU or SSP file, as JSON, and stop"
+    parser.add_argument(
+        "--model", type=Path, metavar="FILE.toml", help="model file of the machine, which may be incomplete"
+    )
+    text = "print the chosen columns, or the variables of an FMU or SSP file, as JSON, and stop"
     parser.add_argument("--columns", action="store_true", help=text)
     add_reading_arguments(parser)
 

@@ -14,7 +14,7 @@ from orchestrator.shared.output import stage_output
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add machine, weights and timing."""
     parser.add_argument(
-        "--model", type=Path, metavar="FILE.toml", help="the machine, as `estimate` takes it (default: the thesis's)"
+        "--model", type=Path, metavar="FILE.toml", help="model file of the machine (default: the thesis's drivetrain)"
     )
     weights = ",".join(f"{weight:g}" for weight in STATE_WEIGHTS)
     parser.add_argument(
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--torque-weight", type=float, default=TORQUE_WEIGHT, metavar="R", help="of the request (default: %(default)s)"
     )
-    parser.add_argument("--gains", metavar="K,K,K,K,K", help="judge these gains, and design none")
+    parser.add_argument("--gains", metavar="K,K,K,K,K", help="evaluate these gains instead of a design")
     parser.add_argument(
         "--sample-time", type=float, default=SAMPLE_TIME, metavar="S", help="of the controller (default: %(default)s)"
     )

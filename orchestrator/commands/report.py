@@ -10,8 +10,10 @@ FLAGS = {"command": "--command"}  # of which the parser stores another name
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    parser.add_argument("directory", type=Path, metavar="DIR", help="where a command left its results")
-    parser.add_argument("--command", dest="of", metavar="COMMAND", help="whose results, where DIR holds several")
+    parser.add_argument("directory", type=Path, metavar="DIR", help="result directory of a command")
+    parser.add_argument(
+        "--command", dest="of", metavar="COMMAND", help="command whose results to use if DIR contains several"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -35,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--step", type=float, metavar="S", help="run: communication step (default: the file's own)")
     parser.add_argument("--stop", type=float, metavar="S", help="run: stop time (default: the file's own)")
-    parser.add_argument("--jacobi", action="store_true", help="run: all FMUs side by side, as most SSP tools do")
+    parser.add_argument("--jacobi", action="store_true", help="run: step all FMUs in parallel, as most SSP tools do")
     parser.add_argument(
-        "--no-events", dest="events", action="store_false", help="run: without event mode of FMUs of FMI 3.0"
+        "--no-events", dest="events", action="store_false", help="run: do not use event mode of FMI 3.0 FMUs"
     )
     parser.add_argument(
         "--input", action="append", default=[], metavar="NAME=VALUE", help="run: constant value of an outer input"

@@ -44,19 +44,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=SPEC",
-        help="vary a parameter too, such as plant.J_l=range:5.3:5.9:5, also list, logrange, random and sobol",
+        help="also vary a parameter, such as plant.J_l=range:5.3:5.9:5; also list, logrange, random, sobol",
     )
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="sweep this TOML scenario instead of the pair")
     parser.add_argument(
         "--samples",
         type=int,
         metavar="N",
-        help=f"draws of what --vary makes random or sobol (default: {DEFAULT_SAMPLES})",
+        help=f"number of draws for random and sobol in --vary (default: {DEFAULT_SAMPLES})",
     )
-    parser.add_argument(
-        "--settings", type=Path, metavar="FILE.toml", help="settings of the calibration that differ from the default"
-    )
-    parser.add_argument("--parquet", action="store_true", help="write the table as Parquet too (extra [parquet])")
+    parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="changed settings of the calibration")
+    parser.add_argument("--parquet", action="store_true", help="also write the table as Parquet (extra [parquet])")
     add_engine_arguments(parser)
     add_trust(parser)
 
