@@ -51,6 +51,14 @@ def test_a_type_checker_finds_the_types_from_another_folder(tmp_path):
     assert 'Revealed type is "orchestrator.api.pair.PairResult"' in shown
 
 
+@pytest.mark.night
+def test_pyright_finds_the_types_from_another_folder(tmp_path):
+    pytest.importorskip("basedpyright")
+    (tmp_path / "script.py").write_text("import orchestrator as oc\nreveal_type(oc.run_pair(alpha=0.02).estimate)\n")
+    words = ["-m", "basedpyright", "--pythonpath", sys.executable, "script.py"]
+    assert 'is "GapEstimate | None"' in run([sys.executable, *words], tmp_path)
+
+
 def test_a_tool_that_takes_no_arguments_starts_nothing_with_one():
     programs = {path: path.read_text(encoding="utf-8") for path in (ROOT / "tools").glob("*.py")}
     programs = {path.stem: text for path, text in programs.items() if 'if __name__ == "__main__":' in text}
