@@ -9,6 +9,9 @@ from orchestrator.shared.numbers import exact_text
 _INT32 = -(2**31), 2**31 - 1
 """Whole numbers that every type of them can hold, save for those that a variable's limits say are longer."""
 
+BOOLEANS: dict[Value, bool] = {"true": True, "false": False, True: True, False: False}
+"""Booleans as tables and command lines write them: as words, and as 1 and 0, which are equal to the last two."""
+
 
 def nearest(name: str, known: list[str]) -> str:
     """Return a hint such as ``; did you mean 'theta_m'?``, or nothing when no name is near."""
@@ -29,7 +32,8 @@ def coerce_value(variable: Variable, value: Value) -> tuple[Value | None, str | 
     if kind == "String":
         return (value, None) if isinstance(value, str) else (None, f"must be a string, but is {value!r}")
     if kind == "Boolean":
-        return (value, None) if isinstance(value, bool) else (None, f"must be true or false, but is {value!r}")
+        known = BOOLEANS.get(value)
+        return (known, None) if known is not None else (None, f"must be true or false, but is {value!r}")
     if kind == "Enumeration" and isinstance(value, str):
         literals = dict(variable.items)
         if value not in literals:
@@ -51,6 +55,9 @@ def coerce_value(variable: Variable, value: Value) -> tuple[Value | None, str | 
             else f"must lie in [{bounds[0]}, {bounds[1]}]"
         )
         return None, f"{text}, but is {value!r}"
+    if kind == "Enumeration" and variable.items and value not in dict(variable.items).values():
+        numbers = ", ".join(f"{number} ({name})" for name, number in variable.items)
+        return None, f"must be one of {numbers}, but is {value!r}"
     return (float(value) if kind == "Real" else int(value)), None
 
 

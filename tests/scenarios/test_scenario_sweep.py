@@ -5,6 +5,10 @@ import csv
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.master.protocol import Variable
+from orchestrator.master.values import coerce_value
+from tests.support.answers_fmu import build_answers_fmu
+from tests.support.c_fmu import have_compiler
 
 SCENARIO = """
 name = "Torque step"
@@ -72,3 +76,27 @@ def test_missing_scenario(tmp_path, capsys):
         main(["sweep", "--scenario", str(tmp_path / "none.toml"), "--vary", "a.b=1", "--out", str(tmp_path / "o")]) == 2
     )
     assert "none.toml" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")
+@pytest.mark.parametrize("words", ["true,false", "1,0"])
+def test_a_boolean_is_swept_as_words_or_numbers(tmp_path, words):
+    build_answers_fmu(tmp_path, parameters=True)  # whose slope is doubled while it is on
+    (tmp_path / "s.toml").write_text(
+        'stop = 1.0\nrecord = ["a.x"]\n[master]\nalgorithm = "gauss_seidel"\nstep = 0.1\n[instances.a]\n'
+        'fmu = "Answers.fmu"\nparameters = { u = 1.0 }\n', encoding="utf-8",
+    )  # fmt: skip
+    given = ["--scenario", str(tmp_path / "s.toml"), "--vary", f"a.on={words}", "--out", str(tmp_path / "out")]
+    assert main(["sweep", *given]) == 0
+    with (tmp_path / "out" / "sweep.csv").open(encoding="utf-8") as file:
+        on, off = (float(row["a.x.last"]) for row in csv.DictReader(file))
+    assert on == pytest.approx(2.0 * off)
+    assert off > 0.0
+
+
+def test_a_number_of_no_item_is_refused_with_the_numbers_that_are():
+    mode = Variable("mode", "parameter", "Enumeration", items=(("slow", 2), ("fast", 5), ("off", -1)))
+    assert [coerce_value(mode, value) for value in (5, -1.0, "slow")] == [(5, None), (-1, None), (2, None)]
+    for wrong in (3, 0, 2.5, 1e9):
+        assert coerce_value(mode, wrong)[0] is None
+    assert coerce_value(mode, 3)[1] == "must be one of 2 (slow), 5 (fast), -1 (off), but is 3"
