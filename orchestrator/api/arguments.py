@@ -1,11 +1,8 @@
-"""Arguments that several workflows take, checked."""
-
-import math
+"""The experiment that several workflows take."""
 
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.experiment import BACKLASH_MODELS, EXPERIMENTS, Experiment, experiment_of
 from orchestrator.paired.pair import with_settings
-from orchestrator.shared.numbers import exact_text
 
 
 def choose_experiment(experiment: str | Experiment, backlash_model: str | None = None) -> Experiment:
@@ -19,19 +16,3 @@ def choose_experiment(experiment: str | Experiment, backlash_model: str | None =
         known = ", ".join(BACKLASH_MODELS)
         raise ScenarioError(f"`backlash_model` must be one of {known}, but is {backlash_model!r}", "backlash_model")
     return with_settings(experiment, backlash_model=backlash_model)
-
-
-def not_negative(name: str, value: float) -> float:
-    """Return ``value``, a number that must be finite and not negative."""
-    if not (math.isfinite(value) and value >= 0.0):
-        raise ScenarioError(f"`{name}` must be finite and not negative, but is {value}", name)
-    return value
-
-
-def within(name: str, value: float, least: float, most: float) -> float:
-    """Return ``value``, a number that must lie between two bounds."""
-    if not least <= value <= most:
-        raise ScenarioError(
-            f"`{name}` must be between {exact_text(least)} and {exact_text(most)}, but is {value:g}", name
-        )
-    return value

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Sequence
 
-from orchestrator.api.arguments import within
 from orchestrator.control.standstill import LONGEST
 from orchestrator.errors import ScenarioError
 from orchestrator.plants.design import REGULATOR_STATES
+from orchestrator.shared.numbers import within
 from orchestrator.shared.results.regulator import ForecastFound
 
 LARGEST_WEIGHT = 1e12

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.arguments import within
 from orchestrator.api.at_rest import five, margins_text, rest_text
 from orchestrator.api.machine import read_fitted_model, require_machine
 from orchestrator.api.plotted import PlottedResult
@@ -33,6 +32,7 @@ from orchestrator.control.weights import choose_weights
 from orchestrator.errors import ScenarioError
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.scenarios.scenario import simulate
+from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.compensate import CompensateFound, LawFound, laws_tables
 from orchestrator.shared.results.regulator import ForecastFound

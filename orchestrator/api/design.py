@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.arguments import within
 from orchestrator.api.estimable import require_linear
 from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, text_table
@@ -23,6 +22,7 @@ from orchestrator.records.formats.heads import head_of
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import LONGEST_STEP, natural_frequency
 from orchestrator.records.record import MINIMUM_ROWS
+from orchestrator.shared.numbers import within
 from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound
 from orchestrator.shared.results.fields import fields_table
 

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
-from orchestrator.api.live import live_corrected_model
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.shown import Block, doubts_of, table
 from orchestrator.diagnosis.report.corrected import (
@@ -21,12 +20,16 @@ from orchestrator.diagnosis.report.corrected import (
     fitted_record_of,
     fmu_name,
     format_corrected_model,
+    start_values,
 )
 from orchestrator.diagnosis.report.json_results import diagnosis_found, misfit_found
-from orchestrator.diagnosis.report.summary import summarise
+from orchestrator.diagnosis.report.summary import named_gap, play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, TestMisfit
 from orchestrator.errors import OutputError
+from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
+from orchestrator.shared.play import Play
+from orchestrator.shared.results import LiveFound
 from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound
 from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.trust import Level
@@ -126,10 +129,27 @@ class DiagnosisResult(AnyDiagnosisResult):
             validation=None
             if self.validation is None
             else misfit_found(self.validation, self.diagnosis.settings.report),
-            live=live_corrected_model(self.diagnosis, self.runs),
+            live=self._live_model(),
             angle_unit=self.record.angle_unit,
             seconds=self.seconds,
         )
+
+    def _live_model(self) -> LiveFound:
+        """Return the corrected model and the starts of its runs over the test part."""
+        workings, plant = self.diagnosis.workings, self.diagnosis.model.plant
+        values, runs = start_values(plant, workings.final), self.runs
+        return LiveFound(plant.name, workings.records[0].step, values, list(runs.rows), list(runs.starts))
+
+    @property
+    def gap(self) -> Estimate | None:
+        """The half-gap [rad] of the corrected model, where a gap is named among what the model misses."""
+        gap = named_gap(self.diagnosis)
+        return None if gap is None else Estimate("diagnosis", gap.value, gap.standard_error, gap.interval)
+
+    @property
+    def play(self) -> Play | None:
+        """The same as total play, at the load and at the motor."""
+        return play_of(self.diagnosis)
 
     @property
     def fmu_name(self) -> str:

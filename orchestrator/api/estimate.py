@@ -2,25 +2,22 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import msgspec
 import numpy as np
 
-from orchestrator.api.diagnose import diagnose as find_missing
-from orchestrator.api.diagnosed import DiagnosisResult
+import orchestrator
 from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.live import live_fitted_model
 from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, doubts_of, text_table
-from orchestrator.diagnosis.report.summary import play_of
-from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation.apply import apply_method, default_method, error_bound
 from orchestrator.estimation.effort import Stop, StoppedError, never
@@ -35,11 +32,41 @@ from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
+from orchestrator.shared.results.diagnose import DiagnoseFound
 from orchestrator.shared.results.estimate import EstimateFound, MethodFound, RepeatsFound, methods_table
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Level, Trust
 
 DIAGNOSIS = "diagnosis"  # the row of a corrected model's half-gap, and the folder of its diagnosis
+
+
+class CorrectedModel(Protocol):
+    """What an estimate reads of the diagnosis of a model that does not explain the record.
+
+    ``orchestrator.diagnose`` makes one. It is asked for by its public name: only such a record needs the diagnosis.
+    """
+
+    seconds: float
+
+    @property
+    def trust(self) -> Trust: ...
+
+    @property
+    def gap(self) -> Estimate | None: ...
+
+    @property
+    def play(self) -> Play | None: ...
+
+    @property
+    def can_compensate(self) -> bool: ...
+
+    def summary(self) -> Iterator[str]: ...
+
+    def results(self, place: Path) -> DiagnoseFound: ...
+
+    def write(
+        self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None, pictures: bool = False
+    ) -> None: ...
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,12 +88,12 @@ class EstimateResult(PlottedResult):
     command: ClassVar[str] = "estimate"
     replaces: ClassVar[tuple[str, ...]] = (
         "estimate.png",
-        *(f"{DIAGNOSIS}/{name}" for name in DiagnosisResult.replaces),
+        f"{DIAGNOSIS}/diagnose.png",
     )
     record: Record
     model: Model
     methods: tuple[MethodResult, ...]
-    diagnosis: DiagnosisResult | None = None
+    diagnosis: "CorrectedModel | None" = None
     arguments: Mapping[str, Any] = field(default_factory=dict)
     more: tuple[Record, ...] = ()
     repeats: Repeats | None = None
@@ -127,7 +154,7 @@ class EstimateResult(PlottedResult):
 
     def _play(self) -> Play:
         """Return the best half-gap with the gear ratio that was fitted beside it."""
-        corrected = None if self.diagnosis is None else play_of(self.diagnosis.diagnosis)
+        corrected = None if self.diagnosis is None else self.diagnosis.play
         return corrected or Play(self.alpha, self._ratio(self.best))
 
     def blocks(self) -> Sequence[Block]:
@@ -314,7 +341,9 @@ def estimate(
     if diagnose and _is_unexplained(judged):
         progress(DIAGNOSIS, "diagnosing", 0.0)
         missing, why = _try_diagnosis([measured, *more], model, partial(progress, DIAGNOSIS), stop)
-    first = () if missing is None else _of_diagnosis(missing)
+    first: tuple[MethodResult, ...] = ()
+    if missing is not None and missing.gap is not None:
+        first = (MethodResult(DIAGNOSIS, missing.gap, math.inf, missing.seconds, trust=missing.trust),)
     repeats = repeats_of([measured, *more])
     return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen, why)
 
@@ -335,7 +364,7 @@ def _is_unexplained(methods: Sequence[MethodResult]) -> bool:
 
 def _try_diagnosis(
     records: Sequence[Record], model: Model, report: Callable[[str, float], None], stop: Stop
-) -> tuple[DiagnosisResult | None, str]:
+) -> tuple[CorrectedModel | None, str]:
     """Return what the model misses; or None, and why these records cannot be diagnosed."""
 
     def progress(done: int, most: int, what: str) -> None:
@@ -348,19 +377,11 @@ def _try_diagnosis(
 
     try:
         ask()
-        return find_missing(records, model, progress=progress), ""
+        found: CorrectedModel = orchestrator.diagnose(records, model, progress=progress)
+        return found, ""
     except (InputError, ConvergenceError) as error:
         return None, str(error)
     except KeyboardInterrupt:
         if not stop():
             raise
         return None, stop()
-
-
-def _of_diagnosis(diagnosis: DiagnosisResult) -> tuple[MethodResult, ...]:
-    """Return the half-gap of the corrected model, where one is named among what the model misses."""
-    gap = next((e.parameters["alpha"] for e in diagnosis.diagnosis.graded(Grade.LIKELY) if e.name == "backlash"), None)
-    if gap is None:
-        return ()
-    estimate = Estimate(DIAGNOSIS, gap.value, gap.standard_error, gap.interval)
-    return (MethodResult(DIAGNOSIS, estimate, math.inf, diagnosis.seconds, trust=diagnosis.trust),)

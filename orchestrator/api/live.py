@@ -1,7 +1,5 @@
 """What result files say for runs beside the record: the model, and from where on it runs."""
 
-from orchestrator.diagnosis.report.corrected import BeforeAfter, start_values
-from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
 from orchestrator.shared.results import LiveFound
@@ -11,13 +9,6 @@ SPAN = 2.0
 """Seconds after which the fitted model starts anew from the fit: as long as the free runs of a diagnosis."""
 LEAST_ROWS = 100
 STARTS = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
-
-
-def live_corrected_model(diagnosis: Diagnosis, runs: BeforeAfter) -> LiveFound:
-    """Return the corrected model and the starts of its runs over the test part."""
-    plant = diagnosis.model.plant
-    values = start_values(plant, diagnosis.workings.final)
-    return LiveFound(plant.name, diagnosis.workings.records[0].step, values, list(runs.rows), list(runs.starts))
 
 
 def live_fitted_model(record: Record, fit: Estimate) -> LiveFound:

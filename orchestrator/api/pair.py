@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.arguments import choose_experiment, not_negative
+from orchestrator.api.arguments import choose_experiment
 from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import ensure_fastest
@@ -21,6 +21,7 @@ from orchestrator.paired.calibration import GapEstimate
 from orchestrator.paired.cosimulation import FMUS, LoopRun
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.pair import PairRun, with_settings
+from orchestrator.shared.numbers import not_negative
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import GapFound, PairFound
 

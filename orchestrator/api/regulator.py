@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.arguments import within
 from orchestrator.api.at_rest import LARGEST_WEIGHT, five, margins_text, rest_text
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block, table
@@ -18,6 +17,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.plants import design
 from orchestrator.plants.design import GAIN_UNITS, REGULATOR_STATES, DrivetrainValues, five_state_model
 from orchestrator.records.model_file import Model, read_model
+from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns, write_whole
 from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound
 

@@ -4,15 +4,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 from orchestrator.plain_text import plain_text
 from orchestrator.shared.numbers import cell_text
 from orchestrator.shared.output import stage_output, write_result
 from orchestrator.shared.results.fields import ReportTable
 
-if TYPE_CHECKING:  # numpy, which help texts do without
-    from orchestrator.records.arrays import Record
+
+class Doubtful(Protocol):
+    """A record: where it is from, and what its rows say of how they were taken."""
+
+    @property
+    def source(self) -> str: ...
+
+    @property
+    def doubts(self) -> tuple[str, ...]: ...
 
 
 @dataclass(frozen=True)
@@ -27,7 +34,7 @@ class TextTable:
 Block = TextTable | str
 
 
-def doubts_of(records: "Sequence[Record]") -> list[str]:
+def doubts_of(records: Sequence[Doubtful]) -> list[str]:
     """Return what the rows of logs say of how they were taken, a line each, for the head of a result."""
     return [f"{record.source}: {text}." for record in records for text in record.doubts]
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.api.build import build
+import orchestrator
 from orchestrator.api.check import check, find_fmus
 from orchestrator.commands._check import add_check_arguments, mend_fmus, read_arguments, verdicts_shown, write_reports
 from orchestrator.commands._trust import note_missing_walls
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check every FMU; 1 when any fails."""
-    paths = find_fmus(args.fmus) if args.fmus else list(build().paths.values())
+    paths = find_fmus(args.fmus) if args.fmus else list(orchestrator.build().paths.values())
     policy = read_arguments(args)
     paths = mend_fmus(args, paths)
     if not (args.static or args.trust):

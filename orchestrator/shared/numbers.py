@@ -1,6 +1,8 @@
-"""Numbers as text: to be copied, and to be read."""
+"""Numbers as text, to be copied and to be read, and arguments within their bounds."""
 
 import math
+
+from orchestrator.errors import ScenarioError
 
 MISSING = "–"
 
@@ -32,3 +34,19 @@ def _float(value: float, digits: int) -> str:
         return text.rstrip("0").rstrip(".") if "." in text else text
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(exponent)}"
+
+
+def not_negative(name: str, value: float) -> float:
+    """Return ``value``, a number that must be finite and not negative."""
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ScenarioError(f"`{name}` must be finite and not negative, but is {value}", name)
+    return value
+
+
+def within(name: str, value: float, least: float, most: float) -> float:
+    """Return ``value``, a number that must lie between two bounds."""
+    if not least <= value <= most:
+        raise ScenarioError(
+            f"`{name}` must be between {exact_text(least)} and {exact_text(most)}, but is {value:g}", name
+        )
+    return value

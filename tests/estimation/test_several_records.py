@@ -109,7 +109,7 @@ def test_records_that_the_model_does_not_explain_are_diagnosed_together(rubbing,
         seen.append([record.source for record in records])
         raise RecordError("it is a test")
 
-    monkeypatch.setattr("orchestrator.api.estimate.find_missing", refused)
+    monkeypatch.setattr("orchestrator.diagnose", refused)
     records = [record_from_columns(columns, f"rubbing {k}") for k, columns in enumerate(rubbing)]
     found = oc.estimate(records)
     assert seen == [["rubbing 0", "rubbing 1"]]

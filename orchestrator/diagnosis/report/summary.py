@@ -9,7 +9,6 @@ from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEff
 from orchestrator.diagnosis.selection.grading import GRADE_RULES
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.effects.words import SITES, effect_words, list_effects, list_words, number_words
-from orchestrator.plants.description import Plant
 from orchestrator.shared.play import Play
 
 BODIES = {"motor": "the motor", "load": "the load"}
@@ -105,13 +104,15 @@ def _name_with_others(effect: GradedEffect) -> str:
     return effect_words(effect.label) + (f" (or {' or '.join(others)})" if effect.evidence.foreign_family else "")
 
 
+def named_gap(diagnosis: Diagnosis) -> ValueEstimate | None:
+    """Return the half-gap [rad] of the backlash that was named; None: none is likely."""
+    return next((e.parameters["alpha"] for e in diagnosis.graded(Grade.LIKELY) if e.name == "backlash"), None)
+
+
 def play_of(diagnosis: Diagnosis) -> Play | None:
     """Return the size of the backlash that was named; None: none is likely."""
-    gap = next((effect for effect in diagnosis.graded(Grade.LIKELY) if effect.name == "backlash"), None)
-    if gap is None:
-        return None
-    plant: Plant = diagnosis.model.plant
-    return Play(gap.parameters["alpha"].value, plant.ratio(diagnosis.workings.final))
+    gap, plant = named_gap(diagnosis), diagnosis.model.plant
+    return None if gap is None else Play(gap.value, plant.ratio(diagnosis.workings.final))
 
 
 def _effect(effect: GradedEffect, diagnosis: Diagnosis) -> Iterator[str]:
