@@ -149,6 +149,33 @@ def test_no_circle_of_imports():
     assert not {name: sorted(needs & left.keys()) for name, needs in left.items() if name in users}
 
 
+def reached_from(name, needs):
+    """All modules that a module imports, directly or through others, and the packages that they lie in."""
+    reached, left = set(), [name]
+    while left:
+        module = left.pop()
+        if module in needs and module not in reached:
+            reached.add(module)
+            left += [*needs[module], module.rpartition(".")[0]]
+    return reached
+
+
+def test_a_command_needs_no_more_lines_than_the_page_of_the_architecture_says():
+    known = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path for path in SOURCES}
+    needs = {name: set(sources_of(path, known)) for name, path in known.items()}
+    lines = {name: path.read_text(encoding="utf-8").count("\n") for name, path in known.items()}
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    most = {name: int(text.replace(",", "")) for name, text in re.findall(r"^\| `(\w+)` \| ([\d,]+) \|$", page, re.M)}
+    found = {
+        command: sum(lines[name] for name in reached_from(f"orchestrator.commands.{command}", needs))
+        for command in COMMANDS
+    }
+    assert most.keys() == found.keys()
+    assert not {
+        name: (count, most[name]) for name, count in found.items() if not most[name] - 2000 < count <= most[name]
+    }
+
+
 def test_the_diagnosis_has_short_chains_of_imports():
     known = {
         ".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in SOURCES if "diagnosis" in path.parts

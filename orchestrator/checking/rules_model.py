@@ -11,7 +11,6 @@ from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.grammar import attributes_of
 from orchestrator.checking.rules import declare
 from orchestrator.checking.units import (
-    EXPONENTS,
     Conversion,
     base_conversion,
     dimension_of,
@@ -19,6 +18,7 @@ from orchestrator.checking.units import (
     lacks_angle,
 )
 from orchestrator.checking.xml_reading import xpath
+from orchestrator.shared.units import EXPONENTS
 
 declare("""
 [description]

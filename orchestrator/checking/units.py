@@ -3,8 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from orchestrator.master.protocol import EXPONENTS
-from orchestrator.shared.units import KnownUnit, parse_unit
+from orchestrator.shared.units import EXPONENTS, KnownUnit, parse_unit
 
 # Names that may mean two things (`g`, `t`, `U`) are not among them.
 _NAMES = (

@@ -13,8 +13,9 @@ from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, names_in_words, read_clocks
 from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange2, read_exchange3
-from orchestrator.master.protocol import EXPONENTS, ModelInterface, Unit, Value
+from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.shared.isolation.archives import open_archive
+from orchestrator.shared.units import EXPONENTS
 
 PYTHON_SLAVE = "resources/slavemodule.txt"  # in what PythonFMU builds
 MAXIMUM_XML = 64 * 2**20

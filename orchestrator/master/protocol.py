@@ -61,10 +61,6 @@ class RunEndedError(StepDiscardedError):
         return self.time >= end - 1e-9 * max(1.0, abs(end))
 
 
-EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-"""The base units of FMI, in the order of a unit's exponents."""
-
-
 @dataclass(frozen=True, slots=True)
 class Unit:
     """A unit by its relation to SI: ``base value = factor * value + offset``.

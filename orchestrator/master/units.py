@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from orchestrator.master.protocol import EXPONENTS, Unit, Variable
-from orchestrator.shared.units import parse_unit
+from orchestrator.master.protocol import Unit, Variable
+from orchestrator.shared.units import EXPONENTS, parse_unit
 
 
 def resolve(name: str, declared: Mapping[str, Unit]) -> Unit:

@@ -11,6 +11,7 @@ from functools import lru_cache
 
 Dimension = tuple[int, ...]
 BASES = ("kilogram", "meter", "second", "ampere", "kelvin", "mole", "candela", "radian", "count")
+EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # the same in FMI, which knows no counts
 LONGEST = 40  # characters of a unit's text
 _NEWTON_METRE = "newton*meter"
 _ROTATION = "revolution/minute"

@@ -49,7 +49,6 @@ VALUES = "initialValues"
 
 FURTHER = {"ssd": ("ssv", "osp", "oms"), "ssv": ()}
 """Namespaces that a file of each kind uses beside its own and the common one."""
-EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 MAXIMUM_XML = 64 * 2**20
 
 

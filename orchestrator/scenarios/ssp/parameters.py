@@ -13,8 +13,9 @@ from orchestrator.master import units
 from orchestrator.master.problems import Problem
 from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.master.values import nearest
-from orchestrator.scenarios.ssp.common import EXPONENTS, MAXIMUM_XML, file_of_uri, parse, tag
+from orchestrator.scenarios.ssp.common import MAXIMUM_XML, file_of_uri, parse, tag
 from orchestrator.shared.isolation.archives import open_archive
+from orchestrator.shared.units import EXPONENTS
 
 WHOLE = ("Integer", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
 TYPES = {

@@ -14,7 +14,6 @@ from orchestrator.master.signals import Constant
 from orchestrator.master.system import Connection, Instance, System, split
 from orchestrator.scenarios.scenario import Scenario
 from orchestrator.scenarios.ssp.common import (
-    EXPONENTS,
     STRUCTURE,
     VALUES,
     add_experiment,
@@ -24,6 +23,7 @@ from orchestrator.scenarios.ssp.common import (
     tag,
 )
 from orchestrator.scenarios.ssp.described import SspVariable, connector_of, described, whole_values
+from orchestrator.shared.units import EXPONENTS
 
 
 def write_ssp(path: Path, scenario: Scenario, version: str = "1.0") -> None:
