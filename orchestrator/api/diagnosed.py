@@ -23,7 +23,7 @@ from orchestrator.diagnosis.report.corrected import (
     start_values,
 )
 from orchestrator.diagnosis.report.json_results import diagnosis_found, misfit_found
-from orchestrator.diagnosis.report.summary import named_gap, play_of, summarise
+from orchestrator.diagnosis.report.summary import half_gap_of, play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, TestMisfit
 from orchestrator.errors import OutputError
 from orchestrator.estimation.protocol import Estimate
@@ -143,7 +143,7 @@ class DiagnosisResult(AnyDiagnosisResult):
     @property
     def gap(self) -> Estimate | None:
         """The half-gap [rad] of the corrected model, where a gap is named among what the model misses."""
-        gap = named_gap(self.diagnosis)
+        gap = half_gap_of(self.diagnosis)
         return None if gap is None else Estimate("diagnosis", gap.value, gap.standard_error, gap.interval)
 
     @property

@@ -104,14 +104,14 @@ def _name_with_others(effect: GradedEffect) -> str:
     return effect_words(effect.label) + (f" (or {' or '.join(others)})" if effect.evidence.foreign_family else "")
 
 
-def named_gap(diagnosis: Diagnosis) -> ValueEstimate | None:
+def half_gap_of(diagnosis: Diagnosis) -> ValueEstimate | None:
     """Return the half-gap [rad] of the backlash that was named; None: none is likely."""
     return next((e.parameters["alpha"] for e in diagnosis.graded(Grade.LIKELY) if e.name == "backlash"), None)
 
 
 def play_of(diagnosis: Diagnosis) -> Play | None:
     """Return the size of the backlash that was named; None: none is likely."""
-    gap, plant = named_gap(diagnosis), diagnosis.model.plant
+    gap, plant = half_gap_of(diagnosis), diagnosis.model.plant
     return None if gap is None else Play(gap.value, plant.ratio(diagnosis.workings.final))
 
 
