@@ -46,7 +46,8 @@ class CorrectedModel(Protocol):
     ``orchestrator.diagnose`` makes one. It is asked for by its public name: only such a record needs the diagnosis.
     """
 
-    seconds: float
+    @property
+    def seconds(self) -> float: ...
 
     @property
     def trust(self) -> Trust: ...
