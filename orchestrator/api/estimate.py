@@ -221,14 +221,7 @@ class EstimateResult(PlottedResult):
     def write(
         self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None, pictures: bool = False
     ) -> None:
-        """Write data, ``estimate.json``, ``report.html`` and the diagnosis into a folder that exists.
-
-        Args:
-            folder: that gets the files, made when missing.
-            place: the folder that they will be moved to.
-            arguments: what was asked for (default: the arguments of the call).
-            pictures: whether to draw the plots of each page into a PNG file beside it.
-        """
+        """Write data, ``estimate.json``, ``report.html`` and the diagnosis into a folder that exists."""
         self.write_diagnosis(folder, place, pictures)
         super().write(folder, place, arguments, pictures)
 
