@@ -199,9 +199,8 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
         _, P = solve_riccati(A.T, model.C.T, Q, R)
     except np.linalg.LinAlgError as error:
         raise DesignError(f"the estimator's Riccati equation has no solution: {error}") from None
-    S = model.C @ P @ model.C.T + R
-    L = P @ model.C.T @ np.linalg.inv(S)
-    return KalmanFilter(A, B[:, 0], L, np.linalg.inv(S), sample_time)
+    S_inverse = np.asarray(np.linalg.inv(model.C @ P @ model.C.T + R), dtype=np.float64)
+    return KalmanFilter(A, B[:, 0], P @ model.C.T @ S_inverse, S_inverse, sample_time)
 
 
 def _noise_covariance(A: Array, intensity: Array, h: float) -> Array:
