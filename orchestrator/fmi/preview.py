@@ -72,7 +72,7 @@ def preview_fmu(path: Path) -> FmuPreview:
 def _head(path: Path) -> tuple[str, str, tuple[str, ...], float | None, float | None]:
     """Return description, tool, platforms, and stop time and step of the default experiment."""
     with open_archive(path) as (archive, members):
-        content = archive.read(members["modelDescription.xml"])
+        content = archive.read("modelDescription.xml")
         folders = {tuple(name.split("/")[:2]) for name in members}
     platforms = sorted(part[1] for part in folders if part[0] == "binaries" and len(part) > 1 and part[1])
     sources = ["sources"] if any(part[0] == "sources" for part in folders) else []

@@ -129,22 +129,29 @@ class Trace:
 
     def show(self, place: int, first: int, last: int, stretches: int) -> CurveShown:
         """Return what lies in view."""
-        self._parts = [tuple(np.concatenate(part) for part in zip(*self._parts, strict=True))] if self._parts else []  # type: ignore[misc]
-        starts, low, high = self._parts[0] if self._parts else (np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+        if not self._parts:
+            return CurveShown(place, whole=self.whole, problem=self.problem)
+        starts, low, high = (np.concatenate([part[k] for part in self._parts]) for k in range(3))
+        self._parts = [(starts, low, high)]
         begin = max(int(np.searchsorted(starts, first, side="right")) - 1, 0)
         end = int(np.searchsorted(starts, last, side="right"))
-        edges = np.unique(np.linspace(begin, end, stretches + 1).astype(int)[:-1]) if end > begin else np.zeros(0, int)
-        parts = [np.zeros(0)] * 2
-        if edges.size:
-            parts = [np.fmin.reduceat(low[:end], edges), np.fmax.reduceat(high[:end], edges)]
+        edges, least, most = _reduce(low, high, begin, end, stretches)
         found = self.most >= self.least
         count = max(self.rows, 1)
         return CurveShown(
-            place, tuple(starts[edges].tolist()), _plain(parts[0]), _plain(parts[1]),
+            place, tuple(starts[edges].tolist()), _plain(least), _plain(most),
             self.least if found else None, self.most if found else None,
             self.at_least / count if self.whole else 0.0, self.at_most / count if self.whole else 0.0,
             self.missing / count if self.whole else 0.0, self.whole, self.problem,
         )  # fmt: skip
+
+
+def _reduce(low: Array, high: Array, begin: int, end: int, stretches: int) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return where at most so many parts of [begin, end) begin, and the smallest and largest value of each."""
+    edges = np.unique(np.linspace(begin, max(end, begin), stretches + 1).astype(np.int64)[:-1])
+    if end <= begin:
+        return edges[:0], low[:0], high[:0]
+    return edges, np.fmin.reduceat(low[:end], edges), np.fmax.reduceat(high[:end], edges)
 
 
 def _plain(values: Array) -> tuple[float | None, ...]:
@@ -256,11 +263,10 @@ def _closer(
     found = {}
     for n, place in enumerate(places):
         values = np.concatenate([np.zeros(0), *(piece[n] for piece in pieces)])
-        edges = np.unique(np.linspace(0, values.size, asked.stretches + 1).astype(int)[:-1]) if values.size else []
-        if len(edges):
-            ends = [_plain(reduce(values, edges)) for reduce in (np.fmin.reduceat, np.fmax.reduceat)]
+        edges, low, high = _reduce(values, values, 0, values.size, asked.stretches)
+        if edges.size:
             rows = tuple((asked.first + edges).tolist())
-            found[place] = msgspec.structs.replace(shown[place], rows=rows, low=ends[0], high=ends[1])
+            found[place] = msgspec.structs.replace(shown[place], rows=rows, low=_plain(low), high=_plain(high))
     return found
 
 
