@@ -110,12 +110,12 @@ def _sets(d: Description, files: FmuFiles) -> Iterator[SourceSet]:
             yield SourceSet(tuple(n for n in chosen if posixpath.normpath(f"sources/{n}") in names), tuple(words))
 
 
-def _compile(compiler: str, folder: Path, one: SourceSet, walls: bool) -> str | None:
+def _compile(compiler: str, folder: Path, group: SourceSet, walls: bool) -> str | None:
     """What a compiler says against sources; empty where it takes or cannot judge them, None where it does not end."""
     found = importlib.util.find_spec("fmpy")
     headers = [Path(found.origin).parent / "c-code"] if found is not None and found.origin else []
-    names = [f"./{posixpath.normpath(name)}" for name in one.files[:_MOST]]
-    command = [compiler, "-fsyntax-only", "-w", "-I.", *one.words, *(f"-I{path}" for path in headers), *names]
+    names = [f"./{posixpath.normpath(name)}" for name in group.files[:_MOST]]
+    command = [compiler, "-fsyntax-only", "-w", "-I.", *group.words, *(f"-I{path}" for path in headers), *names]
     home = Path(compiler).resolve().parents[1]
     read = [*system_folders(), Path(compiler).resolve().parent, *(home / name for name in _FOLDERS), *headers]
     read += [Path("/usr") / name for name in _FOLDERS] + [Path("/usr/local/include")]
