@@ -8,7 +8,8 @@
 | limits of memory, processor time, files | yes | yes | none |
 | peak memory of a child that has ended | yes | yes | unknown: 0 |
 | symbolic links, and removal of an open file | yes | yes | Windows: no |
-| end of a whole process group | yes | yes | the child alone |
+| signals to a whole process group | yes | yes | the child alone, which ends |
+| Ctrl-C to a command when its server dies | yes | no | no |
 | lock of an open file (filelock) | yes | yes | Windows: yes |
 | lock of a folder | yes | yes | no |
 | exchange of two folders in one step | most file systems | APFS | no |
@@ -27,12 +28,14 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 try:
     import resource as _resource
 except ImportError:  # Windows
     _resource = None  # type: ignore[assignment]
 
+_SET_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 KILLED: int | None = getattr(signal, "SIGKILL", None)
 """Number of the signal that ends a process without a word; ``None`` where there is none."""
 
@@ -118,13 +121,34 @@ def set_limits(limits: Mapping[str, int]) -> None:
 
 def kill_group(process: "subprocess.Popen[bytes] | subprocess.Popen[str]") -> bool:
     """Kill the process group that a child leads; tell whether anything was in it."""
-    if not hasattr(os, "killpg"):
-        return False
-    try:
-        os.killpg(process.pid, signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        return False
-    return True
+    return hasattr(os, "killpg") and signal_group(process.pid, KILLED)
+
+
+def signal_group(leader: int, number: int | None) -> bool:
+    """Send a signal to a process group, or end its leader where there are no groups; tell whether one was there."""
+    send = getattr(os, "killpg", os.kill)  # which ends a process of Windows, whatever the number
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        send(leader, signal.SIGTERM if number is None else number)
+        return True
+    return False
+
+
+def command_options() -> dict[str, Any]:
+    """Return the options of a child that leads a process group, hears Ctrl-C, and on Linux gets it when we die.
+
+    Ctrl-C waits until the command can answer it: while the interpreter starts it would end in a traceback.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        return {}
+    control = ctypes.CDLL(None, use_errno=True).prctl if sys.platform == "linux" else None
+
+    def prepare() -> None:
+        signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell's background has it ignored
+        if control is not None:
+            control(_SET_DEATH_SIGNAL, int(signal.SIGINT), 0, 0, 0)
+
+    return {"start_new_session": True, "preexec_fn": prepare}
 
 
 def collect(process: "subprocess.Popen[bytes]", limit: float) -> int:

@@ -3,14 +3,13 @@
 Standard library alone: the package is built with it.
 """
 
-import os
 import signal
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from orchestrator.shared.operating_system import kill_group
+from orchestrator.shared.operating_system import kill_group, signal_group
 
 _PATIENCE = 2.0  # s to clean up: a compiler removes its temporary files
 
@@ -38,8 +37,7 @@ def run_tool(
         try:
             out, told = process.communicate(given)
         except BaseException:
-            if sys.platform != "win32":
-                os.killpg(process.pid, signal.SIGTERM)
+            signal_group(process.pid, signal.SIGTERM)
             try:
                 process.communicate(timeout=_PATIENCE)
             except subprocess.TimeoutExpired:

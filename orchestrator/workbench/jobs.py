@@ -2,22 +2,21 @@
 
 import asyncio
 import contextlib
-import ctypes
 import json
 import os
 import shlex
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import orchestrator
 from orchestrator.errors import InputError
 from orchestrator.plain_text import plain_text
+from orchestrator.shared.operating_system import KILLED, command_options, signal_group
 from orchestrator.shared.output import write_whole
 from orchestrator.workbench.session import SessionFolder
 from orchestrator.workbench.settings import WorkbenchSettings
@@ -29,7 +28,6 @@ _SHOWN = (
     "stops",
 )  # fmt: skip
 STOPPED = (130, 143, 129)  # exit codes after Ctrl-C, SIGTERM and SIGHUP
-_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
 @dataclass
@@ -111,7 +109,7 @@ class Jobs:
         if not job.is_over():
             job.stops += 1
             if job.process is not None:
-                _signal(job.process, signal.SIGINT if job.stops < 3 else signal.SIGKILL)
+                signal_group(job.process.pid, signal.SIGINT if job.stops < 3 else KILLED)
         return job
 
     async def remove(self, name: str) -> None:
@@ -146,7 +144,7 @@ class Jobs:
             _, late = await asyncio.wait(self._tasks, timeout=self._settings.stop_seconds)
             for job in self.all.values():
                 if not job.is_over() and job.process is not None:
-                    _signal(job.process, signal.SIGKILL)
+                    signal_group(job.process.pid, KILLED)
             if late:
                 await asyncio.wait(late, timeout=self._settings.stop_seconds)
 
@@ -164,7 +162,7 @@ class Jobs:
         try:
             out, said = await asyncio.wait_for(process.communicate(), self._settings.answer_seconds)
         except (TimeoutError, asyncio.CancelledError):
-            _signal(process, signal.SIGKILL)
+            signal_group(process.pid, KILLED)
             await process.wait()
             raise InputError(f"the answer must come within {self._settings.answer_seconds:g} s, but did not") from None
         return process.returncode or 0, out.decode("utf-8", "replace"), said.decode("utf-8", "replace").strip()
@@ -188,7 +186,7 @@ class Jobs:
                 return
         job.state = "running"
         if job.stops:  # asked while it was being started
-            _signal(job.process, signal.SIGINT)
+            signal_group(job.process.pid, signal.SIGINT)
         assert job.process.stderr is not None
         rest = b""
         while chunk := await job.process.stderr.read(65536):
@@ -198,7 +196,7 @@ class Jobs:
                 self._hear(job, line)
         self._hear(job, rest)
         code = await job.process.wait()
-        _signal(job.process, signal.SIGKILL)  # whatever of its group is left
+        signal_group(job.process.pid, KILLED)  # whatever of its group is left
         job.exit_code = code if code >= 0 else 128 - code
         stopped = job.exit_code in STOPPED or (job.stops > 0 and code != 0)
         job.state = "stopped" if stopped else "done" if _is_complete(job) else "failed"
@@ -262,28 +260,5 @@ async def _spawn(words: Sequence[str], folder: Path, output: int) -> "asyncio.su
         sys.executable, "-P", "-m", "orchestrator", *words,
         cwd=folder, stdin=asyncio.subprocess.DEVNULL, stdout=output, stderr=asyncio.subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))},
-        start_new_session=True, preexec_fn=_end_with_parent(),
+        **command_options(),
     )  # fmt: skip
-
-
-@cache
-def _end_with_parent() -> Callable[[], object]:
-    """Return what a child calls first: it hears Ctrl-C, and on Linux is interrupted when the server dies.
-
-    Ctrl-C waits until the command can answer it: while the interpreter starts it would end in a traceback.
-    """
-    control = ctypes.CDLL(None, use_errno=True).prctl if sys.platform.startswith("linux") else None
-
-    def prepare() -> None:
-        signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell's background has it ignored
-        if control is not None:
-            control(_PARENT_DEATH_SIGNAL, int(signal.SIGINT), 0, 0, 0)
-
-    return prepare
-
-
-def _signal(process: "asyncio.subprocess.Process", number: signal.Signals) -> None:
-    """Send a signal to a command and what it has started."""
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, number)

@@ -1,14 +1,18 @@
-"""The main commands where the modules, functions and files of POSIX are missing: the same numbers, and exit code 0."""
+"""The commands where the modules, functions and files of POSIX are missing: the same numbers, and exit code 0."""
 
 import ast
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from orchestrator.cli import COMMANDS as KNOWN
+from orchestrator.shared import operating_system
 from tests.support.example_record import copy_examples
 from tests.support.sources import nodes_of
 
@@ -35,6 +39,17 @@ COMMANDS = (
     "inspect machine.csv",
     "estimate machine.csv --no-diagnose",
     "check built/LqrController.fmu",
+    "regulator",
+    "ssp export",
+    "report results/simulate",
+)
+AT_NIGHT = (
+    "thesis",
+    "build ServoAxis --directory built --force",
+    "calibrate axis.csv --fmu built/ServoAxis.fmu --map axis_map.toml",
+    "diagnose machine.csv --model machine.toml",
+    "compensate --plants 2",
+    "simulate --scenario loop.toml",
 )
 MEASURED = {"seconds", "time", "duration", "cases_per_second", "wall"}
 
@@ -58,23 +73,44 @@ def numbers(value: object) -> object:
 
 
 @pytest.mark.slow
-def test_the_main_commands_give_the_same_numbers(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "commands", [COMMANDS, pytest.param(AT_NIGHT, marks=pytest.mark.night)], ids=["by day", "at night"]
+)
+def test_the_commands_give_the_same_numbers(tmp_path: Path, commands: tuple[str, ...]) -> None:
     here, hidden = tmp_path / "here", tmp_path / "hidden"
     for folder in (here, hidden):
         folder.mkdir()
         copy_examples(folder)
-    for words in COMMANDS:
+    for words in commands:
         done = run("tests.support.without_posix", words, hidden)
         cost = r"The fit of \d+ rows will take about \d+ s of processor time\n" if "estimate" in words else ""
-        assert re.fullmatch(cost, done.stderr), (words, done.stderr[-2000:])
-        assert done.returncode == 0
+        assert not cost or re.fullmatch(cost, done.stderr), (words, done.stderr[-2000:])
+        assert "Traceback" not in done.stderr, (words, done.stderr[-2000:])
+        assert done.returncode == 0, (words, done.stderr[-2000:])
         assert run("orchestrator", words, here).returncode == 0
     written = sorted(p.relative_to(here) for p in here.rglob("results/*/*.json"))
-    assert [p.stem for p in written] == ["build", "check", "estimate", "inspect", "simulate", "sweep"]
+    named = {words.split()[0] for words in commands} - {"--help", "report"}
+    assert {path.stem for path in written} >= named - {"regulator", "ssp"}
     for path in written:
         one, other = (numbers(json.loads((folder / path).read_text())) for folder in (here, hidden))
         assert one == other, path
-    assert (here / "built" / "LqrController.fmu").read_bytes() == (hidden / "built" / "LqrController.fmu").read_bytes()
+    for fmu in here.glob("built/*.fmu"):
+        assert fmu.read_bytes() == (hidden / "built" / fmu.name).read_bytes()
+
+
+def test_every_command_that_ends_by_itself_is_run() -> None:
+    run_here = {words.split()[0] for words in (*COMMANDS, *AT_NIGHT)} - {"--help"}
+    assert run_here == set(KNOWN) - {"workbench"}
+
+
+def test_a_child_without_a_group_is_ended_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the workbench does with its jobs: without signals to groups a job that is stopped ends."""
+    monkeypatch.delattr(os, "killpg")
+    monkeypatch.delattr(signal, "pthread_sigmask")
+    assert operating_system.command_options() == {}
+    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+    assert operating_system.signal_group(child.pid, signal.SIGINT)
+    assert child.wait(60) != 0
 
 
 def test_one_module_alone_imports_what_one_system_has() -> None:

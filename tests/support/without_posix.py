@@ -19,10 +19,12 @@ FUNCTIONS = (
 
 def hide() -> None:
     """Hide what only POSIX has from whatever is imported afterwards."""
-    import ctypes.util  # noqa: F401 - the standard library's own use of POSIX is there already
+    import ctypes.util  # noqa: F401 - what libraries use of POSIX by themselves is there already
     import shutil  # noqa: F401
     import subprocess  # noqa: F401
     import tempfile  # noqa: F401
+
+    import platformdirs  # noqa: F401 - asks for the system by its name
 
     for name in MODULES:
         sys.modules[name] = None  # type: ignore[assignment]

@@ -14,6 +14,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.operating_system import command_options
 from orchestrator.workbench import jobs
 from orchestrator.workbench.session import open_session
 from orchestrator.workbench.settings import WorkbenchSettings
@@ -196,7 +197,7 @@ def test_the_end_of_the_server_stops_its_jobs(tmp_path: Path, log: Path) -> None
 
 def test_a_stop_that_comes_first_of_all_is_told_in_a_word() -> None:
     """While the interpreter starts, Ctrl-C would end in a traceback."""
-    prepare = jobs._end_with_parent()
+    prepare = command_options()["preexec_fn"]
 
     def stopped_at_once() -> None:
         prepare()
