@@ -322,14 +322,16 @@ def _judge(task: ControlTask, measured: Sequence[LoopMeasures], seed: int) -> tu
     text = ""
     if any(unstable):
         text = "no plant that the record allows may be unstable under the compensator, but so are "
-        text += _differing(task, unstable, seed)
+        text += _describe_difference(task, unstable, seed)
     if sum(hard) <= HARD_SHARE * len(hard):
         return text, []
-    told = f"Teeth meet at more than {HARD:g} times the impact speed on plants, {_differing(task, hard, seed)}."
+    told = (
+        f"Teeth meet at more than {HARD:g} times the impact speed on plants, {_describe_difference(task, hard, seed)}."
+    )
     return text, [f"{told} {CURE}."]
 
 
-def _differing(task: ControlTask, wrong: Sequence[bool], seed: int) -> str:
+def _describe_difference(task: ControlTask, wrong: Sequence[bool], seed: int) -> str:
     """Return how many plants are wrong, and the parameter in which they differ most from the others, if any does."""
     draws = [task.machine.draw(np.random.default_rng((seed, n))) for n in range(len(wrong))]
     names, bad = list(draws[0]), np.array(wrong)
