@@ -16,12 +16,15 @@ _HALF = r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\.?)?"
 _HOUR = r"(?P<hour>\d\d?):(?P<minute>\d\d)"
 _TIME = rf"[T _]+{_HOUR}(?:{_SECOND})?{_HALF}"
 _ISO = re.compile(
-    rf"(?P<year>\d{{4}})(?P<mark>[-/])(?P<month>\d\d?)(?P=mark)(?P<day>\d\d?){_TIME}(?P<zone>Z|[+-]\d\d:?\d\d)?"
+    rf"(?P<year>\d{{4}})(?P<mark>[-/])(?P<month>\d\d?)(?P=mark)(?P<day>\d\d?){_TIME}(?P<zone>Z|[+-]\d\d(?::?\d\d)?)?"
 )
 _GERMAN = re.compile(rf"(?P<day>\d\d?)\.(?P<month>\d\d?)\.(?P<year>\d{{4}}){_TIME}")
+_NAMED = re.compile(rf"(?P<day>\d\d?)[- ](?P<month>[A-Za-z]{{3}})[- ](?P<year>\d{{4}}){_TIME}")  # as MATLAB writes it
 _SLASHES = re.compile(rf"(?P<date>\d\d?/\d\d?/\d{{4}}){_TIME}")  # day or month first: nobody knows
 _CLOCK = re.compile(rf"{_HOUR}{_SECOND}{_HALF}")
-_PATTERNS = (_ISO, _GERMAN, _SLASHES, _CLOCK)
+_PATTERNS = (_ISO, _GERMAN, _NAMED, _SLASHES, _CLOCK)
+_NAMES = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_MONTHS = {name: n for n, name in enumerate(_NAMES, start=1)}  # whatever the locale is
 DAY = 86_400 * 10**9  # ns
 _NO_TIME = np.datetime64("NaT", "ns").astype(np.int64)
 
@@ -91,7 +94,7 @@ class StampReader:
         zone = found["zone"] if self._pattern is _ISO else None
         if zone and zone != "Z":
             digits = zone[1:].replace(":", "")
-            away = (int(digits[:2]) * 60 + int(digits[2:])) * 60 * 10**9
+            away = (int(digits[:2]) * 60 + int(digits[2:] or 0)) * 60 * 10**9
             value -= away if zone[0] == "+" else -away
         return value
 
@@ -113,7 +116,8 @@ class StampReader:
         key = match["year"], match["month"], match["day"]
         if key not in self._days:
             try:
-                day = np.datetime64(f"{key[0]}-{int(key[1]):02d}-{int(key[2]):02d}", "ns")
+                month = _MONTHS.get(key[1].lower()) or int(key[1])
+                day = np.datetime64(f"{key[0]}-{month:02d}-{int(key[2]):02d}", "ns")
             except ValueError:
                 raise self._error(f"must be a date, but is `{match[0][:40]}`") from None
             self._days[key] = int(day.astype(np.int64))

@@ -1,5 +1,6 @@
 """Dates and times of day: the instants that they mean, and what is refused with its row."""
 
+import datetime
 from pathlib import Path
 
 import numpy as np
@@ -82,3 +83,15 @@ def test_a_cell_that_is_no_such_stamp_is_named_by_its_row_in_the_file(cells: lis
 def test_a_column_without_a_stamp_is_refused() -> None:
     with pytest.raises(RecordError, match="column `t` must hold times, but is empty"):
         seconds_of(_read(["", ""]), "t", FILE)
+
+
+@pytest.mark.parametrize(
+    "shape", ["%Y-%m-%d %H:%M:%S.%f+02", "%Y-%m-%d %H:%M:%S.%f-0330", "%d-%b-%Y %H:%M:%S.%f", "%d %b %Y %H:%M:%S.%f"]
+)
+def test_stamps_of_databases_and_of_matlab_are_read_over_midnight(tmp_path, shape):
+    begin = datetime.datetime(2026, 3, 31, 23, 59, 59)
+    stamps = [(begin + datetime.timedelta(milliseconds=5 * n)).strftime(shape) for n in range(400)]
+    found = StampReader("time", tmp_path / "log.csv").read(stamps, 0)
+    assert set(np.diff(found).tolist()) == {5_000_000}
+    with pytest.raises(RecordError, match="must be a date, but is `29-Xyz-2026"):
+        StampReader("time", tmp_path / "log.csv").read(["29-Xyz-2026 01:02:03"], 0)
