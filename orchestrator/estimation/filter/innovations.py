@@ -6,7 +6,7 @@ With the process noise at zero this is the output-error likelihood of the determ
 is the likelihood in innovation form, in which an imperfect model does not drift away from the record.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.estimation.filter.model import AffineModel, Array, NoiseLevels
 
+# Of a sample, the least lag of the drive: a shorter one acts as it does, and no series follows a quicker one through it.
+LEAST_LAG = 5e-4
 ROOM = "orchestrator.estimation.filter"
 KERNELS = {1: Kernels(f"{ROOM}.kernel"), 2: Kernels(f"{ROOM}.kernel[{ROOM}.two_stages]")}  # by gaps in a row
 
@@ -95,6 +97,7 @@ def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:
 def _arrays(model: AffineModel, step: float) -> tuple[Array, ...]:
     """Return what kernels take of a model, its modes over a whole sample last."""
     kernels, modes = KERNELS[model.stages], len(model.matrices)
+    model = _with_least_lag(model, LEAST_LAG * step)
     phi, gain, gain_1 = (
         np.empty_like(model.matrices),
         np.empty((modes, *model.inputs.shape)),
@@ -105,3 +108,14 @@ def _arrays(model: AffineModel, step: float) -> tuple[Array, ...]:
     return (
         model.matrices, model.inputs, model.constants, model.normals, model.halves, model.jumps, phi, gain, gain_1
     )  # fmt: skip
+
+
+def _with_least_lag(model: AffineModel, least: float) -> AffineModel:
+    """Return the plant with a lag of the drive of at least this [s]."""
+    share = -1.0 / (least * model.matrices[0, -1, -1])
+    if not 0.0 < share < 1.0:
+        return model
+    matrices, inputs, constants = model.matrices.copy(), model.inputs.copy(), model.constants.copy()
+    for part in (matrices[..., -1, -1], inputs[..., -1], constants[..., -1]):
+        part *= share
+    return replace(model, matrices=matrices, inputs=inputs, constants=constants)
