@@ -17,6 +17,7 @@ SCALE = "u_scale"
 TORQUE_OFFSET = "torque_offset"
 LATE = "torque_late"
 DRY = tuple(f"effects.coulomb_friction.{side}.torque" for side in ("motor", "load"))
+LOAD_TORQUE = "effects.load_torque.torque"  # constant; of a prior as wide as the drive's torque at the load
 # Prior standard deviations: of the torque's gain where the record states none, of its offset and of dry friction over
 # the rms of the drive's torque, and of how late it acts [s].
 SCALE_SPREAD, OFFSET_SHARE, FRICTION_SHARE, LATE_SPREAD = 0.03, 0.03, 0.1, 3e-3
@@ -119,6 +120,10 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     damping = model.parameters["c"].value
     unknowns.append(Unknown(IMPULSE, 0.0, 0.5 * IMPULSE_DEPTH * damping, 0.5 * IMPULSE_DEPTH * damping))
     unknowns += torque_unknowns(record, model, model.parameters["tau"].value, ratio)
+    if LOAD_TORQUE not in (unknown.name for unknown in unknowns):
+        own = model.parameters.get(LOAD_TORQUE)
+        pull = abs(ratio) * rms_behind_lag(record.u, record.step, model.parameters["tau"].value)
+        unknowns.append(Unknown(LOAD_TORQUE, own.value if own is not None else 0.0, pull, 1e-3 * pull))
     if record.u_sampled is not None:
         unknowns.append(Unknown(SAMPLED, 0.0, math.inf, 0.1, 0.0, 1.0))
     units = _torque_units(record, model.parameters["tau"].value, ratio)

@@ -26,6 +26,7 @@ from orchestrator.estimation.problem import (
     IMPULSE,
     LATE,
     LEAST_WHERE_INEXACT,
+    LOAD_TORQUE,
     SCALE,
     TORQUE_OFFSET,
     make_problem,
@@ -292,7 +293,8 @@ def _first_fits(
     if all(smallest is not start for start in starts):
         starts.append(smallest)
     fits: list[GapFit] = []
-    held = {SCALE, TORQUE_OFFSET, LATE, *DRY}  # a first step of these too may leave the size behind for good
+    # A first step of these too may leave the size behind for good.
+    held = {SCALE, TORQUE_OFFSET, LATE, LOAD_TORQUE, *DRY}
     early = [n for n in others if problem.names[n] not in held]
     for point in starts:
         fits.append(maximise(likelihood, point.theta, early, 3, tolerance=1.0))
