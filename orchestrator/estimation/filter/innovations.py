@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.estimation.filter.model import AffineModel, Array, NoiseLevels
 
-# Of a sample, the least lag of the drive: a shorter one acts as it does, and no series follows a quicker one through it.
-LEAST_LAG = 5e-4
+LEAST_LAG = 5e-4  # of the drive, in samples: a shorter one acts the same, and would take a contact thousands of pieces
 ROOM = "orchestrator.estimation.filter"
 KERNELS = {1: Kernels(f"{ROOM}.kernel"), 2: Kernels(f"{ROOM}.kernel[{ROOM}.two_stages]")}  # by gaps in a row
 
@@ -96,15 +95,13 @@ def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:
 
 def _arrays(model: AffineModel, step: float) -> tuple[Array, ...]:
     """Return what kernels take of a model, its modes over a whole sample last."""
-    kernels, modes = KERNELS[model.stages], len(model.matrices)
     model = _with_least_lag(model, LEAST_LAG * step)
     phi, gain, gain_1 = (
         np.empty_like(model.matrices),
-        np.empty((modes, *model.inputs.shape)),
+        np.empty((len(model.matrices), *model.inputs.shape)),
         np.empty_like(model.constants),
     )
-    for m in range(modes):
-        kernels.transition(model.matrices[m], model.inputs, model.constants[m], step, phi[m], gain[m], gain_1[m])
+    KERNELS[model.stages].transitions(model.matrices, model.inputs, model.constants, step, phi, gain, gain_1)
     return (
         model.matrices, model.inputs, model.constants, model.normals, model.halves, model.jumps, phi, gain, gain_1
     )  # fmt: skip
@@ -115,7 +112,7 @@ def _with_least_lag(model: AffineModel, least: float) -> AffineModel:
     share = -1.0 / (least * model.matrices[0, -1, -1])
     if not 0.0 < share < 1.0:
         return model
-    matrices, inputs, constants = model.matrices.copy(), model.inputs.copy(), model.constants.copy()
-    for part in (matrices[..., -1, -1], inputs[..., -1], constants[..., -1]):
-        part *= share
-    return replace(model, matrices=matrices, inputs=inputs, constants=constants)
+    rows = np.append(np.ones(model.matrices.shape[-1] - 1), share)
+    return replace(
+        model, matrices=model.matrices * rows[:, None], inputs=model.inputs * rows, constants=model.constants * rows
+    )

@@ -30,10 +30,11 @@ from orchestrator.estimation.filter.motion import (
     multiply,
     propagate,
     transition,
+    transitions,
 )
 
 SLOTS = DEFAULTS = "orchestrator.estimation.filter.motion"
-__all__ = ["advance_blurred", "propagate", "run_filter", "run_free", "transition"]
+__all__ = ["advance_blurred", "propagate", "run_filter", "run_free", "transition", "transitions"]
 
 Dry = Annotated[Any, ArrayKind(REAL, (2, 2))]
 

@@ -62,11 +62,11 @@ def affine_model(values: Sequence[float], impulse: float = 0.0, dry: Array = NO_
     matrices, constants = np.zeros((3, STATES, STATES)), np.zeros((3, STATES))
     zero = _unit(STATES)
     for flank in (-1, 0, 1):
-        base: tuple[float, ...] = rates(zero, flank, 0.0, 0.0, p, 0.0, 0.0)
-        constants[flank + 1] = base[:STATES]
+        constants[flank + 1] = rates(zero, flank, 0.0, 0.0, p, 0.0, 0.0)[:STATES]
+    for mode in (1, 2):
         for n in range(STATES):
-            moved = rates(_unit(n), flank, 0.0, 0.0, p, 0.0, 0.0)
-            matrices[flank + 1, :, n] = [moved[m] - base[m] for m in range(STATES)]
+            matrices[mode, :, n] = rates(_unit(n), mode - 1, 0.0, 0.0, p, 0.0, 0.0)[:STATES] - constants[mode]
+    matrices[0] = matrices[2]
     asked = rates(zero, 1, 0.0, 0.0, p, 1.0, 0.0)
     mobility = np.array([1.0 / p.J_m, 1.0 / p.J_l])
     inputs = _friction_inputs(np.array(asked[:STATES]) - constants[2], mobility)

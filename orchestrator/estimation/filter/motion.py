@@ -38,7 +38,7 @@ from orchestrator.estimation.filter.one_stage import (
 from orchestrator.estimation.filter.roots import first_root
 
 SLOTS = "orchestrator.estimation.filter.one_stage"
-__all__ = ["propagate", "transition"]
+__all__ = ["propagate", "transitions"]
 
 Three = Annotated[Any, ArrayKind(REAL, (3,))]
 
@@ -122,6 +122,14 @@ def transition(a: Matrix, b: Inputs, b_1: Vector, h: float, phi: Matrix, gain: I
             gain_1[r] += integral[r, c] * b_1[c]
             for n in range(3):
                 gain[n, r] += integral[r, c] * b[n, c]
+
+
+def transitions(
+    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, h: float, phi: ModeMatrices, gain: ModeInputs, gain_1: ModeVectors
+) -> None:
+    """Fill the transitions over ``h`` of all modes."""
+    for mode in range(MODES):
+        transition(mats[mode], b, b_1[mode], h, phi[mode], gain[mode], gain_1[mode])
 
 
 def _advance(phi: Matrix, gain: Inputs, gain_1: Vector, torques: Three, x: Vector, out: Vector) -> None:
