@@ -9,7 +9,7 @@ import numpy as np
 from orchestrator.estimation.cramer_rao import error_bound_of_fit
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import Fit, GapFit, Likelihood, inverse
-from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
+from orchestrator.estimation.problem import DRY, LEAST_TORQUE_NOISE
 from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import GapVerdictSettings
@@ -100,7 +100,8 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
         diagnostics, drive, likelihood.parameters(fit.point.theta).i, problem.record.size, settings
     )
     diagnostics["lacking"] = lacking
-    message = "; ".join(text for text in (message, lacking, torque_words(problem)) if text)
+    crawl = friction_note(fit, (high - low) / (2.0 * alpha)) if visible else ""
+    message = "; ".join(text for text in (message, lacking, torque_words(problem), crawl) if text)
     curves = {"states": kept.states, "contacts": contacts, "errors": kept.errors, "profile": curve}
     curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
     curves["model"] = likelihood.parameters(fit.point.theta)
@@ -173,6 +174,25 @@ def stillness_note(outputs: Array, noise: tuple[float, ...], settings: GapVerdic
                 f"noise, and must by {least:g}; `design` proposes an excitation"
             )
     return ""
+
+
+def friction_note(fit: GapFit, reach: float) -> str:
+    """Return the advice where much of the half-gap's variance is that of dry friction, or nothing.
+
+    Args:
+        reach: half of the interval over the half-gap.
+    """
+    settings, names = fit.likelihood.settings.verdict, fit.likelihood.problem.names
+    _, error, column = _gap_of(fit)
+    rest = [n for n, place in enumerate(fit.free) if names[place] not in DRY]
+    known = inverse(fit.information[np.ix_(rest, rest)])[rest.index(column), rest.index(column)]
+    share = 1.0 - float(known) / error**2
+    if share < settings.open_friction or reach < settings.worth_a_record:
+        return ""
+    return (
+        f"{100.0 * share:.0f} % of the half-gap's variance is dry friction, which the record hardly tells from the "
+        "gap: record a crawl in both directions too, and fit both records together"
+    )
 
 
 def _model_warning(

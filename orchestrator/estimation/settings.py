@@ -54,6 +54,12 @@ class GapVerdictSettings(Settings, frozen=True):
         float, setting("travel of the motor in standard deviations of its encoder's noise, below which nothing is seen")
     ] = 100.0
     least_travel_load: Annotated[float, setting("the same of the load, which moves by the gear ratio less")] = 30.0
+    open_friction: Annotated[
+        float, share("share of the half-gap's variance that is friction's, from which a crawl would tell them apart")
+    ] = 0.5
+    worth_a_record: Annotated[
+        float, share("half of the interval over the half-gap, from which that is worth another record")
+    ] = 0.01
     misfit_widening: Annotated[
         float, setting("factor on the interval where the model is not exact: what it lacks is not white", ge=1)
     ] = 1.3
