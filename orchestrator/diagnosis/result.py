@@ -1,5 +1,6 @@
 """What a diagnosis says: plain immutable values."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -89,6 +90,7 @@ class SignalMisfit:
         noise: standard deviation of its noise.
         nominal, parameters, final: rms of the model as given, re-fitted, and with its effects.
         r_squared: of the final model's free runs.
+        drift: rms by which the uncertainty of its values lets them drift; worked out where they miss.
     """
 
     signal: str
@@ -98,6 +100,7 @@ class SignalMisfit:
     parameters: float
     final: float
     r_squared: float = float("nan")
+    drift: float = 0.0
 
     @property
     def miss(self) -> float:
@@ -108,6 +111,11 @@ class SignalMisfit:
     def is_missed(self) -> bool:
         """Whether the final model misses the signal by more than its noise, as an engineer sees it."""
         return self.miss > NOTABLE
+
+    @property
+    def tells(self) -> bool:
+        """Whether it is missed by more than noise and the uncertainty of the values account for."""
+        return self.final > NOTABLE * math.hypot(self.noise, self.drift)
 
 
 @dataclass(frozen=True)

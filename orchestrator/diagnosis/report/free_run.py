@@ -7,6 +7,7 @@ five numbers against thousands of samples, for the nominal and the corrected mod
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,6 +195,35 @@ def free_runs(
         return min(runs, key=lambda run: float(np.sum((run.rms / signals.noise) ** 2)))
 
     return map_on_threads(run, list(parts))
+
+
+def drift_variance(
+    plant: Plant, p: Array, moved: Sequence[Array], signals: RunSignals, parts: Sequence[slice]
+) -> Array:
+    """Return the variance (channels,) [rad^2] that uncertain values give to free runs whose start is chosen anew.
+
+    Args:
+        p: values of the plant.
+        moved: the same, each moved along one axis of the values' uncertainty by one standard deviation.
+    """
+    model, places = Simulation(plant, p, signals), state_places(plant, p)
+    total = np.zeros(signals.channels)
+    for run, part in zip(free_runs(plant, p, signals, parts), parts, strict=True):
+        outputs = partial(_errors, model, part)
+        there, scale = outputs(run.start), np.tile(signals.noise, len(run.outputs))[:, None]
+        steps = _steps(plant, run.start, signals, places)
+        answers = _answers(outputs, run.start, there, places, steps, plant) / scale
+        drifts = [_errors(Simulation(plant, q, signals), part, run.start) - there for q in moved]
+        away = np.column_stack([drift.ravel() for drift in drifts]) / scale
+        # The start of a run lies closest to what was measured: what it can make up for is no drift.
+        away -= answers @ np.linalg.lstsq(answers, away, rcond=FADE)[0]
+        total += np.mean(np.sum(away.reshape(len(run.outputs), -1, len(moved)) ** 2, axis=2), axis=0)
+    return total / len(parts) * signals.noise**2
+
+
+def _errors(model: Simulation, part: slice, start: Array) -> Array:
+    """Return simulated minus measured angles (n, channels) of a run from a state."""
+    return (model.run(start, part) - model.measured[part])[:, : model.signals.channels]
 
 
 def start_guesses(plant: Plant, p: Array, signals: RunSignals, row: int) -> list[Array]:

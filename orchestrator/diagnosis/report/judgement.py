@@ -17,9 +17,12 @@ UNEXPLAINED = 0.1  # of the torque's power, a third of it in rms: a model that l
 
 def form_verdict(
     search: SearchResult, effects: Sequence[GradedEffect], dependences: Sequence[Dependence], record: RecordEvidence,
-    settings: DiagnosisSettings,
+    test: Sequence[TestMisfit], settings: DiagnosisSettings,
 ) -> str:  # fmt: skip
     """Return the verdict.
+
+    Args:
+        test: misfits on test data, with how far the values' uncertainty lets free runs drift.
 
     Returns:
         "effects": one at least is likely; "unknown": something is missing and nothing is likely; "none" or
@@ -31,7 +34,8 @@ def form_verdict(
     takes = [(one.t, one.gain) for one in (effect.evidence for effect in effects)]
     takes += [(one.t, one.gain) for one in (curve.comparison for curve in dependences)]
     strong = any(t >= settings.grades.likely_t and gain >= settings.grades.likely_gain for t, gain in takes)
-    if strong or not search.complete or record.left > UNEXPLAINED:
+    missed = any(signal.tells for one in test for signal in one.signals)
+    if strong or missed or not search.complete or record.left > UNEXPLAINED:
         return "unknown"
     return "none" if _nominal_explains(search) else "parameters"
 
@@ -66,7 +70,7 @@ def judge_trust(
         if one.is_worse(settings.report.worse, settings.report.of_noise):
             red.append(f"the final model predicts the test part of {one.source} worse than re-fitted parameters do")
         for signal in one.signals:
-            if signal.is_missed:
+            if signal.tells:
                 amber.append(
                     f"free runs on the test part of {one.source} miss {signal.signal} by "
                     f"{number_words(signal.miss)} times its noise{_of_motion(signal)}"

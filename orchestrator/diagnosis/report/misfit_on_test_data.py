@@ -11,7 +11,8 @@ from orchestrator.diagnosis.inference.fitting import ScoreComparison, compare_re
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.plant_effects import in_metres
 from orchestrator.diagnosis.model.torque_balance import balance_of
-from orchestrator.diagnosis.report.free_run import free_runs, run_parts
+from orchestrator.diagnosis.report.estimates import value_covariance
+from orchestrator.diagnosis.report.free_run import drift_variance, free_runs, run_parts
 from orchestrator.diagnosis.report.open_test_data import open_test_data, signals_for_runs, signals_of_test_data
 from orchestrator.diagnosis.report.simulation import RunSignals
 from orchestrator.diagnosis.result import Diagnosis, SignalMisfit, TestMisfit, Workings
@@ -72,6 +73,41 @@ def _misfit(workings: Workings, model: Model, record: Record, first: int, settin
     still = bool(np.all(np.ptp(signals.angles[first:], axis=0) < LEAST_TRAVEL * signals.noise))
     torque = () if still else torque_left(record.part(first, record.size), workings, model, settings)
     return TestMisfit(record.source, signals.size - first, rows, torque, still)
+
+
+def with_drift(
+    test: Sequence[TestMisfit], workings: Workings, model: Model, settings: ReportSettings
+) -> tuple[TestMisfit, ...]:
+    """Return misfits with how far the uncertainty of the final model's values lets free runs drift, where they miss."""
+    moved = _values_moved(workings)
+
+    def drifts(signals: RunSignals, first: int) -> list[float]:
+        parts = run_parts(first, signals.size, settings)
+        variance = drift_variance(model.plant, workings.final, moved, signals, parts)
+        return [float(one) for one in np.sqrt(variance)]
+
+    records = signals_of_test_data(workings.test_data, workings.balances[0])
+    return tuple(
+        replace(one, signals=tuple(map(_with_drift, one.signals, drifts(signals, first))))
+        if any(signal.is_missed for signal in one.signals)
+        else one
+        for (_, signals, first), one in zip(records, test, strict=True)
+    )
+
+
+def _with_drift(signal: SignalMisfit, drift: float) -> SignalMisfit:
+    return replace(signal, drift=drift)
+
+
+def _values_moved(workings: Workings) -> list[Array]:
+    """Return the final model's values, moved along each axis of their uncertainty by one standard deviation."""
+    problem, fitted = workings.search.problem, workings.search.final
+    sizes, axes = np.linalg.eigh(value_covariance(fitted))
+    moved = []
+    for size, axis in zip(sizes, axes.T, strict=True):
+        point = problem.move_point(fitted.point, fitted.coordinates, np.sqrt(max(size, 0.0)) * axis)
+        moved.append(workings.balances[0].physical_values(problem.record_points(point)[0]))
+    return moved
 
 
 def misfit_on_record(diagnosis: Diagnosis, record: Record) -> TestMisfit:
