@@ -19,13 +19,19 @@ from orchestrator.diagnosis.report.estimates import (
     add_test_evidence,
     find_drive_gain,
     interval_width,
+    open_to,
     parameter_estimates,
     report_effect,
     share_values,
 )
 from orchestrator.diagnosis.report.hidden_gap import HiddenGap, find_hidden_gap, gap_effects, gap_parameters
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
-from orchestrator.diagnosis.report.misfit_on_test_data import misfit_on_test_data, misses_of, torque_comparison
+from orchestrator.diagnosis.report.misfit_on_test_data import (
+    misfit_on_test_data,
+    misses_of,
+    torque_comparison,
+    with_drift,
+)
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
 from orchestrator.diagnosis.selection.evidence import (
     effect_evidence,
@@ -129,12 +135,17 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     workings, evidence, test = _test(workings, evidence, record, model, settings)
     while any(one.label in workings.search.final.labels for one in possible_effects(evidence, record, settings)):
         workings, evidence, test = _test(workings, evidence, record, model, settings)  # without what the test refutes
+    test = with_drift(test, workings, model, settings.report)
     result = workings.search
     labels = result.final.labels
     graded = tuple(
         _grade(result if one.label in labels else searched, one, record, model, settings, one.label in labels)
         for one in evidence
     )
+    if len(searched.final.labels) > len(labels):
+        with_possible = (_grade(searched, one, record, model, settings, True) for one in evidence)
+        pairs = zip(graded, with_possible, strict=True)
+        graded = tuple(open_to(one, other) if one.in_model else one for one, other in pairs)
     graded = share_values(graded, labels, model.plant)
     effects = tuple(sorted((effect for effect in graded if not effect.of_log), key=lambda effect: -effect.grade))
     parameters = parameter_estimates(result.problem, result.final, settings.report.level)
@@ -142,7 +153,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     remaining = _dependences(workings, model, settings)
     left = torque_shares(result.problem, result.final.point)
     record = replace(record, left=float(left.max()))  # that of the model as it is reported
-    verdict = form_verdict(result, graded, remaining, record, settings)
+    verdict = form_verdict(result, graded, remaining, record, test, settings)
     trust = judge_trust(verdict, graded, searched.searched, record, test, parameters, model.uncertain, settings)
     return Diagnosis(
         verdict=verdict, effects=effects, nuisances=_nuisances(result, graded, parameters, model, settings),

@@ -1,5 +1,6 @@
 """What is said of an axis: laws that a machine can have, names that test data refute, hints beside verdicts."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -12,9 +13,12 @@ from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.torque_balance import balance_of
+from orchestrator.diagnosis.report.estimates import open_to
+from orchestrator.diagnosis.report.free_run import drift_variance, free_runs, run_parts
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
+from orchestrator.diagnosis.report.open_test_data import signals_for_runs
 from orchestrator.diagnosis.report.summary import sureness, words_on_test_data
-from orchestrator.diagnosis.result import SignalMisfit
+from orchestrator.diagnosis.result import GradedEffect, SignalMisfit, ValueEstimate
 from orchestrator.diagnosis.result import TestMisfit as MisfitOnTest
 from orchestrator.diagnosis.selection.evidence import acts_one_way
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
@@ -47,13 +51,14 @@ def graded(grade: Grade, gain: float, t: float) -> Any:
     return SimpleNamespace(label="torque_ripple@motor", grade=grade, evidence=evidence)
 
 
-def verdict_of(*effects: Any, left: float = 1e-5) -> str:
+def verdict_of(*effects: Any, left: float = 1e-5, misses: SignalMisfit | None = None) -> str:
     fitted: Any = SimpleNamespace(point=ModelPoint((1.0,)), cost=0.0)
     problem = SimpleNamespace(
         shared=("slope",), start=ModelPoint((1.0,)), whiten_residuals=lambda points: [np.full(9, 10.0)]
     )
     search: Any = SimpleNamespace(problem=problem, final=fitted, complete=True)
-    return form_verdict(search, effects, (), replace(CLEAN, left=left), SETTINGS)
+    test = () if misses is None else (MisfitOnTest("record", 100, (misses,)),)
+    return form_verdict(search, effects, (), replace(CLEAN, left=left), test, SETTINGS)
 
 
 def test_a_hint_is_no_verdict() -> None:
@@ -156,6 +161,51 @@ def test_what_test_data_refute_is_not_in_the_corrected_model(tmp_path) -> None:
 def test_a_model_is_worse_by_its_torque_where_free_runs_drift(final, torque, still, worse) -> None:
     signal = SignalMisfit("theta_m", "rad", 0.01, 3.0, 1.0, final)
     assert MisfitOnTest("record", 100, (signal,), torque, still).is_worse(0.05, 0.1) is worse
+
+
+def test_a_miss_is_judged_by_noise_and_by_what_the_values_leave_open() -> None:
+    """A run that drifts no more than its values may be off tells nothing; one that drifts further does."""
+    tight, loose = (SignalMisfit("theta_m", "rad", 0.01, 3.0, 1.0, 0.06, drift=drift) for drift in (0.01, 0.02))
+    assert (tight.tells, loose.tells, loose.is_missed) == (True, False, True)
+    assert verdict_of(misses=tight) == "unknown"
+    assert verdict_of(misses=loose) == "parameters"
+
+
+def test_a_possible_name_widens_the_sizes_of_the_others() -> None:
+    """Two models of equal chance, 3 apart with errors of 1 and 2: the variance about the first is (1 + 4 + 9) / 2."""
+    one, other = (
+        GradedEffect(
+            "backlash", "shaft", Grade.LIKELY, (), {"alpha": ValueEstimate(v, e, (v - 2 * e, v + 2 * e), "rad")},
+            graded(Grade.LIKELY, 0.5, 9.0).evidence, {},
+        )
+        for v, e in ((5.0, 1.0), (8.0, 2.0))
+    )  # fmt: skip
+    wide = open_to(one, other).parameters["alpha"]
+    assert wide.value == 5.0
+    assert wide.standard_error == pytest.approx(math.sqrt(7.0))
+    assert wide.interval == pytest.approx((5.0 - 2.0 * math.sqrt(7.0), 5.0 + 2.0 * math.sqrt(7.0)))
+    assert open_to(other, replace(other)).parameters == other.parameters
+
+
+def test_the_drift_of_free_runs_is_what_values_off_make(model: Model) -> None:
+    """Against runs of a plant whose friction is drawn anew from its uncertainty, each from its closest start."""
+    p = np.array(values(model))
+    record = axis_record(list(p), 3, "axis")
+    found = diagnose(record, model)
+    signals = signals_for_runs(record, found.workings.balances[0])
+    parts, place = run_parts(record.size // 2, record.size, SETTINGS.report), model.plant.index("b")
+
+    def moved(by: float) -> np.ndarray:
+        return p + by * np.eye(p.size)[place]
+
+    (variance,) = drift_variance(model.plant, p, [moved(0.02)], signals, parts)
+    rng, own = np.random.default_rng(1), [run.outputs for run in free_runs(model.plant, p, signals, parts)]
+    drawn = []
+    for off in rng.standard_normal(30):
+        runs = free_runs(model.plant, moved(0.02 * off), signals, parts)
+        drawn.append(np.mean([np.mean((run.outputs - mine) ** 2) for run, mine in zip(runs, own, strict=True)]))
+    assert variance == pytest.approx(np.mean(drawn), rel=0.5)
+    assert variance > (0.1 * signals.noise[0]) ** 2
 
 
 def test_a_test_part_at_rest_says_nothing_of_an_effect(model: Model) -> None:

@@ -147,6 +147,26 @@ def report_effect(
     return GradedEffect(name, site, grade, lowered, estimates, evidence, blocks, in_model=in_model)
 
 
+def open_to(effect: GradedEffect, other: GradedEffect) -> GradedEffect:
+    """Return an effect whose sizes are as uncertain as two models leave them of which the record excludes neither.
+
+    Each has half the probability: the variance about the first one's value is half of either's second moment.
+
+    Args:
+        other: the same effect in the other model, which has an effect that is only possible too.
+    """
+
+    def widened(name: str, own: ValueEstimate) -> ValueEstimate:
+        there = other.parameters[name]
+        away = _wrap_phase(name, there.value - own.value)
+        variance = 0.5 * (own.standard_error**2 + there.standard_error**2 + away**2)
+        factor = max(math.sqrt(variance) / max(own.standard_error, 1e-300), 1.0)
+        low, high = (own.value + factor * (end - own.value) for end in own.interval)
+        return replace(own, standard_error=factor * own.standard_error, interval=(low, high))
+
+    return replace(effect, parameters={name: widened(name, own) for name, own in effect.parameters.items()})
+
+
 def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: Plant) -> tuple[GradedEffect, ...]:
     """Return effects with one value of each parameter that several have: both end stops are of one stiffness."""
     rows = {row.label: row.parameters for row in plant.bank}
