@@ -189,11 +189,10 @@ def test_a_possible_name_widens_the_sizes_of_the_others() -> None:
 
 def test_the_drift_of_free_runs_is_what_values_off_make(model: Model) -> None:
     """Against runs of a plant whose friction is drawn anew from its uncertainty, each from its closest start."""
-    p = np.array(values(model))
-    record = axis_record(list(p), 3, "axis")
-    found = diagnose(record, model)
-    signals = signals_for_runs(record, found.workings.balances[0])
-    parts, place = run_parts(record.size // 2, record.size, SETTINGS.report), model.plant.index("b")
+    p = model.plant.extend_values(values(model))
+    record = axis_record(values(model), 3, "axis")
+    signals = signals_for_runs(record, balance_of(record, model, SETTINGS))
+    parts, place = run_parts(record.size // 2, record.size, SETTINGS.report)[:1], model.plant.index("b")
 
     def moved(by: float) -> np.ndarray:
         return p + by * np.eye(p.size)[place]
