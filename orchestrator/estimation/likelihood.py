@@ -220,14 +220,19 @@ class FilterLikelihood(ABC, Generic[P]):
             return error.ravel(), spread.ravel()
 
         def run(n: int) -> tuple[Array, Array]:
-            error, spread = look(n, self.difference)
-            # A direction is scaled to an information of one. Much more is a contact that comes or goes within the step.
+            ahead = look(n, self.difference)
+            # A direction is scaled to an information of one. Much more is a contact that comes or goes within the step:
+            # it may not on the other side, or only where the point itself is, which two others then leave out.
             with np.errstate(all="ignore"):  # threads of a pool do not have the caller's
-                if float(error @ error) > JUMP:
-                    other = look(n, -self.difference)
-                    if 0.0 < float(other[0] @ other[0]) < float(error @ error):  # 0: beyond a bound
-                        return other
-            return error, spread
+                if not ahead[0] @ ahead[0] > JUMP:
+                    return ahead
+                back = look(n, -self.difference)
+                ways = [ahead, back, (0.5 * (ahead[0] + back[0]), 0.5 * (ahead[1] + back[1]))]
+                if not back[0].any():  # beyond a bound
+                    far = look(n, 2.0 * self.difference)
+                    ways = [ahead, far, (2.0 * far[0] - ahead[0], 2.0 * far[1] - ahead[1])]
+                sizes = [float(error @ error) for error, _ in ways]
+                return ways[int(np.argmin([size if size > 0.0 else math.inf for size in sizes]))]
 
         columns = list(self._pool.map(run, range(free.size)) if self._pool else map(run, range(free.size)))
         error = np.array([column[0] for column in columns])
