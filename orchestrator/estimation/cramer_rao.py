@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.filter.model import Array
+from orchestrator.estimation.information import inverse
 from orchestrator.estimation.joint import JointLikelihood
-from orchestrator.estimation.likelihood import GapFit, Likelihood, inverse
+from orchestrator.estimation.likelihood import GapFit, Likelihood
 from orchestrator.estimation.problem import ALPHA, STATE_NAMES, GapProblem, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record

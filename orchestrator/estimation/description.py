@@ -8,7 +8,8 @@ import numpy as np
 
 from orchestrator.estimation.cramer_rao import error_bound_of_fit
 from orchestrator.estimation.filter.model import Array
-from orchestrator.estimation.likelihood import Fit, GapFit, Likelihood, inverse
+from orchestrator.estimation.information import inverse
+from orchestrator.estimation.likelihood import Fit, GapFit, Likelihood
 from orchestrator.estimation.problem import DRY, LEAST_TORQUE_NOISE
 from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate

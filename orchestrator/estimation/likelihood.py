@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.filter.innovations import Innovations, innovations
 from orchestrator.estimation.filter.model import AffineModel, Array, NoiseLevels, affine_model
+from orchestrator.estimation.information import covariance_factor, inverse
 from orchestrator.estimation.problem import (
     DRY,
     IMPULSE,
@@ -35,7 +36,6 @@ from orchestrator.estimation.problem import (
     UnknownProblem,
 )
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
-from orchestrator.shared.inference.inverse import pseudo_inverse
 from pyfmu_sources.drivetrain.equations import NAMES, DrivetrainParameters
 
 JUMP = 100.0
@@ -254,17 +254,6 @@ class FilterLikelihood(ABC, Generic[P]):
         return basis
 
 
-def covariance_factor(information: Array) -> Array:
-    """Return a matrix (k, k) whose product with its transpose is the inverse of an information (k, k).
-
-    What the information hardly shows is bounded at 1e-13 of what it shows best.
-    """
-    diagonal = np.sqrt(np.diag(information))
-    values, vectors = np.linalg.eigh(information / np.outer(diagonal, diagonal))
-    values = np.maximum(values, 1e-13 * values[-1])
-    return np.asarray(vectors / np.sqrt(values) / diagonal[:, None])
-
-
 L = TypeVar("L", bound=FilterLikelihood[Any])
 
 
@@ -394,17 +383,3 @@ def _step(
         if damping > 1e6:
             break
     return point, damping
-
-
-def inverse(information: Array) -> Array:
-    """Return the inverse of an information matrix, scaled first because units differ by many powers of ten.
-
-    Args:
-        information: (k, k).
-
-    Returns:
-        Shape (k, k).
-    """
-    diagonal = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    scaled = information / np.outer(diagonal, diagonal)
-    return pseudo_inverse(scaled, hermitian=True) / np.outer(diagonal, diagonal)

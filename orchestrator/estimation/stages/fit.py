@@ -16,7 +16,8 @@ import numpy as np
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import block_variance
 from orchestrator.estimation.filter.model import Array
-from orchestrator.estimation.likelihood import Fit, Point, inverse, maximise
+from orchestrator.estimation.information import inverse
+from orchestrator.estimation.likelihood import Fit, Point, maximise
 from orchestrator.estimation.settings import StageSettings
 from orchestrator.estimation.stages.likelihood import StagesLikelihood
 from orchestrator.estimation.stages.problem import BODIES, SHARE, TOTAL, TWIST
