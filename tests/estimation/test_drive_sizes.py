@@ -6,9 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.description import friction_note
+from orchestrator.estimation.filter.innovations import Innovations
+from orchestrator.estimation.information import inverse
+from orchestrator.estimation.likelihood import Fit, Likelihood
 from orchestrator.estimation.methods import maximum_likelihood
-from orchestrator.estimation.problem import make_problem
+from orchestrator.estimation.problem import DRY, Unknown, make_problem
 from orchestrator.records.model_file import Model, default_model
 from orchestrator.records.record import Record, record_from_columns
 from tests.support.independent_plant import make_record
@@ -64,3 +67,37 @@ def test_a_difference_is_not_taken_beyond_a_bound() -> None:
     gradient, information, _ = likelihood.derivatives(likelihood.at(theta), np.arange(theta.size))
     assert np.isfinite(gradient).all()
     assert np.isfinite(information).all()
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_contact_that_hangs_on_a_point_is_no_information(inside: bool) -> None:
+    """All other points differ from this one by a jump, whichever way they lie; that tells nothing of any slope."""
+    problem = make_problem(*_weak(1.0))
+    start = problem.start
+    slopes = np.random.default_rng(1).normal(size=(problem.record.size, 2, start.size))
+    unknowns = [Unknown(u.name, u.mean, math.inf, 1.0, -math.inf if inside else u.mean) for u in problem.unknowns]
+
+    class Jumping(Likelihood):
+        def run(self, theta: np.ndarray, keep: bool = False) -> Innovations:
+            errors = slopes @ (theta - start) + 0.05 * bool(np.any(theta != start))
+            return Innovations(errors, np.ones_like(errors), np.empty(0), np.empty(0, dtype=np.int64))
+
+    likelihood = Jumping(replace(problem, unknowns=tuple(unknowns)))
+    information, expected = np.eye(start.size), np.einsum("rok,rol->kl", slopes, slopes)
+    for _ in range(3):
+        _, information, likelihood = likelihood.derivatives(likelihood.at(start), np.arange(start.size))
+    assert information == pytest.approx(expected, rel=0.01, abs=10.0)
+
+
+def test_friction_that_makes_up_the_interval_asks_for_a_crawl() -> None:
+    problem = make_problem(*_weak(1.0))
+    likelihood, free = Likelihood(problem), np.arange(len(problem.unknowns))
+    gap, dry = problem.index("alpha"), problem.index(DRY[0])
+    covariance = np.diag([u.scale**2 for u in problem.unknowns])
+    for correlation, advised in ((0.9, True), (0.5, False)):
+        covariance[gap, dry] = covariance[dry, gap] = correlation * math.sqrt(
+            covariance[gap, gap] * covariance[dry, dry]
+        )
+        fit = Fit(likelihood.at(problem.start), free, inverse(covariance), 1, True, likelihood)
+        assert ("record a crawl in both directions" in friction_note(fit, 0.02)) == advised
+        assert not friction_note(fit, 0.001)
