@@ -17,7 +17,7 @@ from orchestrator.diagnosis.fmu.record import FmuRecord
 from orchestrator.diagnosis.fmu.report import FmuDiagnosis, FmuWorkings, misfit_on_test_data, misses_of
 from orchestrator.diagnosis.fmu.residual_model import FmuResiduals, port_arguments
 from orchestrator.diagnosis.fmu.system import FmuSystem
-from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.inference.fitting import fit_model, value_covariance
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParameter
@@ -25,7 +25,6 @@ from orchestrator.diagnosis.report.estimates import (
     add_test_evidence,
     parameter_estimates,
     report_effect,
-    value_covariance,
 )
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.selection.evidence import (

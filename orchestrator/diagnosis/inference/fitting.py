@@ -68,6 +68,17 @@ class FittedModel:
         return np.asarray(blocks * np.outer(wider, wider))
 
 
+def value_covariance(fitted: FittedModel) -> Array:
+    """Return the covariance (coordinates, coordinates) of fitted values.
+
+    Returns:
+        That of white residuals, with each standard error at least what blocks differ by.
+    """
+    white, blocks = fitted.covariance, fitted.jackknife
+    wider = np.sqrt(np.maximum(np.diag(blocks) / np.maximum(np.diag(white), 1e-300), 1.0))
+    return np.asarray(white * np.outer(wider, wider))
+
+
 def jackknife_covariance(shifts: Array) -> Array:
     """Return the covariance (values, values) by how values move (blocks, values) when each block is left out."""
     off = shifts - shifts.mean(axis=0)

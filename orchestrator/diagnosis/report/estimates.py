@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, fit_model
+from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, fit_model, value_covariance
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import ModelPoint, Values
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, TestMisfit, ValueEstimate
@@ -114,17 +114,6 @@ def block_values(
     return {name: tuple(row[name] for row in rows) for name in rows[0]}
 
 
-def value_covariance(fitted: FittedModel) -> Array:
-    """Return the covariance (coordinates, coordinates) of fitted values.
-
-    Returns:
-        That of white residuals, with each standard error at least what blocks differ by.
-    """
-    white, blocks = fitted.covariance, fitted.jackknife
-    wider = np.sqrt(np.maximum(np.diag(blocks) / np.maximum(np.diag(white), 1e-300), 1.0))
-    return np.asarray(white * np.outer(wider, wider))
-
-
 def interval_width(problem: FitProblem, level: float) -> float:
     """Return half the width of an interval in standard errors."""
     return float(student.ppf(0.5 + 0.5 * level, problem.block_count - 1))
@@ -156,15 +145,15 @@ def open_to(effect: GradedEffect, other: GradedEffect) -> GradedEffect:
         other: the same effect in the other model, which has an effect that is only possible too.
     """
 
-    def widened(name: str, own: ValueEstimate) -> ValueEstimate:
+    def widen(name: str, first: ValueEstimate) -> ValueEstimate:
         there = other.parameters[name]
-        away = _wrap_phase(name, there.value - own.value)
-        variance = 0.5 * (own.standard_error**2 + there.standard_error**2 + away**2)
-        factor = max(math.sqrt(variance) / max(own.standard_error, 1e-300), 1.0)
-        low, high = (own.value + factor * (end - own.value) for end in own.interval)
-        return replace(own, standard_error=factor * own.standard_error, interval=(low, high))
+        away = _wrap_phase(name, there.value - first.value)
+        variance = 0.5 * (first.standard_error**2 + there.standard_error**2 + away**2)
+        factor = max(math.sqrt(variance) / max(first.standard_error, 1e-300), 1.0)
+        low, high = (first.value + factor * (end - first.value) for end in first.interval)
+        return replace(first, standard_error=factor * first.standard_error, interval=(low, high))
 
-    return replace(effect, parameters={name: widened(name, own) for name, own in effect.parameters.items()})
+    return replace(effect, parameters={name: widen(name, first) for name, first in effect.parameters.items()})
 
 
 def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: Plant) -> tuple[GradedEffect, ...]:

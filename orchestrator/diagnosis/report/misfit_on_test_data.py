@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
-from orchestrator.diagnosis.inference.fitting import ScoreComparison, compare_residuals
+from orchestrator.diagnosis.inference.fitting import ScoreComparison, compare_residuals, value_covariance
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.plant_effects import in_metres
 from orchestrator.diagnosis.model.torque_balance import balance_of
-from orchestrator.diagnosis.report.estimates import value_covariance
 from orchestrator.diagnosis.report.free_run import drift_variance, free_runs, run_parts
 from orchestrator.diagnosis.report.open_test_data import open_test_data, signals_for_runs, signals_of_test_data
 from orchestrator.diagnosis.report.simulation import RunSignals
@@ -79,7 +78,7 @@ def with_drift(
     test: Sequence[TestMisfit], workings: Workings, model: Model, settings: ReportSettings
 ) -> tuple[TestMisfit, ...]:
     """Return misfits with how far the uncertainty of the final model's values lets free runs drift, where they miss."""
-    moved = _values_moved(workings)
+    moved = _move_values(workings)
 
     def drifts(signals: RunSignals, first: int) -> list[float]:
         parts = run_parts(first, signals.size, settings)
@@ -99,7 +98,7 @@ def _with_drift(signal: SignalMisfit, drift: float) -> SignalMisfit:
     return replace(signal, drift=drift)
 
 
-def _values_moved(workings: Workings) -> list[Array]:
+def _move_values(workings: Workings) -> list[Array]:
     """Return the final model's values, moved along each axis of their uncertainty by one standard deviation."""
     problem, fitted = workings.search.problem, workings.search.final
     sizes, axes = np.linalg.eigh(value_covariance(fitted))
