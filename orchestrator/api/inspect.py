@@ -12,6 +12,7 @@ from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
 from orchestrator.api.shown import Block, doubts_of, text_table
+from orchestrator.diagnosis.data.records import check_whole
 from orchestrator.estimation.inspection.channels import (
     channels_of,
     delay_between,
@@ -25,6 +26,7 @@ from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.estimation.methods import two_encoders
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.estimation.zeros import set_zeros
+from orchestrator.records.checks import LARGEST_SHARE_MISSING
 from orchestrator.records.model_file import DEFAULT, Model, read_model
 from orchestrator.records.record import Record
 from orchestrator.shared.output import write_arrays
@@ -188,7 +190,9 @@ def inspect(
     if not isinstance(record, Record):
         columns, assumed = assume_columns(Path(record), columns, base.header)
         base = replace(base, columns=columns)
-    measured = as_record(record, base, torque_needed=False, part=part, resample=resample, rate=rate)
+    measured = _longest_part(
+        as_record(record, base, torque_needed=False, part=part, resample=resample, rate=rate, holes=True)
+    )
     machine, origin, more = _machine(measured, base, given=model is not None, sure=not assumed)
     assumed = (*assumed, *more)
     measured = set_zeros(measured, machine)
@@ -227,6 +231,17 @@ def draft_model(record: Path | str, model: Model | None = None, *, header: int |
     """
     base = read_model(None) if model is None else model
     return blank_starter(Path(record), base.columns, base.header if header is None else header, problem)
+
+
+def _longest_part(record: Record) -> Record:
+    """Return the longest part between holes where these are most of a record; else the record itself."""
+    part, parts = record, record.parts_between_holes()
+    if record.n_missing > LARGEST_SHARE_MISSING * record.size and len(parts) > 1:
+        part = max(parts, key=lambda one: one.size)
+        note = f"holes divide what was logged into {len(parts)} parts: the longest one is looked at, `diagnose` fits all"
+        part = replace(part, notes=(*part.notes, note))
+    check_whole(part)
+    return part
 
 
 def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Model, Mapping[str, str], tuple[str, ...]]:

@@ -26,6 +26,9 @@ def test_the_parts_between_long_holes_are_fitted_together() -> None:
         record_from_columns(table, "log")
     record = record_from_columns(table, "log", holes=True)
     assert [part.size for part in record.parts_between_holes()] == [600, 500]
+    seen = oc.inspect(record).record
+    assert seen.size == 600
+    assert any("2 parts: the longest one is looked at" in note for note in seen.notes)
     found = oc.diagnose(record, effects=EFFECTS).diagnosis
     assert any("2 parts, which are fitted together" in note for note in found.notes)
     for effect, name, true in zip(found.effects, ("alpha", "torque"), TRUE.values(), strict=True):
