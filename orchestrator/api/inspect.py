@@ -238,7 +238,9 @@ def _longest_part(record: Record) -> Record:
     part, parts = record, record.parts_between_holes()
     if record.n_missing > LARGEST_SHARE_MISSING * record.size and len(parts) > 1:
         part = max(parts, key=lambda one: one.size)
-        note = f"holes divide what was logged into {len(parts)} parts: the longest one is looked at, `diagnose` fits all"
+        note = (
+            f"holes divide what was logged into {len(parts)} parts: the longest one is looked at, `diagnose` fits all"
+        )
         part = replace(part, notes=(*part.notes, note))
     check_whole(part)
     return part

@@ -61,7 +61,9 @@ class SelectionSettings(Settings, frozen=True):
     least_gain: Annotated[float, share("of the squared error that an effect must take: no model is known better")] = (
         0.01
     )
-    effect_probability: Annotated[float, share("of an effect before the record is seen: half a one of a bank")] = 0.02
+    effect_probability: Annotated[
+        float, share("of an effect before the record is seen: of two subsets that do about as well, the smaller one")
+    ] = 0.001
     most_effects: Annotated[int, setting("of a model", ge=0)] = 6
     prior_deviations: Annotated[
         float, setting("of the model file that an effect may push a parameter to: beyond it is another machine")

@@ -49,6 +49,7 @@ class SearchResult:
         base: the model with re-fitted parameters alone, as the problem of its own time had it.
         alone: effects that were fitted alone on top of the base, by gain.
         reviews: label -> the step that it makes in the final model, with the family that it has there.
+        entries: label -> the step that it makes beside those effects alone that take more than it.
         searched: whether effects were looked for.
         complete: False when time ran out.
         asked: labels of effects that were asked for: they stay, whatever they gain.
@@ -59,6 +60,7 @@ class SearchResult:
     final: FittedModel
     alone: tuple[TriedEffect, ...] = ()
     reviews: Mapping[str, SearchStep] = field(default_factory=dict)
+    entries: Mapping[str, SearchStep] = field(default_factory=dict)
     searched: bool = False
     complete: bool = True
     asked: frozenset[str] = field(default_factory=frozenset)
@@ -128,7 +130,7 @@ class RecordEvidence:
 
 @dataclass(frozen=True)
 class EffectEvidence:
-    """What speaks for one effect: when it entered, or by what leaves with it, whichever is more.
+    """What speaks for one effect: beside those that take more than it, or beside all others, whichever is more.
 
     Attributes:
         t: paired gain over its standard error.

@@ -14,6 +14,7 @@ import numpy as np
 from orchestrator.diagnosis.inference.fitting import FittedModel, compare, fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
 from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.selection.evidence import size_over_error
 from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
 from orchestrator.diagnosis.selection.screening import Screening, start_of_fit
 from orchestrator.diagnosis.selection.settling import fit_base, settle_anew
@@ -27,6 +28,7 @@ ROUNDS = 4  # of the search at most
 KNOWN = 8  # subsets of the round before that are fitted anew
 ALONE = 8  # effects that are fitted alone on top of re-fitted parameters
 FITS = 24  # subsets that a round fits in full, at most
+SHOWN = 2.0  # sizes over their errors of an effect that the record shows
 TRIALS = 2  # in which an effect may be impossible
 RIVALS = 3  # fitted in an effect's place
 SURE = 3.0  # of the log score, by which an effect must be better than what stands in its place: odds of 20
@@ -166,7 +168,8 @@ class _Round:
         """
         alone = [subset for subset in self.ranked if len(subset) == 1 and not self.has]
         known = sorted(self.earlier, key=lambda subset: -self.score.score_fit(self.earlier[subset]))
-        first = [*(self.has - {label} for label in self.has), *known[:KNOWN], *alone[:ALONE]]
+        beside = [one for label in self.has for one in (self.has - {label}, *self.rivals(label))]
+        first = [*beside, *known[:KNOWN], *alone[:ALONE]]
         found, possible, impossible = {self.has: self.reference}, set(self.has), Counter[str]()
         for subset in dict.fromkeys([*first, *self.ranked]):
             if len(self.fits) > FITS or self.out_of_time():
@@ -176,12 +179,18 @@ class _Round:
             fitted = self.fit(subset)
             if fitted is None:
                 continue
-            bad = {label for label in subset if not self.problem.is_possible(label, fitted.point)}
+            bad = self.impossible(fitted)
             impossible.update(bad)
             possible |= subset - bad
-            if not bad and farthest_parameter(self.problem, fitted) < self.farthest:
+            if not bad and self.is_shown(fitted):
                 found[subset] = fitted
         return found
+
+    def rivals(self, label: str) -> list[Subset]:
+        """Return the most promising subsets with another effect in the place of one of the reference."""
+        others = self.has - {label}
+        rivals = [one for one in self.ranked if others < one and len(one) == len(self.has) and one != self.has]
+        return rivals[:RIVALS]
 
     def fit(self, subset: Subset) -> FittedModel | None:
         """Return a subset fitted from its best start: the reference's, the linear fit's, or an earlier round's."""
@@ -195,10 +204,15 @@ class _Round:
             self.fits[subset] = None if best is None else _fit(self.problem, starts[best])
         return self.fits[subset]
 
-    def is_allowed(self, fitted: FittedModel) -> bool:
-        """Tell whether a machine can have the effects of a model, and no parameter leaves the model file with them."""
-        possible = all(self.problem.is_possible(label, fitted.point) for label in fitted.labels)
-        return possible and farthest_parameter(self.problem, fitted) < self.farthest
+    def impossible(self, fitted: FittedModel) -> set[str]:
+        """Return the effects of a model that no machine can have so."""
+        return {label for label in fitted.labels if not self.problem.is_possible(label, fitted.point)}
+
+    def is_shown(self, fitted: FittedModel) -> bool:
+        """Tell whether the records show how large each effect is, and no parameter leaves the model file with them."""
+        return farthest_parameter(self.problem, fitted) < self.farthest and all(
+            size_over_error(self.problem, fitted, label) >= SHOWN for label in fitted.labels
+        )
 
     def tried(self, others: Subset) -> tuple[TriedEffect, ...]:
         """Return the effects that were fitted on top of some others, by gain."""
@@ -216,15 +230,35 @@ class _Round:
         """Return the result with what each effect of the final model gains there, and its family."""
         for label in result.final.labels:
             others = self.has - {label}
-            known = self.fit(others)
-            if known is None:
-                known = self.fits[others] = fit_model(self.problem, result.final.point.without_effects([label]), 0)
-            rivals = [one for one in self.ranked if others < one and len(one) == len(self.has) and one != self.has]
-            for subset in rivals[:RIVALS]:
+            known = self._fit_without(self.reference, label)
+            for subset in self.rivals(label):
                 self.fit(subset)
             step = SearchStep(known, self.tried(others), label)
             result = replace(result, reviews={**result.reviews, label: replace(step, family=self._family(step))})
-        return result
+        return replace(result, entries=self._entries())
+
+    def _fit_without(self, after: FittedModel, label: str) -> FittedModel:
+        """Return a model that lacks one effect of another one, fitted where the machine does not run away."""
+        others = frozenset(after.labels) - {label}
+        before = self.fit(others)
+        if before is None:
+            before = self.fits[others] = fit_model(self.problem, after.point.without_effects([label]), 0)
+        return before
+
+    def _entries(self) -> dict[str, SearchStep]:
+        """Return what each effect takes beside those that take more than it: in other company it may stand for them."""
+        entries, has = {}, self.has
+        while has:
+            after = self.fits[has]
+            assert after is not None
+            steps = []
+            for label in has:
+                before = self._fit_without(after, label)
+                steps.append(SearchStep(before, (TriedEffect(label, compare(before, after), after),), label))
+            last = min(steps, key=lambda step: step.before.score)
+            entries[last.taken] = last
+            has -= {last.taken}
+        return entries
 
     def _family(self, step: SearchStep) -> tuple[str, ...]:
         """Return the effects that the records do not tell from the one that a step took.
@@ -238,7 +272,7 @@ class _Round:
         most, none = chosen.fitted.score + least * step.before.score, self.score.score_fit(step.before)
         family = []
         for one in step.tried:
-            if one is chosen or not self.is_allowed(one.fitted):
+            if one is chosen or self.impossible(one.fitted) or not self.is_shown(one.fitted):
                 continue
             score, foreign = self.score.score_fit(one.fitted), self.problem.effects[one.label].kind != kind
             alike = foreign and one.fitted.score < most and one.comparison.gain >= least
