@@ -124,6 +124,17 @@ def test_families_are_those_of_the_final_model():
         assert not review.family
 
 
+def test_an_effect_counts_for_what_it_takes_beside_others_not_for_what_it_is_alone():
+    rng = np.random.default_rng(4)
+    ramp, large, own, noise = rng.standard_normal((4, 2000))
+    columns = {"a@motor": large, "b@motor": large + 0.3 * own}  # alone, the second one stands for most of the first
+    data = 1.1 * ramp + 4.0 * columns["a@motor"] + 0.05 * columns["b@motor"] + 0.03 * noise
+    found = search_effects(fit_problem([LinearModel(data, ramp, columns, 0.03)], FitSettings()), SETTINGS)
+    evidence = {one.label: one for one in effect_evidence(found)}
+    assert evidence["a@motor"].share > 0.9
+    assert evidence["b@motor"].share < 0.01
+
+
 def test_sizes_count_as_they_are_in_what_remains():
     problem = linear_problem({"a@motor": 0.4, "b@motor": 0.4})
     found = search_effects(problem, SETTINGS)
