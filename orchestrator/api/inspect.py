@@ -237,7 +237,7 @@ def _longest_part(record: Record) -> Record:
     """Return the longest part between holes where these are most of a record; else the record itself."""
     part, parts = record, record.parts_between_holes()
     if record.n_missing > LARGEST_SHARE_MISSING * record.size and len(parts) > 1:
-        part = max(parts, key=lambda one: one.size)
+        part = max(parts, key=lambda piece: piece.size)
         note = (
             f"holes divide what was logged into {len(parts)} parts: the longest one is looked at, `diagnose` fits all"
         )
