@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.inference.fitting import fit_model, size_over_error
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.report.summary import percent
-from orchestrator.diagnosis.selection.evidence import effect_evidence, leave_out_possible, size_over_error
+from orchestrator.diagnosis.selection.evidence import effect_evidence, leave_out_possible
 from orchestrator.diagnosis.selection.outcome import RecordEvidence
 from orchestrator.diagnosis.selection.screening import products_with_waves
 from orchestrator.diagnosis.selection.search import search_effects

@@ -203,6 +203,19 @@ def leave_blocks_out(
     return held_out, shifts
 
 
+def size_over_error(problem: FitProblem, fitted: FittedModel, label: str) -> float:
+    """Return the sizes of an effect over their errors, blocks' disagreement included."""
+    effect = problem.effects[label]
+    places = [fitted.coordinates.index((label, n)) for n in effect.sizes if (label, n) in fitted.coordinates]
+    if not places:
+        return 0.0
+    values = fitted.point.effects[label]
+    sizes = np.array([values[fitted.coordinates[n][1]] / effect.scales[fitted.coordinates[n][1]] for n in places])  # type: ignore[index]
+    covariance = (fitted.jackknife + fitted.covariance)[np.ix_(places, places)]
+    square = sizes @ np.linalg.lstsq(covariance + 1e-12 * np.eye(len(places)), sizes, rcond=1e-10)[0]
+    return float(np.sqrt(max(square, 0.0) / len(places)))
+
+
 def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
     """Return the problem with the prior weighed by how much more blocks differ than white residuals do."""
     places = [

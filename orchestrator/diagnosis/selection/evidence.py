@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.inference.fitting import FittedModel, fit_model
+from orchestrator.diagnosis.inference.fitting import FittedModel, fit_model, size_over_error
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint
@@ -138,19 +138,6 @@ def torque_shares(problem: FitProblem, point: ModelPoint) -> Array:
         ]
         shares.append(np.mean(power[0] ** 2, axis=1) / (np.mean(power[1] ** 2, axis=1) + 1e-300))
     return np.asarray(np.mean(shares, axis=0))
-
-
-def size_over_error(problem: FitProblem, fitted: FittedModel, label: str) -> float:
-    """Return the sizes of an effect over their errors, blocks' disagreement included."""
-    effect = problem.effects[label]
-    places = [fitted.coordinates.index((label, n)) for n in effect.sizes if (label, n) in fitted.coordinates]
-    if not places:
-        return 0.0
-    values = fitted.point.effects[label]
-    sizes = np.array([values[fitted.coordinates[n][1]] / effect.scales[fitted.coordinates[n][1]] for n in places])  # type: ignore[index]
-    covariance = (fitted.jackknife + fitted.covariance)[np.ix_(places, places)]
-    square = sizes @ np.linalg.lstsq(covariance + 1e-12 * np.eye(len(places)), sizes, rcond=1e-10)[0]
-    return float(np.sqrt(max(square, 0.0) / len(places)))
 
 
 def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float]:

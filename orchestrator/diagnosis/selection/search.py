@@ -11,10 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from orchestrator.diagnosis.inference.fitting import FittedModel, compare, fit_model
+from orchestrator.diagnosis.inference.fitting import FittedModel, compare, fit_model, size_over_error
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
 from orchestrator.diagnosis.model.interface import ModelPoint
-from orchestrator.diagnosis.selection.evidence import size_over_error
 from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
 from orchestrator.diagnosis.selection.screening import Screening, start_of_fit
 from orchestrator.diagnosis.selection.settling import fit_base, settle_anew
