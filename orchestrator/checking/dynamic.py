@@ -23,11 +23,11 @@ from orchestrator.checking.probing import (
     probes_misuse,
     probes_promises,
     probes_reference,
-    probes_restore,
     probes_states,
     probes_steps,
     probes_values,
     relations,
+    returns,
     trajectory,
 )
 from orchestrator.checking.probing.binding import Library
@@ -75,8 +75,8 @@ _PROBES: dict[str, probes.Probe] = {
     "setting": probes_driven.setting,
     "values": probes_values.values,
     "instances": relations.instances,
-    "reset": probes_restore.reset,
-    "state": probes_restore.state,
+    "reset": returns.reset,
+    "state": returns.state,
     "variable steps": probes_steps.variable_steps,
     "inner steps": probes_steps.inner_steps,
     "time": probes_steps.own_time,

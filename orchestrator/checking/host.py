@@ -7,6 +7,7 @@ own to choose anyway.
 import ctypes
 import sys
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from typing import Any, NamedTuple
 
@@ -291,6 +292,11 @@ class Host:
         status = self._status(function, self._instances[instance][0], *values)
         found = [read() for _, read in made if read is not None]
         return Returned(status, found, self._messages, self._errors, self._left)
+
+    def call_in_thread(self, instance: int, function: str, arguments: Sequence[Sequence[Any]]) -> Returned:
+        """Call a function in a thread of its own, which has ended then."""
+        with ThreadPoolExecutor(1) as thread:
+            return thread.submit(self.call, instance, function, arguments).result()
 
     def calls(self, instance: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]) -> list[Returned]:
         """Call several functions, up to the first that returns neither OK nor Warning.

@@ -137,6 +137,7 @@ NOT_IN_THE_CORPUS = {
     "log.effect",
     "misuse.clock",
     "model.vendor-annotation",
+    "partition.thread",
     "path.letters",
     "process.environment",
     "process.settings",

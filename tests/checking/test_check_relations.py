@@ -32,6 +32,7 @@ FAULTS = (
     ("3 CS", "sets_environment", "life cycle", "process.environment"),
     ("3 CS", "leaves_threads", "memory", "resources.leak"),
     ("se", "crosses_partitions", "clocks", "clock.inactive-change"),
+    ("se", "thread_memory", "determinism", "partition.thread"),
     ("se", "any_clock", "clocks", "misuse.clock"),
     ("se", "ends_at_zero", "values", "value.kept"),
     ("se", "rounds_down", "life cycle", "process.settings"),

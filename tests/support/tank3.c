@@ -19,6 +19,7 @@ static void say(I*i,fmi3Status s,const char*cat,const char*m){ if(i->log&&(i->lo
 static fmi3Status bad(I*i,const char*m){ say(i,fmi3Error,"logStatusError",m); return fmi3Error; }
 static void start(I*i){ Vals*v=&i->v; memset(v,0,sizeof *v); v->h=0.2;v->k=2;v->g=3;v->u=1;v->sel=1;v->scale=i->scale0;strcpy(v->label,"tank");v->next=0.25;v->uf=1; v->blob[0]=1; v->nblob=1; v->echo[0]=1; v->necho=1;
 }
+static _Thread_local int begun;
 #ifdef FAULT_leaves_threads
 static void*idle(void*x){ for(;;) usleep(100000); return 0; }
 #endif
@@ -36,7 +37,7 @@ static I*make(const char*name,const char*tok,const char*res,int logging,fmi3Inst
 #ifdef FAULT_leaves_threads
   pthread_create(&i->th,0,idle,0); pthread_detach(i->th);
 #endif
-  start(i); say(i,OK,"logStatusOK","instantiated"); return i; }
+  begun=1; start(i); say(i,OK,"logStatusOK","instantiated"); return i; }
 const char*fmi3GetVersion(void){return "3.0";}
 fmi3Instance fmi3InstantiateModelExchange(fmi3String n,fmi3String t,fmi3String r,fmi3Boolean v,fmi3Boolean l,fmi3InstanceEnvironment e,fmi3LogMessageCallback m){
 #ifdef SE
@@ -186,6 +187,9 @@ fmi3Status fmi3DoStep(fmi3Instance c,fmi3Float64 t,fmi3Float64 hh,fmi3Boolean ns
 fmi3Status fmi3ActivateModelPartition(fmi3Instance c,fmi3ValueReference r,fmi3Float64 t){ I*i=c; Vals*v=&i->v; if(i->mode!=ACT) return bad(i,"wrong state");
   if(i->lock) i->lock();
   v->time=t;
+#ifdef FAULT_thread_memory
+  if(!begun) v->uf=0;
+#endif
   if(r==17){ v->c++; v->sum+=v->uf;
 #ifdef FAULT_crosses_partitions
     if(v->c%3==0) v->cs++;

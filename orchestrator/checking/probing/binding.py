@@ -103,6 +103,8 @@ class Library:
         self.epoch = 0
         self.messages: list[str] = []
         self.errors = 0
+        self.threaded = False
+        """Whether each call is done in a thread of its own."""
         self.logged: list[tuple[list[str], int]] = []
         """Messages and number of errors of each call that was done last in one go."""
         self._changed: set[str] = set()
@@ -177,7 +179,8 @@ class Library:
 
     def raw(self, number: int, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
         """Call a function of an instance; return its status and what its output arguments hold."""
-        answer = self._ask(Returned, function, "call", number, function, arguments)
+        how = "call_in_thread" if self.threaded else "call"
+        answer = self._ask(Returned, function, how, number, function, arguments)
         return self._check_answer(answer, function, arguments)
 
     def _check_answer(

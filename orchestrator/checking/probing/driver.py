@@ -28,6 +28,7 @@ class Habits:
         again: the discrete states are updated once more than the FMU asks for.
         completes: completed steps of the integrator are told.
         judges_first: event indicators are read before the derivatives.
+        threads: each partition is activated in a thread of its own, as tasks of an operating system are.
     """
 
     quiet: bool = False
@@ -36,6 +37,7 @@ class Habits:
     again: bool = False
     completes: bool = True
     judges_first: bool = False
+    threads: bool = False
 
 
 Report = Callable[..., None]

@@ -6,7 +6,6 @@ from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.rules import declare
-from orchestrator.errors import ChildError
 
 declare("""
 [end]
@@ -23,11 +22,11 @@ _NEAR = 1e-6
 
 
 def ending(context: Context) -> None:
-    """After the end values can still be read, and a reset leads to another life."""
-    bench, job = context.bench, context.bench.job
+    """After the end values can still be read."""
+    job = context.bench.job
     variables = [v for v in job.variables if not v.clocks and v.base != "Clock" and v.causality == "output"]
     firsts = list({v.base: v for v in reversed(variables)}.values())
-    with bench.instance() as driver:
+    with context.bench.instance() as driver:
         _steps(context, driver)
         driver.terminate()
         for v in firsts:
@@ -36,40 +35,6 @@ def ending(context: Context) -> None:
             except StatusError as error:
                 context.report("ended.get", str(error), v.name)
                 break
-    if not context.resets:
-        return
-    with bench.instance() as driver:
-        _steps(context, driver)
-        driver.terminate()
-        try:
-            driver.reset()
-            bench.begin(driver)
-            _steps(context, driver)
-        except StatusError as error:
-            context.report("run.reset", f"{error}, after Terminate and Reset")
-            return
-    _reset_early(context)
-
-
-def _reset_early(context: Context) -> None:
-    """An instance can be reset before and in initialisation mode too, and then lives on."""
-    bench, job = context.bench, context.bench.job
-    for entered, moment in ((False, "of a new instance"), (True, "in initialisation mode")):
-        try:
-            with bench.instance(initialised=False) as driver:
-                if entered:
-                    driver.enter_initialisation(job.start, job.stop)
-                driver.reset()
-                bench.begin(driver)
-                _steps(context, driver)
-        except StatusError as error:
-            context.report("run.reset", f"{error}, after a Reset {moment}")
-            return
-        except ChildError as error:
-            text = f"a Reset {moment} must lead to a new life, but {error} during {bench.library.current or 'a step'}"
-            context.report("run.reset", text)
-            bench.library.renew()
-            return
 
 
 def _steps(context: Context, driver: Driver) -> None:

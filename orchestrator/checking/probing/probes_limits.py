@@ -7,7 +7,7 @@ from typing import Any
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.movement import Values
 from orchestrator.checking.probing.probes import Context
-from orchestrator.checking.probing.probes_restore import readable
+from orchestrator.checking.probing.returns import readable
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.values import by_variable, equal, values_text
 from orchestrator.checking.probing.variables import ProbedVariable

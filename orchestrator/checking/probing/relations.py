@@ -25,6 +25,7 @@ value.order | E | 2.1.7 | 2.2.7.2 | values can be set and read one by one or tog
 event.idle | E | 3.2.2 | 2.3.5 | event mode that is entered without a cause changes nothing | ask whether an event is due before something is changed
 event.again | E | 3.2.2 | 2.3.5 | once the discrete states need no update, one more changes nothing | change them where their conditions are fulfilled alone
 promise.completed-step | E | 3.3.1 | 3.4 | completed steps need not be told where the flag says so | do in event mode what depends on them, or correct the flag
+partition.thread | E | - | 5.2.1 | a partition can be activated in a thread of its own | keep what a partition needs in the instance, not in memory of a thread
 value.sequence | E | 3.2.1 | 3.2.1 | derivatives and event indicators can be read in any order | compute both from what was set last
 
 [instances]
@@ -83,6 +84,10 @@ VARIATIONS = (
         Habits(judges_first=True), "value.sequence",
         "a run must be the same when event indicators are read before the derivatives",
         lambda job: _exchanges(job) and bool(job.state_variables) and job.indicators != 0,
+    ),
+    Variation(
+        Habits(threads=True), "partition.thread", "a run must be the same when each partition has a thread of its own",
+        lambda job: job.interface == "ScheduledExecution",
     ),
 )  # fmt: skip
 

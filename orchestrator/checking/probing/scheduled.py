@@ -33,7 +33,11 @@ class ScheduledExecution(EventDriver):
             now = self.next_instant(end)
             for clock in self.due(now):
                 at = f"for the clock `{clock.name}` at t = {now:g}"
-                self.call("ActivateModelPartition", ("uint32", clock.reference), ("double", now), when=at)
+                self.library.threaded = self.habits.threads
+                try:
+                    self.call("ActivateModelPartition", ("uint32", clock.reference), ("double", now), when=at)
+                finally:
+                    self.library.threaded = False
                 self._hold({clock.reference}, at)
                 self._advance_clocks([clock], now)
         _, locks = self.library.updates()
