@@ -160,12 +160,13 @@ def _probe_partitions(context: Context) -> None:
     for clock in clocks:
         others = [v for v in outputs if clock.reference not in v.clocks]
         with bench.instance() as driver:
+            bench.run(driver, 0, min(_FEW_TICKS, job.steps), read=False)
             try:
                 before = [driver.get([v]) for v in others]
             except StatusError:
                 break  # an FMU may refuse to be read where no clock ticks
             for n in range(_FEW_TICKS):
-                t = job.start + n * (clock.interval or job.step)
+                t = job.start + _FEW_TICKS * job.step + n * (clock.interval or job.step)
                 driver.call("ActivateModelPartition", ("uint32", clock.reference), ("double", t))
             for v, a in zip(others, before, strict=True):
                 if not equal(v, b := driver.get([v]), a):

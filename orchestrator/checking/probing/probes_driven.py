@@ -29,7 +29,8 @@ _PATIENCE = 4.0  # budgets of a run for finding what an FMU takes
 _DEAR = 3.0  # times what a run from the values of the file costs: a driven one that costs more has fewer steps
 _CHEAP = 0.05  # s: what costs less is never dear
 _FEWEST_STEPS = 25
-_NEARER = (18, 19)  # of the values of ``moved``: a tenth as far as the first, on both sides
+_NEARER = ((18, False), (19, False), (18, True))
+"""Of the values of ``moved``, a tenth as far as the first, on both sides; then numbers alone."""
 _NEARER_SHARE = 0.1
 
 
@@ -129,11 +130,11 @@ class _Search:
         chosen = list(bench.movement.values)
         far = bench.movement, context.trace, context.plain
         lacking = self._still()
-        for which in _NEARER if lacking else ():
+        for which, numbers in _NEARER if lacking else ():
             if self.budget.over or self.crashes:
                 break
             before = bench.movement, context.trace, self.seconds
-            if self._works(chosen, None, which) and len(still := self._still()) < len(lacking):
+            if self._works(chosen, None, which, numbers) and len(still := self._still()) < len(lacking):
                 lacking = still
             else:
                 bench.movement, context.trace, self.seconds = before
@@ -168,16 +169,20 @@ class _Search:
         half = len(group) // 2
         return self._add(self._add(accepted, group[:half]), group[half:])
 
-    def _works(self, variables: Sequence[ProbedVariable], steps: int | None = None, which: int = 0) -> bool:
+    def _works(
+        self, variables: Sequence[ProbedVariable], steps: int | None = None, which: int = 0, numbers: bool = False
+    ) -> bool:
         """Whether a run can be done while these variables are moved: a whole one, or its first ``steps``.
 
         Args:
             which: of the values that ``moved`` knows.
+            numbers: whether floating point numbers alone are others at the start; inputs still switch in the run.
         """
         self.trials += 1
         bench = self.bench
         values = {v: x for v in variables if (x := moved(v, v.start or (), which)) is not None}
         switched = tuple(v for v in values if v.causality == "input" and not (v.real and v in bench.job.inputs()))
+        values |= {v: v.start or () for v in values if numbers and not v.real}
         bench.movement = Movement(values, switched if bench.excited else (), _NEARER_SHARE if which else 1.0)
         began = bench.library.process.jail.processor_time()
         try:

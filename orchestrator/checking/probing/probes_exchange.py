@@ -87,8 +87,12 @@ def _is_back(context: Context, driver: ModelExchange, rates: Sequence[float], wh
     return False
 
 
-def judge_completed_step(context: Context, point: RestPoint) -> None:
-    """A completed step that leads to no event leaves the derivatives as they are; the run ends with this."""
+def judge_completed_step(context: Context, point: RestPoint, others: Sequence[float]) -> None:
+    """A completed step that leads to no event leaves the derivatives as they are; the run ends with this.
+
+    Args:
+        others: a vector of states other than that of the last completed step.
+    """
     driver = point.driver
     assert isinstance(driver, ModelExchange)
     t = point.time + _LATER * context.bench.job.step
@@ -96,9 +100,12 @@ def judge_completed_step(context: Context, point: RestPoint) -> None:
         return
     try:
         driver.call("SetTime", ("double", t))
+        driver.set_continuous_states(others)
         before, signs = driver.rates(), driver.signs()
         if any(driver.complete_step()) or signs != driver.memory["signs"]:
             return
+        if driver.continuous_states() != list(others):
+            return  # an FMU that brings states back to where they may be says so elsewhere
         after = driver.rates()
     except StatusError:
         return  # the states of this point need not be possible at a later time

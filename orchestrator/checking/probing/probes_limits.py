@@ -83,9 +83,9 @@ def _extremes(v: ProbedVariable) -> Iterator[Any]:
 
 
 def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
-    """Parameters that are set in initialisation mode have the effect that they have when they are set before it."""
+    """What is set after a look at the values of initialisation mode has the effect that it has when set before."""
     bench, job = context.bench, context.bench.job
-    chosen = [v for v in movement if v.causality == "parameter"]
+    chosen = [v for v in movement if v.causality in ("parameter", "input")]
     if not chosen or context.trace is None:
         return
     watch = [v for v in readable(job) if v.base != "Binary"]
@@ -120,7 +120,7 @@ def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Value
         names = ", ".join(f"`{v.name}`" for v in off[:_MOST_NAMED]) + (" and others" if off[_MOST_NAMED:] else "")
         verb = "differs" if len(off) == 1 else "differ"
         rule = "value.kept" if any(v in chosen for v in off) else "value.stale"
-        text = "parameters that are set in initialisation mode must act as those that are set before it"
+        text = "what is set after a look at values in initialisation mode must act as what is set before"
         context.report(rule, f"{text}, but {names} {verb}{when}", off[0].name)
         context.remarked.add(rule)
 

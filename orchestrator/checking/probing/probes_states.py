@@ -57,7 +57,7 @@ def _exchange(context: Context) -> None:
             if not judge_following(context, last, _others(driver, variables)):
                 return
         if last is not None:
-            judge_completed_step(context, last)
+            judge_completed_step(context, last, _others(driver, variables))
 
 
 def _others(driver: ModelExchange, variables: Sequence[ProbedVariable]) -> list[float]:

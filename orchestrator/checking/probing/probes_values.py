@@ -1,6 +1,7 @@
 """The probe of values: what is set is kept, and what follows from it follows at once."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
@@ -41,14 +42,14 @@ def values(context: Context) -> None:
     if job.interface == "ScheduledExecution":
         raise SkippedError("the interface has no communication points")
     judge_batches(context)
-    if not _kept_before(context, movement):
-        return
+    with context.away() if context.far is not None else nullcontext():
+        if not _kept_before(context, bench.movement.values):
+            return
     judge_limits(context, movement)
     judge_late_setting(context, movement)
     try:
         _kept_between(context, movement)
         _kept_at_limits(context)
-        _follow_inputs(context, movement)
     except StatusError:
         return  # not every FMU takes values at every point; what must be taken has been set before
     _calculated(context, movement)
@@ -144,7 +145,12 @@ def _set_between(context: Context, chosen: list[ProbedVariable]) -> Followers | 
             if not _takes(context, driver, wanted, t):
                 return None
             found = by_variable(list(wanted), driver.read(list(wanted)))
-            if _judge(context, wanted, found, "at a communication point", "value.lags"):
+            rule = "value.lags"
+            if steps < job.steps and any(not equal(v, found[v], x) for v, x in wanted.items()):
+                driver.advance(t, job.step)  # what is there then was late; what is not is lost
+                later = by_variable(list(wanted), driver.read(list(wanted)))
+                rule = "value.lags" if all(equal(v, later[v], x) for v, x in wanted.items()) else "value.kept"
+            if _judge(context, wanted, found, "at a communication point", rule):
                 return None
             if steps <= _FEW_STEPS and not seen[1]:
                 seen = _followers(context, driver, wanted)
@@ -216,40 +222,11 @@ def _follow_tunable(
         bench.place(other, inputs=True)
         other.exit_initialisation()
         wanted = by_variable(followers, other.read(followers))
-    _report_stale(context, wanted, now, "when a tunable parameter is set at a communication point")
-
-
-def _follow_inputs(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
-    """What is read in initialisation mode follows what was set last, not what was set first."""
-    bench, job = context.bench, context.bench.job
-    causalities = ("output", "calculatedParameter")
-    followers = [v for v in distinct(job.variables) if v.causality in causalities and not v.clocks]
-    followers = [v for v in followers if v.base not in ("Clock", "Binary") and not v.extents][:_MOST]
-    inputs = [v for v in movement if v.causality == "input"]
-    if not followers or not inputs:
-        return
-    rows = []
-    for first in (True, False):
-        with bench.instance(initialised=False) as driver:
-            bench.place(driver, inputs=False)
-            driver.enter_initialisation(job.start, job.stop)
-            if first:
-                driver.read(followers, "in initialisation mode")
-            bench.place(driver, inputs=True)
-            rows.append(by_variable(followers, driver.read(followers, "in initialisation mode")))
-    _report_stale(context, rows[1], rows[0], "when an input is set after it was read in initialisation mode")
-
-
-def _report_stale(
-    context: Context,
-    wanted: Mapping[ProbedVariable, Sequence[Any]],
-    now: Mapping[ProbedVariable, Sequence[Any]],
-    when: str,
-) -> None:
     for v, expected in wanted.items():
         if not equal(v, now[v], expected, _SAME):
-            values_shown = f"is {values_text(now[v])} instead of {values_text(expected)}"
-            context.report("value.stale", f"`{v.name}` must follow {when}, but {values_shown}", v.name)
+            text = f"`{v.name}` must follow when a tunable parameter is set at a communication point"
+            shown = f"is {values_text(now[v])} instead of {values_text(expected)}"
+            context.report("value.stale", f"{text}, but {shown}", v.name)
 
 
 def _calculated(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:

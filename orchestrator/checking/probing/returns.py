@@ -34,6 +34,7 @@ state.free | W | 2.1.8 | 2.2.7.4 | freeing a state sets it to null | set the poi
 _AMPLIFIED = 100.0
 _MOST_INEXACT = 1e-2
 _FEW_STEPS = 5
+_FEWEST_AFTER = 2  # steps after a saved state
 _MOST_READ = 1000
 _LARGEST = 1000  # elements of an array
 _EQUAL = 1e-9
@@ -127,13 +128,27 @@ def _run(share: float, ended: bool = False) -> Way:
     return go
 
 
-RESETS: tuple[tuple[str, Way], ...] = (
-    ("in mid-run", _run(0.5)),
-    ("after Terminate", _run(1.0, ended=True)),
-    ("that is new", lambda context, driver: None),
-    ("in initialisation mode", _begin),
+@dataclass(frozen=True)
+class Reset:
+    """A reset, which leads back to the first point.
+
+    Attributes:
+        what: an instance that it is done to, in words.
+        go: how a new instance gets there.
+        early: whether no run has begun; an FMU that breaks on it can still be looked at otherwise.
+    """
+
+    what: str
+    go: Way
+    early: bool = False
+
+
+RESETS = (
+    Reset("an instance that is reset in mid-run", _run(0.5)),
+    Reset("an instance that is reset after Terminate", _run(1.0, ended=True)),
+    Reset("a new instance that is reset", lambda context, driver: None, early=True),
+    Reset("an instance that is reset in initialisation mode", _begin, early=True),
 )
-"""Where an instance is reset, in words, and how it gets there."""
 
 
 def reset(context: Context) -> None:
@@ -142,29 +157,27 @@ def reset(context: Context) -> None:
     if context.plain is None:
         raise SkippedError(NOT_COMPARABLE)
     fresh = RunPoint(0, *_fresh_values(context, readable(job)), context.plain)
-    for moment, go in RESETS:
-        what = (
-            f"an instance {moment} that is reset" if moment == "that is new" else f"an instance that is reset {moment}"
-        )
+    for way in RESETS:
+        failed = ""
         try:
             with bench.instance(initialised=False) as driver:
-                go(context, driver)
+                way.go(context, driver)
                 driver.reset()
                 bench.begin(driver, moved=False)
-                is_back = _is_back(context, fresh, driver, "run.reset", what)
+                last = min(_FEW_STEPS, job.steps) if way.early else None
+                if not _is_back(context, fresh, driver, "run.reset", way.what, last):
+                    return
                 driver.terminate()
         except StatusError as error:
-            context.resets = False
-            context.report("run.reset", f"{what} must lead another life, but {error}")
-            return
+            context.resets = way.early
+            failed = str(error)
         except ChildError as error:
-            if go not in (_begin, RESETS[2][1]):
+            if not way.early:
                 raise
-            text = f"{what} must lead another life, but {error} during {bench.library.current or 'a step'}"
-            context.report("run.reset", text)
+            failed = f"{error} during {bench.library.current or 'a step'}"
             bench.library.renew()
-            return
-        if not is_back:
+        if failed:
+            context.report("run.reset", f"{way.what} must lead another life, but {failed}")
             return
     _reset_sizes(context)
 
@@ -212,7 +225,7 @@ def state(context: Context) -> None:
         raise SkippedError(NOT_COMPARABLE)
     if not job.saves:
         raise SkippedError("states cannot be saved, as the flags say")
-    half = max(job.steps // 2, 1) if job.steps > 1 else 0
+    half = _telling_step(context.trace)
     data, memory = b"", dict[str, Any]()
     with bench.instance() as driver:
         try:
@@ -240,6 +253,16 @@ def state(context: Context) -> None:
             context.report(error.rule or "state.status", str(error))
     if data:
         _restore_elsewhere(context, later, data, memory)
+
+
+def _telling_step(trace: Sequence[Sequence[Any]]) -> int:
+    """How many steps to do before a state is saved: about half, where most that is no number has changed."""
+    half, last = len(trace) // 2, max(len(trace) - _FEWEST_AFTER, len(trace) // 2)
+    changed = {
+        n: sum(a != b for a, b in zip(trace[0], trace[n - 1], strict=True) if not isinstance(a, float))
+        for n in range(max(half // 2, 1), last + 1)
+    }
+    return max(changed, key=lambda n: (changed[n], -abs(n - half)), default=0)
 
 
 def _save(context: Context, driver: Driver, number: int) -> tuple[RunPoint, int]:
