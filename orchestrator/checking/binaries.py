@@ -13,6 +13,7 @@ from orchestrator.checking.findings import Finding, list_names
 from orchestrator.checking.library_headers import LibraryHeader, inspect
 from orchestrator.checking.rules import Version, declare
 from orchestrator.checking.rules_model import C_NAME
+from orchestrator.checking.tables.functions import FUNCTIONS
 from orchestrator.checking.xml_reading import xpath
 
 declare("""
@@ -63,46 +64,6 @@ PLATFORMS: dict[Version, dict[str, BinaryPlatform]] = {
 WITHOUT_NAME = ("aarch64-linux", "aarch64-windows", "aarch32-linux", "riscv64-linux")
 # Architectures of FMI 3.0 without a check of their own; a static library may name the toolchain, too.
 _OTHERS = re.compile(rf"({'|'.join(_MACHINES)}|riscv32|riscv64|ppc32|ppc64)-({'|'.join(_SYSTEMS)})(-[a-z][a-z0-9_]*)?")
-
-_COMMON = (
-    "GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode "
-    "ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean "
-    "SetString GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate "
-    "GetDirectionalDerivative"
-)
-_COSIMULATION = (
-    "SetRealInputDerivatives GetRealOutputDerivatives DoStep CancelStep GetStatus GetRealStatus GetIntegerStatus "
-    "GetBooleanStatus GetStringStatus"
-)
-_MODEL_EXCHANGE = (
-    "EnterEventMode NewDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates "
-    "GetDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates"
-)
-_TYPES = "Float32 Float64 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String Binary Clock"
-_ALL = (
-    "GetVersion SetDebugLogging InstantiateModelExchange InstantiateCoSimulation InstantiateScheduledExecution "
-    "FreeInstance EnterInitializationMode ExitInitializationMode EnterEventMode Terminate Reset "
-    "GetNumberOfVariableDependencies GetVariableDependencies GetFMUState SetFMUState FreeFMUState "
-    "SerializedFMUStateSize SerializeFMUState DeserializeFMUState GetDirectionalDerivative GetAdjointDerivative "
-    "EnterConfigurationMode ExitConfigurationMode GetIntervalDecimal GetIntervalFraction GetShiftDecimal "
-    "GetShiftFraction SetIntervalDecimal SetIntervalFraction SetShiftDecimal SetShiftFraction EvaluateDiscreteStates "
-    "UpdateDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates "
-    "GetContinuousStateDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates "
-    "GetNumberOfEventIndicators GetNumberOfContinuousStates EnterStepMode GetOutputDerivatives DoStep "
-    "ActivateModelPartition"
-)
-COSIMULATION_FUNCTIONS = tuple(f"fmi2{n}" for n in f"{_COMMON} {_COSIMULATION}".split())
-MODEL_EXCHANGE_FUNCTIONS = tuple(f"fmi2{n}" for n in f"{_COMMON} {_MODEL_EXCHANGE}".split())
-FMI3_FUNCTIONS = tuple(f"fmi3{n}" for n in _ALL.split()) + tuple(
-    f"fmi3{access}{kind}" for access in ("Get", "Set") for kind in _TYPES.split()
-)
-
-
-def functions_of(version: Version, interface: str) -> tuple[str, ...]:
-    """The functions that a library must export; in FMI 3.0 all of them, whatever the interface."""
-    if version == "3.0":
-        return FMI3_FUNCTIONS
-    return COSIMULATION_FUNCTIONS if interface == "CoSimulation" else MODEL_EXCHANGE_FUNCTIONS
 
 
 def here(version: Version = "2.0") -> str:
@@ -178,7 +139,7 @@ def _check_library(
     if unfit is not None:
         yield unfit
         return
-    missing = [f for f in functions_of(d.dialect.version, interface.kind) if not _exports(library, data, f)]
+    missing = [f for f in FUNCTIONS[d.dialect.version].exported(interface.kind) if not _exports(library, data, f)]
     if missing:
         message = f"the library must export all FMI functions, but lacks {list_names(missing)}"
         yield Finding("binary.exports", path, message)

@@ -6,9 +6,8 @@ types and sizes, and nothing more.
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from orchestrator.checking.host import Made, Returned, Update
@@ -16,6 +15,7 @@ from orchestrator.checking.probing.statuses import ERROR, StatusError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.process import Process
 from orchestrator.checking.rules import Version, declare
+from orchestrator.checking.tables.functions import FUNCTIONS
 from orchestrator.errors import ChildError, SimulationError
 from orchestrator.shared.isolation.jail import Answer
 
@@ -33,40 +33,6 @@ _MOST_CHANGES = 20
 _CHANGED = {"environment variable": "process.environment", "handler": "process.signals"}
 _NOTHING = type(None)
 _LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b", "String": "s"}
-
-
-@dataclass(frozen=True)
-class Names:
-    """What the functions of a version are called; the rest differs by the prefix alone."""
-
-    version: Version
-    texts: tuple[str, ...]
-    makers: tuple[str, ...]
-    get_state: str
-    set_state: str
-    free_state: str
-    state_size: str
-    serialise: str
-    deserialise: str
-
-    @property
-    def prefix(self) -> str:
-        """The first letters of every function."""
-        return f"fmi{self.version[0]}"
-
-
-NAMES: Mapping[Version, Names] = {
-    "2.0": Names(
-        "2.0", ("fmi2GetTypesPlatform", "fmi2GetVersion"), ("fmi2Instantiate",), "GetFMUstate", "SetFMUstate",
-        "FreeFMUstate", "SerializedFMUstateSize", "SerializeFMUstate", "DeSerializeFMUstate",
-    ),
-    "3.0": Names(
-        "3.0", ("fmi3GetVersion",),
-        tuple(f"fmi3Instantiate{kind}" for kind in ("CoSimulation", "ModelExchange", "ScheduledExecution")),
-        "GetFMUState", "SetFMUState", "FreeFMUState", "SerializedFMUStateSize", "SerializeFMUState",
-        "DeserializeFMUState",
-    ),
-}  # fmt: skip
 
 
 def _stamp(path: str) -> tuple[int, ...] | None:
@@ -97,7 +63,7 @@ class Library:
         report: Callable[[str, str], None] = lambda _rule, _message: None,
     ) -> None:
         self.process, self._report = process, report
-        self.names = NAMES[version]
+        self.names = FUNCTIONS[version]
         self.current = ""
         self.ended = False
         self.epoch = 0
@@ -120,8 +86,8 @@ class Library:
         """
         self._path, self._loaded = path, _stamp(path)
         names = self.names
-        freer = f"{names.prefix}FreeInstance"
-        return self._ask(str, "loading the library", "load", path, names.texts, names.makers, freer)
+        texts, makers = names.starting("GetVersion", "GetTypesPlatform"), names.starting("Instantiate")
+        return self._ask(str, "loading the library", "load", path, texts, makers, names.name("FreeInstance"))
 
     def is_replaced(self) -> bool:
         """Return whether the FMU has put something else in the place of the file that was loaded."""

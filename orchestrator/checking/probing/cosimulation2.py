@@ -26,10 +26,7 @@ class CoSimulation2(Driver):
 
     def enter_initialisation(self, start: float, stop: float | None) -> None:
         tolerance = self.job.tolerance
-        self.call(
-            "SetupExperiment", ("int", int(tolerance is not None)), ("double", tolerance or 0.0),
-            ("double", start), ("int", int(stop is not None)), ("double", stop or 0.0),
-        )  # fmt: skip
+        self.call("SetupExperiment", tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0)
         self.call("EnterInitializationMode")
 
     def advance(self, t: float, size: float, when: str = "") -> None:
@@ -50,10 +47,10 @@ class CoSimulation2(Driver):
 
     def _step(self, t: float, size: float, when: str) -> bool:
         """One call of fmi2DoStep; False when it was discarded."""
-        status, _ = self.raw("DoStep", ("double", t), ("double", size), ("int", 0))
+        status, _ = self.raw("DoStep", t, size, 0)
         messages, errors = self.library.messages, self.library.errors
         if status == DISCARD:
-            answer, ended = self.raw("GetBooleanStatus", ("int", _TERMINATED), ("out", "int", 1))
+            answer, ended = self.raw("GetBooleanStatus", _TERMINATED)
             if answer == OK and ended[0][0]:
                 raise TerminatedError(NOT_DONE)
             return False
@@ -62,14 +59,14 @@ class CoSimulation2(Driver):
         self.library.messages = messages
         if status not in (OK, WARNING):
             raise self.status_error("DoStep", status, when)
-        self._remark("fmi2DoStep", status, messages, errors)
+        self._remark("DoStep", status, messages, errors)
         return True
 
     def _wait(self) -> int:
         """Ask until the step is done; the child's limits end this when it takes too long."""
         status: Any = PENDING
         while status == PENDING:
-            answer, values = self.raw("GetStatus", ("int", _DO_STEP_STATUS), ("out", "int", 1, PENDING))
+            answer, values = self.raw("GetStatus", _DO_STEP_STATUS, PENDING)
             if answer not in (OK, PENDING):
                 break
             status = values[0][0]

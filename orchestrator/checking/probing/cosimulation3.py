@@ -91,15 +91,12 @@ class CoSimulation3(EventDriver):
 
     def _step(self, t: float, goal: float, slack: float, when: str) -> tuple[bool, float] | None:
         """One call of fmi3DoStep: whether an event is to be handled, and the time that was reached; None: discarded."""
-        status, found = self.raw(
-            "DoStep", ("double", t), ("double", goal - t), ("bool", True), *(("out", "bool", 1),) * 3,
-            ("out", "double", 1, goal),
-        )  # fmt: skip
+        status, found = self.raw("DoStep", t, goal - t, True, goal)
         if status == DISCARD:
             return None
         if status not in (OK, WARNING):
             raise self.status_error("DoStep", status, when)
-        self._remark("fmi3DoStep", status, self.library.messages, self.library.errors)
+        self._remark("DoStep", status, self.library.messages, self.library.errors)
         event, terminate, early, last = (values[0] for values in found)
         if not t - slack <= last <= goal + slack:
             text = f"lastSuccessfulTime must lie in the step from {t:g} to {goal:g}, but is {last:g} {when}"
@@ -163,6 +160,5 @@ def enter_initialisation_3(driver: Any, start: float, stop: float | None) -> Non
     """Into initialisation mode of FMI 3.0, for an experiment from ``start`` to ``stop`` [s]."""
     tolerance = driver.job.tolerance
     driver.call(
-        "EnterInitializationMode", ("bool", tolerance is not None), ("double", tolerance or 0.0), ("double", start),
-        ("bool", stop is not None), ("double", stop or 0.0),
-    )  # fmt: skip
+        "EnterInitializationMode", tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0
+    )

@@ -10,6 +10,7 @@ from orchestrator.checking.probing.job import ProbeJob, references
 from orchestrator.checking.probing.statuses import DiscardedError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.rules import declare
+from orchestrator.checking.tables.functions import C_TYPES
 
 declare("""
 [life cycle]
@@ -41,13 +42,6 @@ class Habits:
 
 
 Report = Callable[..., None]
-_CTYPES = {
-    "2.0": {"Real": "double", "Integer": "int", "Boolean": "int", "String": "text"},
-    "3.0": {
-        "Float64": "double", "Float32": "float", "Boolean": "uint8", "String": "text", "Clock": "bool",
-        **{f"{sign}Int{bits}": f"{sign.lower()}int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)},
-    },
-}  # fmt: skip
 _PYTHON: dict[str, tuple[type, ...]] = {"double": (float,), "float": (float,), "bool": (bool,)}
 _TEXTS: tuple[type, ...] = (bytes, type(None))
 MOST_ITERATIONS = 100
@@ -88,18 +82,13 @@ class Driver(FmuInstance):
         return self._got(variables, values)
 
     def _get_call(self, variables: Sequence[ProbedVariable]) -> tuple[str, list[Any]]:
-        """Function and arguments that read variables of one base type."""
-        base, size = variables[0].base, sum(v.size for v in variables)
-        out = ("out binaries", size) if base == "Binary" else ("out", _CTYPES[self.job.version][base], size)
-        arguments = [("in", "uint32", references(variables)), ("size", len(variables)), out]
-        if self.job.version == "3.0" and base != "Clock":
-            arguments.append(("size", size))
-        return f"Get{base}", arguments
+        """The function that reads variables of one base type, and what it is called with."""
+        return f"Get{variables[0].base}", [references(variables), sum(v.size for v in variables)]
 
     def _got(self, variables: Sequence[ProbedVariable], values: Any) -> list[Any]:
         """Values that are of the type and number that was asked for."""
         base, size = variables[0].base, sum(v.size for v in variables)
-        ctype = "text" if base == "Binary" else _CTYPES[self.job.version][base]
+        ctype = "text" if base == "Binary" else C_TYPES[self.job.version][base]
         kinds = _TEXTS if ctype == "text" else _PYTHON.get(ctype, (int,))
         if not isinstance(values, list) or len(values) != size or not all(isinstance(v, kinds) for v in values):
             raise odd(f"Get{base}")
@@ -115,13 +104,7 @@ class Driver(FmuInstance):
                 at -= v.size
                 self.set([v], values[at : at + v.size], when)
             return
-        base = variables[0].base
-        head = (("in", "uint32", references(variables)), ("size", len(variables)))
-        tail = (("size", len(values)),) if self.job.version == "3.0" and base != "Clock" else ()
-        if base == "Binary":
-            self.call("SetBinary", *head, ("in binaries", list(values)), *tail, when=when)
-        else:
-            self.call(f"Set{base}", *head, ("in", _CTYPES[self.job.version][base], list(values)), *tail, when=when)
+        self.call(f"Set{variables[0].base}", references(variables), list(values), when=when)
 
     def read(self, variables: Sequence[ProbedVariable], when: str = "") -> list[Any]:
         """Values of variables of any type, one after the other; those of clocked variables at their last tick."""
@@ -172,8 +155,7 @@ class Driver(FmuInstance):
 
     def quieten(self) -> None:
         """Switch logging off."""
-        kind = "bool" if self.job.version == "3.0" else "int"
-        self.call("SetDebugLogging", (kind, 0), ("size", 0), ("in", "text", []))
+        self.call("SetDebugLogging", 0, [])
         self.library.notes()  # what was logged before is allowed
 
     def report_discard(self, when: str, shorter: bool, again: bool = False) -> None:

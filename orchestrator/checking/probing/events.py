@@ -60,8 +60,7 @@ class EventDriver(Driver):
             if interval is None:
                 interval, qualifier = self._interval(clock)
             elif clock.kind in ("fixed", "tunable"):  # the description has a default, which the importer sets
-                arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("in", "double", [interval]))
-                self.call("SetIntervalDecimal", *arguments, when=f"for the clock `{clock.name}`")
+                self.call("SetIntervalDecimal", [clock.reference], [interval], when=f"for the clock `{clock.name}`")
             if shift is None:
                 shift = self._shift(clock) if clock.kind in ("fixed", "tunable") else 0.0
             if qualifier == _NOT_YET_KNOWN:
@@ -74,8 +73,8 @@ class EventDriver(Driver):
 
     def _interval(self, clock: ProbedClock) -> tuple[float, int]:
         """Interval and qualifier of a clock."""
-        arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("out", "double", 1), ("out", "int", 1))
-        (interval,), (qualifier,) = self.call("GetIntervalDecimal", *arguments, when=f"for the clock `{clock.name}`")
+        when = f"for the clock `{clock.name}`"
+        (interval,), (qualifier,) = self.call("GetIntervalDecimal", [clock.reference], 1, 1, when=when)
         if qualifier not in (_NOT_YET_KNOWN, _UNCHANGED, _CHANGED):
             text = f"the qualifier of the interval of `{clock.name}` must be 0, 1 or 2, but is {qualifier}"
             raise StatusError("fmi3GetIntervalDecimal", 0, text, "clock.interval-value")
@@ -94,8 +93,7 @@ class EventDriver(Driver):
         for clock in self.job.clocks:
             if clock.interval is None or clock.kind != "constant":
                 continue
-            arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("out", "double", 1), ("out", "int", 1))
-            status, values = self.raw("GetIntervalDecimal", *arguments)
+            status, values = self.raw("GetIntervalDecimal", [clock.reference], 1, 1)
             if status not in (OK, WARNING):
                 break
             found = values[0][0]
@@ -104,8 +102,7 @@ class EventDriver(Driver):
         return wrong
 
     def _shift(self, clock: ProbedClock) -> float:
-        arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("out", "double", 1))
-        ((shift,),) = self.call("GetShiftDecimal", *arguments, when=f"for the clock `{clock.name}`")
+        ((shift,),) = self.call("GetShiftDecimal", [clock.reference], 1, when=f"for the clock `{clock.name}`")
         if not 0.0 <= shift < math.inf:
             text = f"the shift of the clock `{clock.name}` must not be negative, but is {shift:g}"
             raise StatusError("fmi3GetShiftDecimal", 0, text, "clock.interval-value")
@@ -140,8 +137,7 @@ class EventDriver(Driver):
             active = {c.reference for c in ticking} if position == 0 else set()
             if active:
                 chosen = [c.reference for c in ticking]
-                head = (("in", "uint32", chosen), ("size", len(chosen)))
-                self.call("SetClock", *head, ("in", "bool", [True] * len(chosen)), when=when)
+                self.call("SetClock", chosen, [True] * len(chosen), when=when)
             active |= self._active_clocks(when)
             self._hold(active, when)
             outcomes.append(self.update(t, when))
@@ -168,8 +164,7 @@ class EventDriver(Driver):
         chosen = [c.reference for c in self.job.clocks if c.causality == "output"]
         if not chosen:
             return set()
-        head = (("in", "uint32", chosen), ("size", len(chosen)))
-        (values,) = self.call("GetClock", *head, ("out", "bool", len(chosen)), when=when)
+        (values,) = self.call("GetClock", chosen, len(chosen), when=when)
         return {reference for reference, value in zip(chosen, values, strict=True) if value}
 
     def _hold(self, active: set[int], when: str) -> None:
@@ -208,13 +203,9 @@ class EventDriver(Driver):
 
     def update(self, t: float, when: str) -> EventOutcome:
         """Update the discrete states once."""
-        if self.job.version == "2.0":
-            ((again, terminate, nominals, states, defined, time),) = self.call(
-                "NewDiscreteStates", ("event info",), when=when
-            )
-        else:
-            found = self.call("UpdateDiscreteStates", *(("out", "bool", 1),) * 5, ("out", "double", 1), when=when)
-            again, terminate, nominals, states, defined, time = (values[0] for values in found)
+        found = self.call("UpdateDiscreteStates", when=when)
+        row = found[0] if self.job.version == "2.0" else [values[0] for values in found]
+        again, terminate, nominals, states, defined, time = row
         if defined and not time > t - _SMALL * max(abs(t), self.job.step):
             text = f"the time of the next event must be later than t = {t:g}, but is {time:g} {when}"
             raise StatusError("UpdateDiscreteStates", 0, text, "event.next-time")

@@ -8,8 +8,8 @@ from orchestrator.checking.probing.statuses import FATAL, OK, PENDING, WARNING, 
 
 _STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 _LARGEST_STATE = 64 << 20
-Request = tuple[str, Sequence[Sequence[Any]]]
-"""A function and its arguments."""
+Request = tuple[str, Sequence[Any]]
+"""A function and what it is called with."""
 
 
 class FmuInstance:
@@ -35,30 +35,35 @@ class FmuInstance:
     def dead(self, value: bool) -> None:
         self._fatal = value
 
-    def raw(self, function: str, *arguments: Sequence[Any]) -> tuple[int, list[Any]]:
-        """Call a function and return its status and what its output arguments hold."""
-        name = self.library.names.prefix + function
+    def raw(self, function: str, *values: Any) -> tuple[int, list[Any]]:
+        """Call a function and return its status and what its output arguments hold.
+
+        Args:
+            values: what ``tables.functions`` wants for its parameters.
+        """
+        name = self.library.names.name(function)
         if self.dead:
             raise StatusError(name, FATAL, f"{name} was not called, because a call before returned a fatal error")
-        status, values = self.library.raw(self.number, name, arguments)
+        status, values = self.library.raw(self.number, name, self.library.names.arguments(function, values))
         self.dead = status == FATAL
         return status, values
 
-    def call(self, function: str, *arguments: Sequence[Any], when: str = "") -> list[Any]:
+    def call(self, function: str, *values: Any, when: str = "") -> list[Any]:
         """Call a function that must return OK or Warning; return what its output arguments hold.
 
         Returns:
             A value per output argument, in their order.
         """
-        status, values = self.raw(function, *arguments)
+        status, found = self.raw(function, *values)
         if status not in (OK, WARNING):
             raise self.status_error(function, status, when)
-        self._remark(self.library.names.prefix + function, status, self.library.messages, self.library.errors)
-        return values
+        self._remark(function, status, self.library.messages, self.library.errors)
+        return found
 
     def _remark(self, function: str, status: int, messages: list[str], errors: int) -> None:
         """Take note of a warning, and of an error that was logged although the call went well."""
         if status == WARNING or errors:
+            function = self.library.names.name(function)
             rule = "run.warning" if status == WARNING else "run.logged-error"
             count, first = self.remarks.get(rule, (0, f"{function} ({'; '.join(messages)})" if messages else function))
             self.remarks[rule] = (count + 1, first)
@@ -71,10 +76,12 @@ class FmuInstance:
         """
         if not requests:
             return []
-        prefix = self.library.names.prefix
+        names = self.library.names
         if self.dead:
-            raise StatusError(prefix, FATAL, f"nothing was called {when}, because a call before returned a fatal error")
-        done = self.library.raw_many(self.number, [(prefix + function, list(a)) for function, a in requests])
+            raise StatusError(
+                names.prefix, FATAL, f"nothing was called {when}, because a call before returned a fatal error"
+            )
+        done = self.library.raw_many(self.number, [(names.name(f), names.arguments(f, a)) for f, a in requests])
         status = done[-1][0]
         self.dead = status == FATAL
         if status not in (OK, WARNING):
@@ -82,7 +89,7 @@ class FmuInstance:
         if len(done) < len(requests):
             raise odd(requests[len(done)][0])
         for (function, _), (status, _), (messages, errors) in zip(requests, done, self.library.logged, strict=True):
-            self._remark(prefix + function, status, messages, errors)
+            self._remark(function, status, messages, errors)
         return [values for _, values in done]
 
     def status_error(self, function: str, status: int, when: str = "") -> StatusError:
@@ -91,8 +98,9 @@ class FmuInstance:
         known = 0 <= status < len(_STATUS) and not (prefix == "fmi3" and status == PENDING)
         name = prefix + _STATUS[status] if known else f"the status {status}, which does not exist"
         said = f" ({'; '.join(self.library.messages)})" if self.library.messages else ""
-        text = f"{prefix}{function}{' ' + when if when else ''} must return {prefix}OK, but returned {name}{said}"
-        return StatusError(prefix + function, status, text)
+        called = self.library.names.name(function)
+        text = f"{called}{' ' + when if when else ''} must return {prefix}OK, but returned {name}{said}"
+        return StatusError(called, status, text)
 
     def free(self) -> None:
         """Free the instance, unless that is forbidden."""
@@ -102,43 +110,42 @@ class FmuInstance:
 
     def get_state(self) -> int:
         """A new FMU state, by its number."""
-        state = int(self.call(self.library.names.get_state, ("new state",))[0])
+        state = int(self.call("GetFMUState", None)[0])
         self._memories[state] = dict(self.memory)
         return state
 
     def get_state_again(self, state: int) -> None:
         """Take the present state into one that was made before."""
-        self.call(self.library.names.get_state, ("new state in place", state))
+        self.call("GetFMUState", state)
         self._memories[state] = dict(self.memory)
 
     def set_state(self, state: int) -> None:
         """Restore a state."""
-        self.call(self.library.names.set_state, ("state", state))
+        self.call("SetFMUState", state)
         self.memory = dict(self._memories[state])
 
     def free_state(self, state: int) -> bool:
         """Free a state, unless that is forbidden; whether the pointer was set to null."""
         if self.dead or self.library.ended:
             return True
-        return bool(self.call(self.library.names.free_state, ("free state", state))[0])
+        return bool(self.call("FreeFMUState", state)[0])
 
     def serialise(self, state: int) -> bytes:
         """The bytes of a state."""
-        names = self.library.names
-        (size,) = self.call(names.state_size, ("state", state), ("out", "size", 1))[0]
+        (size,) = self.call("SerializedFMUStateSize", state)[0]
         if not 0 < size <= _LARGEST_STATE:
-            text = f"{names.prefix}{names.state_size} must be positive and at most {_LARGEST_STATE}, but is {size}"
-            raise StatusError(names.prefix + names.state_size, OK, text)
-        data = self.call(names.serialise, ("state", state), ("out bytes", size), ("size", size))[0]
+            function = self.library.names.name("SerializedFMUStateSize")
+            text = f"{function} must be positive and at most {_LARGEST_STATE}, but is {size}"
+            raise StatusError(function, OK, text)
+        data = self.call("SerializeFMUState", state, size)[0]
         if not isinstance(data, bytes):
-            function = names.prefix + names.serialise
+            function = self.library.names.name("SerializeFMUState")
             text = f"{function} must write the {size} bytes that it asked for, but writes more"
             raise StatusError(function, OK, text, "state.serialise")
         return data
 
     def deserialise(self, data: bytes, memory: dict[str, Any]) -> int:
         """A state from bytes, by its number."""
-        names = self.library.names
-        state = int(self.call(names.deserialise, ("bytes", data), ("size", len(data)), ("new state",))[0])
+        state = int(self.call("DeserializeFMUState", data)[0])
         self._memories[state] = dict(memory)
         return state

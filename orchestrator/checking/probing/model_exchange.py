@@ -33,7 +33,6 @@ _MOST_STEPS = 300
 _LOCATED = 1e-5
 _SMALL = 1e-9
 _JUMP = 1e-6  # of the size of a state: less is what a solver or a projection may do
-_DERIVATIVES = {"2.0": "GetDerivatives", "3.0": "GetContinuousStateDerivatives"}
 
 
 class ModelExchange(EventDriver):
@@ -80,7 +79,7 @@ class ModelExchange(EventDriver):
         """How many there are; what the FMU says must be what the description says."""
         if self.job.version == "2.0":
             return described or 0
-        ((count,),) = self.call(f"GetNumberOf{what}", ("out", "size", 1))
+        ((count,),) = self.call(f"GetNumberOf{what}")
         if described is not None and count != described:
             text = f"fmi3GetNumberOf{what} must return {described} as ModelStructure says, but returns {count}"
             raise StatusError(f"fmi3GetNumberOf{what}", 0, text, rule)
@@ -90,7 +89,7 @@ class ModelExchange(EventDriver):
         count = self.memory[kind]
         if not count:
             return []
-        (values,) = self.call(function, ("out", "double", count), ("size", count), when=when)
+        (values,) = self.call(function, count, when=when)
         return list(values)
 
     def continuous_states(self) -> list[float]:
@@ -100,11 +99,11 @@ class ModelExchange(EventDriver):
     def set_continuous_states(self, x: Sequence[float]) -> None:
         """Write the vector of states."""
         if x:
-            self.call("SetContinuousStates", ("in", "double", list(x)), ("size", len(x)))
+            self.call("SetContinuousStates", list(x))
 
     def rates(self) -> list[float]:
         """The derivatives of the states."""
-        return self._values(_DERIVATIVES[self.job.version], "states", "")
+        return self._values("GetContinuousStateDerivatives", "states", "")
 
     def nominal_values(self) -> list[float]:
         """The nominal values of the states, as the FMU says."""
@@ -116,14 +115,13 @@ class ModelExchange(EventDriver):
 
     def _place(self, t: float, x: list[float], when: str) -> tuple[list[float], list[bool]]:
         """Put the FMU to a time and states; their derivatives, and the signs of the event indicators."""
-        head: list[tuple[str, Any]] = [("SetTime", [("double", t)])]
+        head: list[tuple[str, Any]] = [("SetTime", [t])]
         tail: list[tuple[str, Any]] = []
         if x:
-            head.append(("SetContinuousStates", [("in", "double", x), ("size", len(x))]))
-            tail.append((_DERIVATIVES[self.job.version], [("out", "double", len(x)), ("size", len(x))]))
+            head.append(("SetContinuousStates", [x]))
+            tail.append(("GetContinuousStateDerivatives", [len(x)]))
         if self.memory["indicators"]:
-            count = self.memory["indicators"]
-            tail.append(("GetEventIndicators", [("out", "double", count), ("size", count)]))
+            tail.append(("GetEventIndicators", [self.memory["indicators"]]))
         turn = -1 if self.habits.judges_first else 1
         answers = self.call_many([*head, *tail[::turn]], when)[len(head) :][::turn]
         signs = [z > 0.0 for z in answers[-1][0]] if self.memory["indicators"] else []
@@ -167,14 +165,8 @@ class ModelExchange(EventDriver):
 
     def complete_step(self, when: str = "") -> tuple[bool, bool]:
         """Complete a step of the integrator; whether that enters event mode, and whether it ends the run."""
-        out = ("out", self._truth, 1)
-        entered, terminate = self.call("CompletedIntegratorStep", (self._truth, True), out, out, when=when)
+        entered, terminate = self.call("CompletedIntegratorStep", True, when=when)
         return bool(entered[0]), bool(terminate[0])
-
-    @property
-    def _truth(self) -> str:
-        """The C type of truth values."""
-        return "int" if self.job.version == "2.0" else "bool"
 
     def _try(self, t: float, x: list[float], h: float, when: str) -> tuple[list[float], float, float, list[bool]]:
         """Do a step of at most ``h`` that is exact enough and passes no event by far.

@@ -109,10 +109,7 @@ def _probe_early_return(context: Context) -> None:
     with bench.instance(intermediate=True) as driver:
         bench.library.updates()
         bench.library.plan(driver.number, [], [], [], 0)
-        status, found = driver.raw(
-            "DoStep", ("double", job.start), ("double", job.step), ("bool", True), *(("out", "bool", 1),) * 3,
-            ("out", "double", 1),
-        )  # fmt: skip
+        status, found = driver.raw("DoStep", job.start, job.step, True, 0.0)
         rows, _ = bench.library.updates()
         bench.library.plan(driver.number, [], [], [], -1)
     may = bool(rows) and rows[0].early and rows[0].time < job.start + job.step * (1.0 - _SMALL)
@@ -167,7 +164,7 @@ def _probe_partitions(context: Context) -> None:
                 break  # an FMU may refuse to be read where no clock ticks
             for n in range(_FEW_TICKS):
                 t = job.start + _FEW_TICKS * job.step + n * (clock.interval or job.step)
-                driver.call("ActivateModelPartition", ("uint32", clock.reference), ("double", t))
+                driver.call("ActivateModelPartition", clock.reference, t)
             for v, a in zip(others, before, strict=True):
                 if not equal(v, b := driver.get([v]), a):
                     text = f"`{v.name}` is {values_text(b)} instead of {values_text(a)} after ticks of `{clock.name}`"
@@ -176,7 +173,7 @@ def _probe_partitions(context: Context) -> None:
                     return
     with bench.instance() as driver:
         unknown = max((v.reference for v in job.variables), default=0) + 12345
-        status, _ = driver.raw("ActivateModelPartition", ("uint32", unknown), ("double", job.start))
+        status, _ = driver.raw("ActivateModelPartition", unknown, job.start)
         if status in (OK, WARNING):
             text = f"fmi3ActivateModelPartition must refuse the unknown clock {unknown}, but does not"
             context.report("misuse.clock", text)

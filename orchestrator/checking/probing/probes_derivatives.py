@@ -10,6 +10,7 @@ from itertools import accumulate
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.job import references
 from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.probes_slopes import judge_outputs
@@ -209,18 +210,8 @@ def _sensitivities(
 ) -> list[float]:
     """The product of the matrix with a seed of the knowns (directional), or of a seed of the unknowns with it."""
     asked = sum(v.size for v in (unknowns if kind == "Directional" else knowns))
-    lists = [x for group in (unknowns, knowns) for x in (_references(group), ("size", len(group)))]
-    if driver.job.version == "2.0":
-        tail: list[Any] = [("in", "double", seed), ("out", "double", asked)]
-    else:
-        out = [("out", "double", asked), ("size", asked)]
-        tail = [("in", "double", seed), ("size", len(seed)), *out]
-    (values,) = driver.call(f"Get{kind}Derivative", *lists, *tail)
+    (values,) = driver.call(f"Get{kind}Derivative", references(unknowns), references(knowns), seed, asked)
     return list(values)
-
-
-def _references(variables: Sequence[ProbedVariable]) -> tuple[str, str, list[int]]:
-    return ("in", "uint32", [v.reference for v in variables])
 
 
 def _by_changes(point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], width: float) -> Matrix:

@@ -99,7 +99,7 @@ def judge_completed_step(context: Context, point: RestPoint, others: Sequence[fl
     if driver.next_instant(t) < t:
         return
     try:
-        driver.call("SetTime", ("double", t))
+        driver.call("SetTime", t)
         driver.set_continuous_states(others)
         before, signs = driver.rates(), driver.signs()
         if any(driver.complete_step()) or signs != driver.memory["signs"]:

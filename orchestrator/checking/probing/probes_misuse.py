@@ -1,7 +1,5 @@
 """Calls that an FMU must refuse. They come last, for an FMU may break on them."""
 
-from typing import Any
-
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.movement import moved
 from orchestrator.checking.probing.probes import Context
@@ -89,10 +87,7 @@ def _set_fixed(context: Context) -> None:
 
 
 def _get(driver: Driver, base: str, references: list[int], size: int) -> int:
-    kind = {"Float32": "float"}.get(base, "double")
-    tail = (("size", size),) if driver.job.version == "3.0" else ()
-    head = (("in", "uint32", references), ("size", len(references)), ("out", kind, max(size, len(references))))
-    return driver.raw(f"Get{base}", *head, *tail)[0]
+    return driver.raw(f"Get{base}", references, max(size, len(references)))[0]
 
 
 def _steps(context: Context) -> None:
@@ -117,15 +112,9 @@ def _steps(context: Context) -> None:
 
 def _try_step(driver: Driver, size: float, t: float | None = None) -> int:
     """The status of a step that is to be refused, from the start or from ``t`` [s], which takes no time."""
+    more = (0,) if driver.job.version == "2.0" else (True, 0.0)
     with driver.library.limit_calls(_SOON):
-        return driver.raw("DoStep", *_step(driver.job.version, driver.job.start if t is None else t, size))[0]
-
-
-def _step(version: str, t: float, size: float) -> list[tuple[Any, ...]]:
-    head: list[tuple[Any, ...]] = [("double", t), ("double", size)]
-    if version == "2.0":
-        return [*head, ("int", 0)]
-    return [*head, ("bool", True), *[("out", "bool", 1)] * 3, ("out", "double", 1)]
+        return driver.raw("DoStep", driver.job.start if t is None else t, size, *more)[0]
 
 
 def _of_version_3(context: Context) -> None:
@@ -139,7 +128,7 @@ def _of_version_3(context: Context) -> None:
     output = next((v for v in job.variables if v.real and v.causality == "output" and not v.clocks), None)
     if output is not None:
         with bench.instance() as driver:
-            status, _ = driver.raw(f"Set{output.base}", *_one_value(output, 1.0))
+            status, _ = driver.raw(f"Set{output.base}", [output.reference], [1.0] * output.size)
             if status in _NOT_REFUSED:
                 message = f"fmi3Set{output.base} must refuse to set the output `{output.name}`, but does not"
                 context.report("misuse.set-output", message)
@@ -148,8 +137,3 @@ def _of_version_3(context: Context) -> None:
             if driver.raw("EnterEventMode")[0] in _NOT_REFUSED:
                 message = "fmi3EnterEventMode must be refused where event mode is not used, but is not"
                 context.report("misuse.event-mode", message)
-
-
-def _one_value(v: Any, value: float) -> list[tuple[Any, ...]]:
-    kind = "float" if v.base == "Float32" else "double"
-    return [("in", "uint32", [v.reference]), ("size", 1), ("in", kind, [value] * v.size), ("size", v.size)]

@@ -10,7 +10,7 @@ from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.events import EventDriver
-from orchestrator.checking.probing.job import ProbedUnknown, ProbeJob
+from orchestrator.checking.probing.job import ProbedUnknown, ProbeJob, references
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import StatusError
@@ -48,20 +48,15 @@ class PromisedCall:
 
 def _categories(job: ProbeJob) -> list[Call]:
     names = [c.encode() for c in job.categories]
-    kind = "bool" if job.version == "3.0" else "int"
-    chosen = [("size", len(names)), ("in", "text", names)]
-    calls: list[Call] = [("SetDebugLogging", [(kind, 1), ("size", 1), ("in", "text", [name])]) for name in names]
-    return [*calls[:_MOST], ("SetDebugLogging", [(kind, 1), *chosen]), ("SetDebugLogging", [(kind, 0), *chosen])]
+    calls: list[Call] = [("SetDebugLogging", [1, [name]]) for name in names[:_MOST]]
+    return [*calls, ("SetDebugLogging", [1, names]), ("SetDebugLogging", [0, names])]
 
 
 def _input_derivatives(job: ProbeJob) -> list[Call]:
     inputs = [v.reference for v in job.inputs() if v.base == "Real"][:_MOST]
     if job.version != "2.0" or "canInterpolateInputs" not in job.flags:
         return []
-    return [
-        ("SetRealInputDerivatives", [("in", "uint32", [r]), ("size", 1), ("in", "int32", [1]), ("in", "double", [0.0])])
-        for r in inputs
-    ]
+    return [("SetRealInputDerivatives", [[r], [1], [0.0]]) for r in inputs]
 
 
 def _output_derivatives(job: ProbeJob) -> list[Call]:
@@ -69,11 +64,8 @@ def _output_derivatives(job: ProbeJob) -> list[Call]:
     chosen = [v.reference for v in outputs if v.size == 1 and v.variability == "continuous" and not v.clocks][:_MOST]
     if job.interface != "CoSimulation" or not chosen:
         return []
-    name = "GetRealOutputDerivatives" if job.version == "2.0" else "GetOutputDerivatives"
-    tail = [("size", len(chosen))] if job.version == "3.0" else []
-    head = [("in", "uint32", chosen), ("size", len(chosen))]
     return [
-        (name, [*head, ("in", "int32", [order] * len(chosen)), ("out", "double", len(chosen)), *tail])
+        ("GetOutputDerivatives", [chosen, [order] * len(chosen), len(chosen)])
         for order in range(2, min(job.output_order, 5) + 1)  # the first is a probe of its own
     ]
 
@@ -84,13 +76,7 @@ def _evaluate(job: ProbeJob) -> list[Call]:
 
 def _fractions(job: ProbeJob) -> list[Call]:
     chosen = [c for c in job.clocks if c.fraction and c.causality == "input"]
-    return [
-        (
-            "GetIntervalFraction",
-            [("in", "uint32", [c.reference]), ("size", 1), *(("out", "uint64", 1),) * 2, ("out", "int", 1)],
-        )
-        for c in chosen
-    ]
+    return [("GetIntervalFraction", [[c.reference], 1, 1, 1]) for c in chosen]
 
 
 PROMISES = (
@@ -160,7 +146,7 @@ def _judge_fraction(context: Context, function: str, arguments: Sequence[Any], a
         return
     job = context.bench.job
     (counter,), (resolution,), _ = answer
-    clock = next(c for c in job.clocks if c.reference == arguments[0][2][0])
+    clock = next(c for c in job.clocks if c.reference == arguments[0][0])
     if clock.interval and (not resolution or abs(counter / resolution - clock.interval) > 1e-6 * clock.interval):
         text = f"the interval of `{clock.name}` must be {clock.interval:g}, but is {counter}/{resolution} as a fraction"
         context.report("clock.interval-value", text)
@@ -184,10 +170,7 @@ def _interpolation(context: Context) -> None:
                     starts = [x + s * job.step for x, s in zip(starts, sizes, strict=True)]
                 driver.set(inputs, starts)
                 if kind == "sloped":
-                    driver.call(
-                        "SetRealInputDerivatives", ("in", "uint32", [v.reference for v in inputs]),
-                        ("size", len(inputs)), ("in", "int32", [1] * len(inputs)), ("in", "double", sizes),
-                    )  # fmt: skip
+                    driver.call("SetRealInputDerivatives", references(inputs), [1] * len(inputs), sizes)
                 driver.advance(t, job.step, f"at t = {t:g}")
             driver.set(inputs, [float((v.start or (0.0,))[0]) for v in inputs])
             rows.append(driver.read(outputs))
@@ -219,17 +202,12 @@ def _elements(context: Context) -> None:
     with context.bench.instance() as driver:
         for u in _unknowns(job):
             try:
-                ((count,),) = driver.call(
-                    "GetNumberOfVariableDependencies", ("uint32", u.variable.reference), ("out", "size", 1)
-                )
+                ((count,),) = driver.call("GetNumberOfVariableDependencies", u.variable.reference)
                 if count > 1 << 16:
                     text = f"`{u.variable.name}` must have a number of dependencies, but has {count}"
                     context.report("promise.dependencies", text, u.variable.name)
                     return
-                found = driver.call(
-                    "GetVariableDependencies", ("uint32", u.variable.reference), ("out", "size", count),
-                    ("out", "uint32", count), ("out", "size", count), ("out", "int", count), ("size", count),
-                )  # fmt: skip
+                found = driver.call("GetVariableDependencies", u.variable.reference, count, count, count, count)
             except StatusError as error:
                 context.report("promise.refused", f"{error}, for providesPerElementDependencies promises it")
                 return

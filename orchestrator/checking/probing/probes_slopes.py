@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.job import references
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.slopes import TOLERANCE, count_far
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.variables import ProbedVariable
 
-_FUNCTIONS = {"2.0": "GetRealOutputDerivatives", "3.0": "GetOutputDerivatives"}
 _MOST = 20
 _PART = 1.0 / 16.0  # of a step
 _ORDERS = ("the first", "the second")
@@ -56,11 +56,7 @@ def judge_outputs(context: Context, outputs: Sequence[ProbedVariable]) -> None:
 
 def _ask(driver: Driver, variables: Sequence[ProbedVariable], order: int, when: str) -> list[float]:
     count, size = len(variables), sum(v.size for v in variables)
-    arguments = [
-        ("in", "uint32", [v.reference for v in variables]), ("size", count), ("in", "int32", [order] * count),
-        ("out", "double", size), *((("size", size),) if driver.job.version == "3.0" else ()),
-    ]  # fmt: skip
-    return list(driver.call(_FUNCTIONS[driver.job.version], *arguments, when=when)[0])
+    return list(driver.call("GetOutputDerivatives", references(variables), [order] * count, size, when=when)[0])
 
 
 def _judge(context: Context, names: tuple[str, str], order: int, values: tuple[list[float], list[float]]) -> bool:

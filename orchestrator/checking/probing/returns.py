@@ -246,8 +246,7 @@ def state(context: Context) -> None:
                 driver.free_state(begun)
                 nulled = driver.free_state(saved)
             if not nulled:
-                names = bench.library.names
-                function = names.prefix + names.free_state
+                function = bench.library.names.name("FreeFMUState")
                 context.report("state.free", f"{function} must set the state to null, but does not")
         except StatusError as error:
             context.report(error.rule or "state.status", str(error))

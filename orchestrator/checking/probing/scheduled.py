@@ -35,7 +35,7 @@ class ScheduledExecution(EventDriver):
                 at = f"for the clock `{clock.name}` at t = {now:g}"
                 self.library.threaded = self.habits.threads
                 try:
-                    self.call("ActivateModelPartition", ("uint32", clock.reference), ("double", now), when=at)
+                    self.call("ActivateModelPartition", clock.reference, now, when=at)
                 finally:
                     self.library.threaded = False
                 self._hold({clock.reference}, at)
