@@ -28,6 +28,7 @@ _MULTIPLE = 0.02  # of an inner step: nearer to a multiple is one
 _STEP_TOLERANCE = 0.1
 _FEWEST_PAIRS = 10
 _TIME = 1e-3  # of a communication step
+_SHARES = (0.6, 0.3)  # of a communication step; the second is before the first
 _NEAR = 0.01  # of the range of an output
 _FEWEST_EQUAL = 4  # points at which an output must be equal, bit for bit
 _RATIOS = [(p, q) for q in (1, 2, 3) for p in range(1, 17) if math.gcd(p, q) == 1]
@@ -37,6 +38,9 @@ def own_time(context: Context) -> None:
     """The time inside is not ahead of the communication point, and does not stand still."""
     job = context.bench.job
     v = job.time_variable
+    if v is not None and job.interface == "ModelExchange":
+        _judge_set_time(context, v)
+        return
     if v is None or job.interface != "CoSimulation":
         raise SkippedError("the time inside cannot be read")
     found = job.start
@@ -45,6 +49,23 @@ def own_time(context: Context) -> None:
             return
     if not found > job.start:
         context.report("steps.time", f"`{v.name}` must be later after {job.steps} steps, but is not", v.name)
+
+
+def _judge_set_time(context: Context, v: ProbedVariable) -> None:
+    """In model exchange the independent variable is the time that was set last, also where an integrator goes back."""
+    job = context.bench.job
+    with context.bench.instance() as driver:
+        for share in _SHARES:
+            t = job.start + share * job.step
+            try:
+                driver.call("SetTime", t)
+                found = float(driver.get([v])[0])
+            except StatusError as error:
+                raise SkippedError(f"the time inside cannot be read: {error}") from None
+            if abs(found - t) > _TIME * job.step:
+                text = f"`{v.name}` must be what fmi{job.version[0]}SetTime set last, but is not"
+                context.report("value.kept", text, v.name, f"({found:.9g} instead of {t:.9g})")
+                return
 
 
 def _judge_time(context: Context, v: ProbedVariable, inside: float, t: float) -> bool:
