@@ -24,6 +24,8 @@ FAULTS = (
     ("2 ME", "takes_signals", "life cycle", "process.signals"),
     ("2 ME", "counts_idle_events", "determinism", "event.idle"),
     ("2 ME", "counts_updates", "determinism", "event.again"),
+    ("2 ME", "keeps_time", "time", "value.kept"),
+    ("2 CS", "loses_switch", "values", "value.kept"),
     ("2 ME", "late_rates", "determinism", "value.sequence"),
     ("2 ME", "needs_completed_steps", "determinism", "promise.completed-step"),
     ("2 ME", "shares_state", "instances", "instances.interference"),

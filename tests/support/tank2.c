@@ -99,7 +99,11 @@ fmi2Status fmi2SetReal(fmi2Component c,const fmi2ValueReference vr[],size_t n,co
     case 5: v->u=x[j]; break;
     case 10: if(i->mode>INIT) return bad(i,"spare is fixed"); v->spare=x[j]; break;
     default: return bad(i,"this Real cannot be set"); } return OK; }
-fmi2Status fmi2SetInteger(fmi2Component c,const fmi2ValueReference vr[],size_t n,const fmi2Integer x[]){ I*i=c; for(size_t j=0;j<n;j++) if(vr[j]==1){ if(i->mode==CONT||i->mode==TERM) return bad(i,"sel is discrete"); i->v.sel=x[j]; } else return bad(i,"this Integer cannot be set"); return OK; }
+fmi2Status fmi2SetInteger(fmi2Component c,const fmi2ValueReference vr[],size_t n,const fmi2Integer x[]){ I*i=c; for(size_t j=0;j<n;j++) if(vr[j]==1){ if(i->mode==CONT||i->mode==TERM) return bad(i,"sel is discrete");
+#ifdef FAULT_loses_switch
+    if(i->mode==STEP && i->v.time>0) continue;
+#endif
+    i->v.sel=x[j]; } else return bad(i,"this Integer cannot be set"); return OK; }
 fmi2Status fmi2SetBoolean(fmi2Component c,const fmi2ValueReference vr[],size_t n,const fmi2Boolean x[]){ return n?bad(c,"no Boolean can be set"):OK; }
 fmi2Status fmi2SetString(fmi2Component c,const fmi2ValueReference vr[],size_t n,const fmi2String x[]){ I*i=c; for(size_t j=0;j<n;j++) if(vr[j]==0){ if(i->mode>INIT) return bad(i,"label is fixed"); snprintf(i->v.label,64,"%s",x[j]?x[j]:""); } else return bad(i,"this String cannot be set"); return OK; }
 typedef struct { Vals v; int mode; } S;
@@ -162,7 +166,11 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean ns, fmi2Bool
   i->v.scale = i->v.h>0.4? 2: i->v.scale;
 #endif
   return OK; }
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t){ I*i=c; if(!(i->mode&(CONT|EVENT))) return bad(i,"wrong state"); i->v.time=t; return OK; }
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real t){ I*i=c; if(!(i->mode&(CONT|EVENT))) return bad(i,"wrong state");
+#ifdef FAULT_keeps_time
+  if(t<i->v.time) return OK;
+#endif
+  i->v.time=t; return OK; }
 fmi2Status fmi2SetContinuousStates(fmi2Component c,const fmi2Real x[],size_t n){ I*i=c; if(i->mode!=CONT||n!=1) return bad(i,"wrong state or number"); i->v.h=x[0];
 #ifdef FAULT_shares_state
   shared_h=x[0];

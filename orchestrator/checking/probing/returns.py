@@ -135,17 +135,19 @@ class Reset:
     Attributes:
         what: an instance that it is done to, in words.
         go: how a new instance gets there.
+        share: of the run that follows; it is a short one after an early reset.
         early: whether no run has begun; an FMU that breaks on it can still be looked at otherwise.
     """
 
     what: str
     go: Way
+    share: float = 1.0
     early: bool = False
 
 
 RESETS = (
-    Reset("an instance that is reset in mid-run", _run(0.5)),
-    Reset("an instance that is reset after Terminate", _run(1.0, ended=True)),
+    Reset("an instance that is reset in mid-run", _run(0.5), 0.5),
+    Reset("an instance that is reset after Terminate", _run(0.25, ended=True)),
     Reset("a new instance that is reset", lambda context, driver: None, early=True),
     Reset("an instance that is reset in initialisation mode", _begin, early=True),
 )
@@ -164,7 +166,7 @@ def reset(context: Context) -> None:
                 way.go(context, driver)
                 driver.reset()
                 bench.begin(driver, moved=False)
-                last = min(_FEW_STEPS, job.steps) if way.early else None
+                last = min(_FEW_STEPS, job.steps) if way.early else max(int(way.share * job.steps), 1)
                 if not _is_back(context, fresh, driver, "run.reset", way.what, last):
                     return
                 driver.terminate()
