@@ -57,6 +57,7 @@ class RunPoint:
         variables, values: what was read there.
         rows: outputs after each later step, [step][output].
         solver: relative difference that a solver may make which begins anew there; 0: values are back bit for bit.
+        wanted: of the values there, and of what comes after, in words.
     """
 
     number: int
@@ -64,6 +65,7 @@ class RunPoint:
     values: list[Any]
     rows: list[list[Any]]
     solver: float = 0.0
+    wanted: tuple[str, str] = ("have its values back before the next step", "continue as before")
 
     def lost(self, values: Sequence[Any]) -> tuple[ProbedVariable, str] | None:
         """The first variable that has another value there, and how it differs."""
@@ -90,7 +92,7 @@ def _has_values(context: Context, point: RunPoint, driver: Driver, rule: str, wh
         return True
     v, text = lost
     mild = "state.time" if v.causality == "independent" else "run.inexact" if point.is_slight(found) else ""
-    context.report(mild or rule, f"{what} must have its values back before the next step, but {text}", v.name)
+    context.report(mild or rule, f"{what} must {point.wanted[0]}, but {text}", v.name)
     return bool(mild)
 
 
@@ -104,7 +106,7 @@ def _is_back(
     rows = context.bench.run(driver, point.number, last)
     difference = context.compare(point.rows[: last - point.number], rows)
     if difference is not None:
-        context.report_difference(rule, f"{what} must continue as before", difference, max(point.solver, SMALL))
+        context.report_difference(rule, f"{what} must {point.wanted[1]}", difference, max(point.solver, SMALL))
     return difference is None
 
 
@@ -158,7 +160,8 @@ def reset(context: Context) -> None:
     bench, job = context.bench, context.bench.job
     if context.plain is None:
         raise SkippedError(NOT_COMPARABLE)
-    fresh = RunPoint(0, *_fresh_values(context, readable(job)), context.plain)
+    like = ("be as a fresh one", "run as a fresh one")
+    fresh = RunPoint(0, *_fresh_values(context, readable(job)), context.plain, wanted=like)
     for way in RESETS:
         failed = ""
         try:
@@ -172,14 +175,15 @@ def reset(context: Context) -> None:
                 driver.terminate()
         except StatusError as error:
             context.resets = way.early
-            failed = str(error)
+            failed = f"{error}, of {way.what}"
         except ChildError as error:
             if not way.early:
                 raise
-            failed = f"{error} during {bench.library.current or 'a step'}"
+            where = bench.library.current or "a step"
+            failed = f"{way.what} must lead another life, but {error} during {where}"
             bench.library.renew()
         if failed:
-            context.report("run.reset", f"{way.what} must lead another life, but {failed}")
+            context.report("run.reset", failed)
             return
     _reset_sizes(context)
 
