@@ -244,9 +244,8 @@ def state(context: Context) -> None:
                     _has_values(context, first, driver, "state.restore", "a restored state")
                     driver.set_state(saved)  # what the driver keeps beside it is back too
                     if job.serialises:
-                        data, memory = driver.serialise(saved), dict(driver.memory)
-                    if data and not _restore_bytes(context, driver, later, data, memory):
-                        data = b""
+                        written, memory = driver.serialise(saved), dict(driver.memory)
+                        data = written if _restore_bytes(context, driver, later, written, memory) else b""
                     _take_again(context, driver, later, saved)
             finally:
                 driver.free_state(begun)
