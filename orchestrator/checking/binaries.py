@@ -139,7 +139,7 @@ def _check_library(
     if unfit is not None:
         yield unfit
         return
-    missing = [f for f in FUNCTIONS[d.dialect.version].exported(interface.kind) if not _exports(library, data, f)]
+    missing = [f for f in FUNCTIONS[d.dialect.version].export_names(interface.kind) if not _exports(library, data, f)]
     if missing:
         message = f"the library must export all FMI functions, but lacks {list_names(missing)}"
         yield Finding("binary.exports", path, message)

@@ -72,8 +72,8 @@ def check_sources(d: Description, files: FmuFiles, walls: bool = True) -> tuple[
             target = scratch.path / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(files.read(path, _LARGEST))
-        for one in sets:
-            done = _compile(compiler, scratch.path / "sources", one, walls)
+        for group in sets:
+            done = _compile(compiler, scratch.path / "sources", group, walls)
             if done is None:
                 return [], "the compiler reads them for too long"
             if done:

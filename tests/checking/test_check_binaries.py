@@ -35,7 +35,7 @@ def test_elf_symbols_are_those_that_nm_reads(tmp_path: Path) -> None:
     assert library.exported == _nm(path, "--defined-only")
     weak = {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable", "_ITM_registerTMCloneTable"}
     assert library.undefined == _nm(path, "--undefined-only") - weak
-    assert set(FUNCTIONS["2.0"].exported("CoSimulation")) <= library.exported
+    assert set(FUNCTIONS["2.0"].export_names("CoSimulation")) <= library.exported
     assert "libc.so.6" in (library.needed or ())
 
 
@@ -48,9 +48,9 @@ def test_libraries_of_pythonfmu(folder: str, form: str) -> None:
         library = inspect(data)
         assert (library.format, library.bits, library.shared) == (form, 64, True)
         if library.exported is None:
-            assert all(f.encode() + b"\0" in data for f in FUNCTIONS["2.0"].exported("CoSimulation"))
+            assert all(f.encode() + b"\0" in data for f in FUNCTIONS["2.0"].export_names("CoSimulation"))
         else:
-            assert set(FUNCTIONS["2.0"].exported("CoSimulation")) <= library.exported
+            assert set(FUNCTIONS["2.0"].export_names("CoSimulation")) <= library.exported
 
 
 @pytest.mark.parametrize(

@@ -158,7 +158,7 @@ def windows_library(machine: int = 0x8664) -> bytes:
     """The header of a DLL, with the names that a real one would export."""
     head = b"MZ".ljust(0x3C, b"\0") + struct.pack("<I", 0x40)
     head += b"PE\0\0" + struct.pack("<HHIIIHH", machine, 1, 0, 0, 0, 240, 0x2022)
-    return head + b"\0" + b"\0".join(f.encode() for f in FUNCTIONS["2.0"].exported("CoSimulation")) + b"\0"
+    return head + b"\0" + b"\0".join(f.encode() for f in FUNCTIONS["2.0"].export_names("CoSimulation")) + b"\0"
 
 
 def _windows_only(files: Files) -> None:

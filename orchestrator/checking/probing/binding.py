@@ -86,7 +86,7 @@ class Library:
         """
         self._path, self._loaded = path, _stamp(path)
         names = self.names
-        texts, makers = names.starting("GetVersion", "GetTypesPlatform"), names.starting("Instantiate")
+        texts, makers = names.names_with("GetVersion", "GetTypesPlatform"), names.names_with("Instantiate")
         return self._ask(str, "loading the library", "load", path, texts, makers, names.name("FreeInstance"))
 
     def is_replaced(self) -> bool:

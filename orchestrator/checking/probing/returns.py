@@ -67,7 +67,7 @@ class RunPoint:
     solver: float = 0.0
     wanted: tuple[str, str] = ("have its values back before the next step", "continue as before")
 
-    def lost(self, values: Sequence[Any]) -> tuple[ProbedVariable, str] | None:
+    def first_difference(self, values: Sequence[Any]) -> tuple[ProbedVariable, str] | None:
         """The first variable that has another value there, and how it differs."""
         labels = [(v, label) for v in self.variables for label in v.labels]
         for (v, label), a, b in zip(labels, self.values, values, strict=True):
@@ -87,7 +87,7 @@ def _near(a: Any, b: Any, tolerance: float) -> bool:
 def _has_values(context: Context, point: RunPoint, driver: Driver, rule: str, what: str) -> bool:
     """Whether all values are back, but for what is mild; what is not is reported."""
     found = driver.read(point.variables, f"in {what}")
-    lost = point.lost(found)
+    lost = point.first_difference(found)
     if lost is None:
         return True
     v, text = lost
@@ -356,7 +356,7 @@ def _restore_elsewhere(context: Context, point: RunPoint, data: bytes, memory: d
             driver.set_state(copy)
             driver.driven = True
             values = driver.read(point.variables)
-            lost = point.lost(values)
+            lost = point.first_difference(values)
             found = "" if lost is None or point.is_slight(values) else lost[1]
             bench.run(driver, point.number, min(point.number + _FEW_STEPS, bench.job.steps))
             driver.free_state(copy)

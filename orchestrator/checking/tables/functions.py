@@ -131,11 +131,11 @@ class FmiFunctions:
         """What a function is called in C."""
         return self.prefix + self._names[function]
 
-    def exported(self, interface: str) -> list[str]:
+    def export_names(self, interface: str) -> list[str]:
         """What a library must export for an interface; in FMI 3.0 everything."""
         return [self.name(f) for f in self._names if self._interfaces.get(f, "") in ("", interface)]
 
-    def starting(self, *words: str) -> list[str]:
+    def names_with(self, *words: str) -> list[str]:
         """The functions whose names begin so."""
         return [self.name(f) for f in self._names if f.startswith(words)]
 
@@ -177,7 +177,7 @@ def _texts(given: Iterator[Any]) -> list[Argument]:
     return [("size", len(texts)), ("in", "text", texts)]
 
 
-def _taken(given: Iterator[Any]) -> list[Argument]:
+def _state_to_take(given: Iterator[Any]) -> list[Argument]:
     state = next(given)
     return [("new state",) if state is None else ("new state in place", state)]
 
@@ -185,7 +185,7 @@ def _taken(given: Iterator[Any]) -> list[Argument]:
 _SPECIAL: Mapping[str, Callable[[Iterator[Any]], list[Argument]]] = {
     "refs": _references,
     "texts": _texts,
-    "new": _taken,
+    "new": _state_to_take,
     "made": lambda given: [("new state",)],
     "free": lambda given: [("free state", next(given))],
     "info": lambda given: [("event info",)],
