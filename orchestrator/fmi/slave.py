@@ -74,6 +74,7 @@ class FmuSlave(Slave):
             self._release()
             raise
         self._functions = Functions(self._library, self._component, self._description.version, {})
+        self._first_arrays = self._start_arrays()
         self._forget_arrays()
 
     # Loading -------------------------------------------------------------------------------------------------
@@ -99,13 +100,20 @@ class FmuSlave(Slave):
     def _free(self) -> None:
         """Free the instance, and the library unless it runs Python."""
 
-    def _forget_arrays(self) -> None:
-        """Let the values of arrays be those of a new instance."""
+    def _start_arrays(self) -> dict[int, list[Any]]:
+        """Return the values of arrays of a new instance, by value reference."""
+        found: dict[int, list[Any]] = {}
         for name, access in self._description.access.items():
             start = self.model.variables[name].start
             if access.size > 1 and start is not None:
-                array = self._functions.arrays.setdefault(access.reference, [0] * access.size)
+                array = found.setdefault(access.reference, [0] * access.size)
                 array[access.element] = start.encode() if isinstance(start, str) else start
+        return found
+
+    def _forget_arrays(self) -> None:
+        """Let the values of arrays be those of a new instance."""
+        for reference, start in self._first_arrays.items():
+            self._functions.arrays.setdefault(reference, [0] * len(start))[:] = start
 
     # Calls ---------------------------------------------------------------------------------------------------
 
