@@ -164,7 +164,7 @@ def judge_machine(seed: int, number: int, moves: int, folder: Path) -> str:
         f"{about} trust {diagnosis.trust.level.word}, asked {asked:.3g}: impact, 95 %, ",
         f"{np.quantile(impacts, 0.95) / asked:.2f} of it, foreseen {law.upper['landing'] / asked:.2f}; ",
         f"time {np.median(times) / true:.2f} of the bound, foreseen {foreseen / true:.2f}; ",
-        f"error {ours / plain:.2f} of the LQR's, {1e3 * ours:.3g} mrad, foreseen {1e3 * law.error:.3g} ",
+        f"error {ours / plain:.2f} of the LQR's, {1e3 * ours:.3g} mrad, foreseen {1e3 * (law.error or 0.0):.3g} ",
         f"({1e3 * law.upper['error']:.3g}); unstable {unstable} of {moves}, ",
         f"foreseen {law.unstable} of 40; {seconds:.0f} s",
     )
