@@ -157,6 +157,7 @@ def judge_machine(seed: int, number: int, moves: int, folder: Path) -> str:
     impacts = np.concatenate([run["impacts"] for run in runs[0]])
     ours, plain = (float(np.median([run["error"] for run in both])) for both in runs)
     law = found.laws[-1]
+    assert law.error is not None
     true = bound_time(replace_gap(task, effects["alpha"]), task.impact_speed)
     asked, foreseen = task.impact_speed, float(np.median(law.times))
     unstable = sum(not run["stable"] for run in runs[0])

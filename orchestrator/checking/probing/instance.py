@@ -44,9 +44,9 @@ class FmuInstance:
         name = self.library.names.name(function)
         if self.dead:
             raise StatusError(name, FATAL, f"{name} was not called, because a call before returned a fatal error")
-        status, values = self.library.raw(self.number, name, self.library.names.arguments(function, values))
+        status, found = self.library.raw(self.number, name, self.library.names.arguments(function, values))
         self.dead = status == FATAL
-        return status, values
+        return status, found
 
     def call(self, function: str, *values: Any, when: str = "") -> list[Any]:
         """Call a function that must return OK or Warning; return what its output arguments hold.
