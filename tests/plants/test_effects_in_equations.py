@@ -96,12 +96,12 @@ def test_ripple_has_three_harmonics() -> None:
     second = {"torque_ripple__second__amplitude": 0.7, "torque_ripple__second__phase": 0.3}
     third = {"torque_ripple__third__amplitude": -0.5, "torque_ripple__third__phase": 1.0}
     first = {"torque_ripple__amplitude": 1.1}
-    assert eq.ripple(1.7, p_of(**base)) == 0.0
-    assert eq.ripple(1.7, p_of(**base, **first)) == pytest.approx(1.1 * one)
-    assert eq.ripple(1.7, p_of(**base, **second)) == pytest.approx(0.7 * two)
-    assert eq.ripple(1.7, p_of(**base, **third)) == pytest.approx(-0.5 * three)
+    assert eq.of_body.ripple(1.7, p_of(**base)) == 0.0
+    assert eq.of_body.ripple(1.7, p_of(**base, **first)) == pytest.approx(1.1 * one)
+    assert eq.of_body.ripple(1.7, p_of(**base, **second)) == pytest.approx(0.7 * two)
+    assert eq.of_body.ripple(1.7, p_of(**base, **third)) == pytest.approx(-0.5 * three)
     all_three = p_of(**base, **first, **second, **third)
-    assert eq.ripple(1.7, all_three) == pytest.approx(1.1 * one + 0.7 * two - 0.5 * three)
+    assert eq.of_body.ripple(1.7, all_three) == pytest.approx(1.1 * one + 0.7 * two - 0.5 * three)
 
 
 def test_a_resonance_turns_with_the_load() -> None:
