@@ -15,6 +15,9 @@ from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
+MOST_FILES = 1000
+"""Files that a folder of the cache keeps: some hundred kernels and libraries of a few versions, about 20 MB."""
+
 
 def require_room(folder: Path) -> None:
     """Write a file without a name; raise ``OSError`` where that fails. An empty one can be made on a full disk, too."""
@@ -36,7 +39,18 @@ def cache_directory(name: str) -> Path:
         require_room(folder)
     except (OSError, RuntimeError):  # the latter where the user has no home
         return _temporary()
+    forget_oldest(folder)
     return folder
+
+
+def forget_oldest(folder: Path) -> None:
+    """Remove the files of a folder that were made longest ago, above ``MOST_FILES``."""
+    with contextlib.suppress(OSError):  # another process does the same
+        files = [entry for entry in os.scandir(folder) if entry.is_file()]
+        if len(files) > MOST_FILES:
+            files.sort(key=lambda entry: entry.stat().st_mtime)
+            for entry in files[: len(files) - MOST_FILES]:
+                os.unlink(entry)
 
 
 def _temporary() -> Path:

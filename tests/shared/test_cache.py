@@ -1,5 +1,6 @@
 """What is made once and kept."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -26,3 +27,15 @@ def test_bytes_are_made_once_for_a_key_and_anew_when_damaged(
     assert "was damaged, and is made anew" in caplog.text
     monkeypatch.setattr(cache, "cache_directory", lambda name: tmp_path / "missing")
     assert ask("ab", "c") == b"('ab', 'c')"
+
+
+def test_a_folder_forgets_the_oldest_files_above_a_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cache, "MOST_FILES", 4)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = tmp_path / "backlash-cosim" / "of_this_test"
+    (folder / "sub").mkdir(parents=True)
+    for n in range(7):
+        (folder / f"{n}.so").touch()
+        os.utime(folder / f"{n}.so", (0, 100 - n))
+    assert cache.cache_directory("of_this_test") == folder
+    assert sorted(path.name for path in folder.iterdir()) == ["0.so", "1.so", "2.so", "3.so", "sub"]
