@@ -10,7 +10,7 @@ from orchestrator.building.arrays import Array, arrays
 from orchestrator.building.translation.slave import has_states
 from orchestrator.fmi.clocks import SELF_SAMPLING
 from pyfmu_sources.adapters.fmu_variables import FmuVariable, unit_exponents
-from pyfmu_sources.adapters.model_xml import AUTHOR, DATE, ENUMERATIONS, LICENSE, LOG_CATEGORIES, VERSION
+from pyfmu_sources.adapters.model_xml import AUTHOR, DATE, ENUMERATIONS, LICENSE, LOG_CATEGORIES
 
 TYPES = {"Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration"}
 INDICATOR, CLOCK = "indicator", "sample"
@@ -26,7 +26,7 @@ def fmi3_description(cls: Any, name: str) -> Element:
             "instantiationToken": "",
             "description": cls.title,
             "author": AUTHOR,
-            "version": VERSION,
+            "version": "",
             "copyright": f"{AUTHOR}, {LICENSE} license",
             "license": LICENSE,
             "generationTool": "backlash-cosim",

@@ -1,4 +1,4 @@
-"""What every model description gets at the end of a build: the fingerprint, the GUID and its final text."""
+"""What every model description gets at the end of a build: version, fingerprint, GUID and its final text."""
 
 import uuid
 from collections.abc import Mapping
@@ -6,10 +6,12 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from orchestrator.building.sources import digest
+from orchestrator.shared.version import __version__
 
 
 def stamp(description: Element, fingerprint: str) -> None:
-    """Put in the fingerprint, 64 hexadecimal digits, by which a stale FMU is recognised."""
+    """Put in the version, and the fingerprint, 64 hexadecimal digits, by which a stale FMU is recognised."""
+    description.set("version", __version__)
     if description.attrib["fmiVersion"] == "3.0":
         annotations = ElementTree.SubElement(description, "Annotations")
         tool = ElementTree.SubElement(annotations, "Annotation", {"type": "backlash-cosim"})

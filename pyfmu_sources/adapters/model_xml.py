@@ -10,7 +10,6 @@ from .fmu_variables import FmuVariable, unit_exponents
 
 AUTHOR = "backlash-cosim project"
 LICENSE = "MIT"
-VERSION = "0.2.0"
 # A fixed date: the same sources give the same bytes on every day.
 DATE = "2026-01-01T00:00:00Z"
 ENUMERATIONS = {"BacklashModel": tuple((model.name, model.description) for model in MODELS)}
@@ -34,7 +33,7 @@ class Described(Protocol):
 
 
 def model_description(slave: Described, name: str) -> Element:
-    """Return the root element; GUID and model identifier of the build are put in by the builder."""
+    """Return the root element; GUID, version and model identifier are put in by the builder."""
     root = Element(
         "fmiModelDescription",
         {
@@ -43,7 +42,7 @@ def model_description(slave: Described, name: str) -> Element:
             "guid": "",
             "description": slave.title,
             "author": AUTHOR,
-            "version": VERSION,
+            "version": "",
             "copyright": f"{AUTHOR}, {LICENSE} license",
             "license": LICENSE,
             "generationTool": "backlash-cosim with PythonFMU",
