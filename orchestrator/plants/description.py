@@ -63,9 +63,9 @@ class Drive:
     """
 
     torque: int
-    lag: str
-    delay: str
-    limit: str
+    lag: str = "tau"
+    delay: str = "effects.input_delay.delay"
+    limit: str = "effects.torque_saturation.limit"
     second_lag: str = ""
     rate: str = ""
 

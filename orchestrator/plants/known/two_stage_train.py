@@ -31,7 +31,7 @@ PLANT = Plant(
         Body("load", angle=4, speed=5, inertia="J_l", encoder="theta_l", geared=True, viscous="b_l"),
     ),
     shaft=Shaft(stiffness="k_1", ratio="i_1", gap="alpha_1"),
-    drive=Drive(6, "tau", "effects.input_delay.delay", "effects.torque_saturation.limit"),
+    drive=Drive(6),
     starts={0: "theta_m_start", 1: "omega_m_start", 2: "theta_s_start", 3: "omega_s_start", 4: "theta_l_start",
             5: "omega_l_start", 6: "T_m_start"},
     offsets=("effects.sensor_offset.motor.offset", "effects.sensor_offset.load.offset"),
