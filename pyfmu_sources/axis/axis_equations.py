@@ -102,7 +102,8 @@ def drive_torque(x: State, p: Parameters, u: float) -> float:
 def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
     """Return the torque on the axis [N.m] of all but dry friction."""
     against = of_body.resisted(p.b * x[1] + p.load_torque_torque + T_l, x[0], x[1], p)
-    against += directional_friction(x[1], p.directional_friction_motor_difference)
+    if p.directional_friction_motor_difference != 0.0:
+        against += directional_friction(x[1], p.directional_friction_motor_difference)
     return drive_torque(x, p, u) + of_body.ripple(x[0], p) - against
 
 

@@ -10,14 +10,10 @@ from ..laws.friction import bristle_sign, bristle_slip, builds_up, capacity, is_
 from ..laws.parameter_rows import BIG
 from .axis_equations import Parameters, State, friction_of, past_stop, rates, sliding_torque, slip_at_rest
 
-__all__ = [
-    "COUNT", "DRIVE", "GUARDS", "REQUEST", "Mode", "Parameters", "State", "asked", "begin_step", "end_step", "guard",
-    "guard_room", "mode_rates", "switched", "turning", "with_drive",
-]  # fmt: skip
-
 COUNT = 5
 DRIVE, REQUEST = 2, 4
 GUARDS = 2
+TOLERANCE = 2e-10
 SLIP, STOP = range(GUARDS)
 Mode = tuple[int, int]
 

@@ -81,11 +81,6 @@ def stop_bodies(x: State) -> State:
     return (x[0], 0.0, x[2], 0.0, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
 
 
-def asked(x: State, request: float) -> State:
-    """Return the state with the filter of the drive at a ``request`` [N.m]."""
-    return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], request)
-
-
 def after_event(
     x: State,
     contact: int,

@@ -12,10 +12,10 @@ from ..adapters.slave_base import TOO_STIFF, StepRefusedError
 from ..hybrid.event_numbers import NO_EVENT
 from ..laws.parameter_rows import Parameter
 from . import drivetrain
-from .contact import asked
 from .drivetrain import Mode, Parameters, State, Table
 from .drivetrain_modes import QUIET, Indicators, Outputs, output_rates, rates_and_outputs, state_rates
 from .equations import NAMES, PARAMETERS
+from .hybrid_plant import asked
 from .smooth_mode import after_events, indicators
 
 THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(T_L + 1, T_L + 8)

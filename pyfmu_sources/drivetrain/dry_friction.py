@@ -8,6 +8,7 @@ In all functions: ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where bot
 flank, -1 or 1.
 """
 
+from ..hybrid.machine import NEVER
 from ..laws.backlash_models import HELD
 from ..laws.friction import builds_up, is_dry, leaving_speed
 from .bristles import capacity_l, capacity_m
@@ -27,7 +28,6 @@ from .equations import (
     rigid_acceleration,
 )
 
-NEVER = 1e300
 MOTOR, LOAD = 2, 3
 
 

@@ -6,14 +6,14 @@ breakaway torque, else it slides on the other way.
 In all functions: ``u``: requested torque [N.m], delayed and saturated already; ``T_l``: load torque [N.m].
 """
 
+from ..hybrid.machine import NEVER
 from ..laws.backlash_models import BOUNCING, HELD, NONE
 from ..laws.friction import bristle_sign, builds_up, reach
 from .bristles import bent, capacity_l, capacity_m, carried_l, carried_m, settled_slips
-from .contact import after_event, asked, join_teeth, on_flank, stop_bodies
+from .contact import after_event, join_teeth, on_flank, stop_bodies
 from .dry_friction import (
     LOAD,
     MOTOR,
-    NEVER,
     capacity_of_both,
     direction,
     friction_guard,
@@ -43,14 +43,10 @@ from .equations import (
     twist_rate,
 )
 
-__all__ = [
-    "COUNT", "DRIVE", "GUARDS", "REQUEST", "Mode", "Parameters", "State", "asked", "begin_step", "end_step", "guard",
-    "guard_room", "mode_rates", "switched", "turning", "with_drive",
-]  # fmt: skip
-
 COUNT = 12
 DRIVE, REQUEST = 4, 11
 GUARDS = 4
+TOLERANCE = 1e-11
 
 
 def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
@@ -190,6 +186,11 @@ def end_step(x: State, mode: Mode, p: Parameters) -> tuple[Mode, bool]:
         return (mode, False)
     follows = settled_slips(x, mode, p)
     return (follows, follows[1] != mode[1] or follows[2] != mode[2])
+
+
+def asked(x: State, request: float) -> State:
+    """Return the state with the filter of the drive at a ``request`` [N.m]."""
+    return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], request)
 
 
 def with_drive(x: State, torque: float) -> State:

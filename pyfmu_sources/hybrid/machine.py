@@ -21,6 +21,7 @@ from .plant import (
     DRIVE,
     GUARDS,
     REQUEST,
+    TOLERANCE,
     Mode,
     Parameters,
     State,
@@ -36,12 +37,11 @@ from .plant import (
 )
 
 SLOTS = (
-    "COUNT", "DRIVE", "GUARDS", "REQUEST", "Mode", "Parameters", "State", "asked", "begin_step", "end_step", "guard",
-    "guard_room", "mode_rates", "switched", "turning", "with_drive",
+    "COUNT", "DRIVE", "GUARDS", "REQUEST", "TOLERANCE", "Mode", "Parameters", "State", "asked", "begin_step",
+    "end_step", "guard", "guard_room", "mode_rates", "switched", "turning", "with_drive",
 )  # fmt: skip
 
-RELATIVE_TOLERANCE = 1e-11
-ABSOLUTE_TOLERANCE = 1e-13
+ABSOLUTE = 0.01  # rad, rad/s or N.m, times the tolerance: what counts as much as the state itself near zero
 SLOW = 0.01  # of the drive's lag: its torque is smooth within a shorter step
 NEVER = 1e300
 # Integration steps that one communication step may take, and how many more for each second of it. What needs more is
@@ -61,84 +61,9 @@ def is_quick(p: Parameters, h: float) -> bool:
     return h > SLOW * p.tau and p.tau > 0.0 and p.drive_filter_time_constant <= 0.0 and p.rate_limit_rate >= BIG
 
 
-def driven(x: State, after: State, quick: bool, p: Parameters, u: float, h: float) -> State:
+def driven(x: State, after: State, p: Parameters, u: float, h: float) -> State:
     """Return ``after``, ``h`` [s] later, with the torque of a quick drive then: ``u + (T_m - u) exp(-h / tau)``."""
-    return with_drive(after, u + (x[DRIVE] - u) * exp(-h / p.tau)) if quick else after
-
-
-def second(x: State, k1: State, h: float) -> State:
-    """Return the second stage of a step."""
-    return tuple(x[n] + h / 5.0 * k1[n] for n in range(COUNT))
-
-
-def third(x: State, k1: State, k2: State, h: float) -> State:
-    """Return the third stage."""
-    return tuple(x[n] + h * (3.0 / 40.0 * k1[n] + 9.0 / 40.0 * k2[n]) for n in range(COUNT))
-
-
-def fourth(x: State, k1: State, k2: State, k3: State, h: float) -> State:
-    """Return the fourth stage."""
-    return tuple(x[n] + h * (44.0 / 45.0 * k1[n] + -56.0 / 15.0 * k2[n] + 32.0 / 9.0 * k3[n]) for n in range(COUNT))
-
-
-def fifth(x: State, k1: State, k2: State, k3: State, k4: State, h: float) -> State:
-    """Return the fifth stage."""
-    return tuple(
-        x[n]
-        + h
-        * (
-            19372.0 / 6561.0 * k1[n]
-            + -25360.0 / 2187.0 * k2[n]
-            + 64448.0 / 6561.0 * k3[n]
-            + -212.0 / 729.0 * k4[n]
-        )
-        for n in range(COUNT)
-    )  # fmt: skip
-
-
-def sixth(x: State, k1: State, k2: State, k3: State, k4: State, k5: State, h: float) -> State:
-    """Return the sixth stage."""
-    return tuple(
-        x[n]
-        + h
-        * (
-            9017.0 / 3168.0 * k1[n]
-            + -355.0 / 33.0 * k2[n]
-            + 46732.0 / 5247.0 * k3[n]
-            + 49.0 / 176.0 * k4[n]
-            + -5103.0 / 18656.0 * k5[n]
-        )
-        for n in range(COUNT)
-    )  # fmt: skip
-
-
-def seventh(x: State, k1: State, k3: State, k4: State, k5: State, k6: State, h: float) -> State:
-    """Return the state at the end, which is the seventh stage."""
-    return tuple(
-        x[n]
-        + h
-        * (
-            35.0 / 384.0 * k1[n]
-            + 500.0 / 1113.0 * k3[n]
-            + 125.0 / 192.0 * k4[n]
-            + -2187.0 / 6784.0 * k5[n]
-            + 11.0 / 84.0 * k6[n]
-        )
-        for n in range(COUNT)
-    )  # fmt: skip
-
-
-def difference(k1: State, k3: State, k4: State, k5: State, k6: State, k7: State) -> State:
-    """Return the error of the fifth order less that of the fourth, over the length of the step."""
-    return tuple(
-        71.0 / 57600.0 * k1[n]
-        + -71.0 / 16695.0 * k3[n]
-        + 71.0 / 1920.0 * k4[n]
-        + -17253.0 / 339200.0 * k5[n]
-        + 22.0 / 525.0 * k6[n]
-        + -1.0 / 40.0 * k7[n]
-        for n in range(COUNT)
-    )
+    return with_drive(after, u + (x[DRIVE] - u) * exp(-h / p.tau))
 
 
 def runge_kutta(
@@ -146,21 +71,44 @@ def runge_kutta(
 ) -> tuple[State, State, float]:
     """Return the state after one step, its derivative there and the scaled error: below 1 within the tolerance."""
     quick = is_quick(p, h)
-    k2 = mode_rates(driven(x, second(x, k1, h), quick, p, u, h / 5.0), mode, p, u, T_l)
-    k3 = mode_rates(driven(x, third(x, k1, k2, h), quick, p, u, 0.3 * h), mode, p, u, T_l)
-    k4 = mode_rates(driven(x, fourth(x, k1, k2, k3, h), quick, p, u, 0.8 * h), mode, p, u, T_l)
-    k5 = mode_rates(driven(x, fifth(x, k1, k2, k3, k4, h), quick, p, u, 8.0 / 9.0 * h), mode, p, u, T_l)
-    k6 = mode_rates(driven(x, sixth(x, k1, k2, k3, k4, k5, h), quick, p, u, h), mode, p, u, T_l)
-    after = driven(x, seventh(x, k1, k3, k4, k5, k6, h), quick, p, u, h)
+    at = tuple(x[n] + h / 5.0 * k1[n] for n in range(COUNT))
+    k2 = mode_rates(driven(x, at, p, u, h / 5.0) if quick else at, mode, p, u, T_l)
+    at = tuple(x[n] + h * (3.0 / 40.0 * k1[n] + 9.0 / 40.0 * k2[n]) for n in range(COUNT))
+    k3 = mode_rates(driven(x, at, p, u, 0.3 * h) if quick else at, mode, p, u, T_l)
+    at = tuple(x[n] + h * (44.0 / 45.0 * k1[n] + -56.0 / 15.0 * k2[n] + 32.0 / 9.0 * k3[n]) for n in range(COUNT))
+    k4 = mode_rates(driven(x, at, p, u, 0.8 * h) if quick else at, mode, p, u, T_l)
+    at = tuple(
+        x[n]
+        + h * (19372.0 / 6561.0 * k1[n] + -25360.0 / 2187.0 * k2[n] + 64448.0 / 6561.0 * k3[n] + -212.0 / 729.0 * k4[n])
+        for n in range(COUNT)
+    )
+    k5 = mode_rates(driven(x, at, p, u, 8.0 / 9.0 * h) if quick else at, mode, p, u, T_l)
+    at = tuple(
+        x[n] + h * (
+            9017.0 / 3168.0 * k1[n] + -355.0 / 33.0 * k2[n] + 46732.0 / 5247.0 * k3[n] + 49.0 / 176.0 * k4[n]
+            + -5103.0 / 18656.0 * k5[n]
+        ) for n in range(COUNT)
+    )  # fmt: skip
+    k6 = mode_rates(driven(x, at, p, u, h) if quick else at, mode, p, u, T_l)
+    after = tuple(
+        x[n] + h * (
+            35.0 / 384.0 * k1[n] + 500.0 / 1113.0 * k3[n] + 125.0 / 192.0 * k4[n] + -2187.0 / 6784.0 * k5[n]
+            + 11.0 / 84.0 * k6[n]
+        ) for n in range(COUNT)
+    )  # fmt: skip
+    after = driven(x, after, p, u, h) if quick else after
     k7 = mode_rates(after, mode, p, u, T_l)
-    wrong = difference(k1, k3, k4, k5, k6, k7)
+    shares = tuple(
+        h * (
+            71.0 / 57600.0 * k1[n] + -71.0 / 16695.0 * k3[n] + 71.0 / 1920.0 * k4[n] + -17253.0 / 339200.0 * k5[n]
+            + 22.0 / 525.0 * k6[n] + -1.0 / 40.0 * k7[n]
+        ) / (TOLERANCE * (ABSOLUTE + max(abs(x[n]), abs(after[n])))) for n in range(COUNT)
+    )  # fmt: skip
     square = 0.0
     known = DRIVE if quick else -1
     for n in range(COUNT):
         if n != known:
-            scale = ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * max(abs(x[n]), abs(after[n]))
-            share = h * wrong[n] / scale
-            square += share * share
+            square += shares[n] * shares[n]
     return (after, k7, sqrt(square / 8.0))
 
 
@@ -217,27 +165,42 @@ def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Ann
     return tuple(indicator(x, mode, which, p, u, T_l) for which in range(GUARDS))
 
 
-def locate(x: State, k1: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, float, int]:
-    """Return (state, time, guard) at which the first guard turns negative inside a step that ends beyond it."""
-    low = 0.0
-    high = h
-    beyond = x
-    which = -1
-    for _ in range(LOCATE_STEPS):
-        middle = 0.5 * (low + high)
-        if middle <= low or middle >= high:
-            break
-        state, _k, _e = runge_kutta(x, k1, mode, p, u, T_l, middle)
+def depth(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: float) -> float:
+    """Return how far a guard is from its event, which has it between one and two roundings below zero."""
+    return guard(x, mode, which, p, u, T_l) + 1.5 * guard_room(x, mode, which, p)
+
+
+def locate(
+    x: State, k1: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, beyond: State, which: int
+) -> tuple[State, float, int]:
+    """Return (state, time, guard) at which the first guard turns negative inside a step.
+
+    Regula falsi with halved ends (Illinois), and every third time the middle, where a guard is far from straight.
+
+    Args:
+        beyond: state at the end of the step, which violates the guard ``which``.
+    """
+    low, high, last = 0.0, h, 0
+    above, below = depth(x, mode, which, p, u, T_l), depth(beyond, mode, which, p, u, T_l)
+    for n in range(LOCATE_STEPS):
+        share = above / (above - below) if n % 3 != 2 and above < NEVER else 0.5
+        time = low + share * (high - low)
+        if time <= low or time >= high:
+            time = 0.5 * (low + high)
+            if time <= low or time >= high:
+                break
+        state, _k, _e = runge_kutta(x, k1, mode, p, u, T_l, time)
         found = violated(state, mode, p, u, T_l)
         if found < 0:
-            low = middle
-        else:
-            high = middle
-            beyond = state
-            which = found
-    if which < 0:
-        beyond, _k, _e = runge_kutta(x, k1, mode, p, u, T_l, h)
-        which = violated(beyond, mode, p, u, T_l)
+            below = 0.5 * below if last < 0 else below
+            above = depth(state, mode, which, p, u, T_l)
+            low, last = time, -1
+            continue
+        above = NEVER if found != which else 0.5 * above if last > 0 else above
+        below = depth(state, mode, found, p, u, T_l)
+        high, last, beyond, which = time, 1, state, found
+        if -below <= 0.5 * guard_room(state, mode, which, p):
+            break
     return (beyond, high, which)
 
 
@@ -260,13 +223,15 @@ def to_event(
                 continue
             if not error < NEVER:
                 break
-        turn = turning(x, k1, after, k7, mode, p, step)
-        if turn > 0.0 and violated(after, mode, p, u, T_l) < 0:
+        which = violated(after, mode, p, u, T_l)
+        turn = turning(x, k1, after, k7, mode, p, step) if which < 0 else 0.0
+        if turn > 0.0:
             inside, _k, _e = runge_kutta(x, k1, mode, p, u, T_l, turn)
-            if violated(inside, mode, p, u, T_l) >= 0:
-                after, step, last = inside, turn, False
-        if violated(after, mode, p, u, T_l) >= 0:
-            after, step, which = locate(x, k1, mode, p, u, T_l, step)
+            which = violated(inside, mode, p, u, T_l)
+            if which >= 0:
+                after, step = inside, turn
+        if which >= 0:
+            after, step, which = locate(x, k1, mode, p, u, T_l, step, after, which)
             return (after, mode, elapsed + step, work + WORK_OF_EVENT, which)
         x = after
         k1 = k7

@@ -13,6 +13,8 @@ DRIVE, REQUEST = 2, 3
 """Places in the state of the drive's torque behind its lag, and of the request that it follows."""
 GUARDS = 1
 """Number of guards."""
+TOLERANCE = 1e-11
+"""Error that one step of the integrator may make, relative to the state."""
 State = Annotated[tuple[float, ...], COUNT]
 Mode = tuple[int]
 

@@ -33,8 +33,9 @@ HYSTERESIS, BACKLASH, COMPLIANCE = 12, 13, 14
 
 def resisted(against: float, angle: float, speed: float, p: Parameters) -> float:
     """Return the torque ``against`` a body [N.m] with that of all laws of one that carries the load."""
-    gravity = periodic(angle, p.gravity_load_amplitude, 1.0, p.gravity_load_phase)
-    against += gravity + quadratic_drag(speed, p.quadratic_drag_coefficient)
+    if p.gravity_load_amplitude != 0.0 or p.quadratic_drag_coefficient != 0.0:
+        gravity = periodic(angle, p.gravity_load_amplitude, 1.0, p.gravity_load_phase)
+        against += gravity + quadratic_drag(speed, p.quadratic_drag_coefficient)
     if p.spring_load_stiffness != 0.0 or p.spring_load_cubic != 0.0:
         against += spring_torque(angle, p.spring_load_stiffness, p.spring_load_cubic, p.spring_load_angle)
     if angle > p.end_stop_upper or angle < p.end_stop_lower:

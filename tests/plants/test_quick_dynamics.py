@@ -59,8 +59,8 @@ def test_a_sliding_axis_with_a_lag_moves_as_its_closed_form_says(tau):
         angle += free * -math.expm1(-slow * h) / slow + rest * h + part * -math.expm1(-quick * h) / quick
         speed = free * math.exp(-slow * h) + rest + part * math.exp(-quick * h)
         drive = u + (drive - u) * math.exp(-quick * h)
-        assert x[0] == pytest.approx(angle, rel=2e-7)
-        assert x[1] == pytest.approx(speed, rel=2e-7)
+        assert x[0] == pytest.approx(angle, rel=5e-9)
+        assert x[1] == pytest.approx(speed, rel=5e-9)
         assert x[2] == pytest.approx(drive, abs=1e-12)
 
 
