@@ -14,6 +14,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 
+from orchestrator import __version__
 from orchestrator.building import build, sources, starts
 from orchestrator.building.archive import read_archive, write_archive
 from orchestrator.building.launcher import Toolchain, compile_launcher, find_toolchain
@@ -56,6 +57,7 @@ def test_the_description_is_complete(fmus: dict[str, Path], name: str) -> None:
     assert capabilities.get("needsExecutionTool") == "false"
     assert capabilities.get("canGetAndSetFMUstate") == capabilities.get("canSerializeFMUstate") == "true"
     assert (root.get("generationDateAndTime") or "").endswith("Z")
+    assert root.get("version") == __version__
 
 
 def test_the_enumeration_is_the_parameter_table_s() -> None:
