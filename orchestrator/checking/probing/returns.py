@@ -65,7 +65,7 @@ class RunPoint:
     values: list[Any]
     rows: list[list[Any]]
     solver: float = 0.0
-    wanted: tuple[str, str] = ("have its values back before the next step", "continue as before")
+    wanted: tuple[str, str] = ("have its values back", "continue as before")
 
     def first_difference(self, values: Sequence[Any]) -> tuple[ProbedVariable, str] | None:
         """The first variable that has another value there, and how it differs."""
@@ -92,7 +92,8 @@ def _has_values(context: Context, point: RunPoint, driver: Driver, rule: str, wh
         return True
     v, text = lost
     mild = "state.time" if v.causality == "independent" else "run.inexact" if point.is_slight(found) else ""
-    context.report(mild or rule, f"{what} must {point.wanted[0]}, but {text}", v.name)
+    how = " bit for bit" if mild == "run.inexact" else "" if point.number == 0 else " before the next step"
+    context.report(mild or rule, f"{what} must {point.wanted[0]}{how}, but {text}", v.name)
     return bool(mild)
 
 
