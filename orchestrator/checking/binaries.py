@@ -109,7 +109,7 @@ def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
         if folder not in known and folder not in others:
             message = f"a folder of binaries must be one of {', '.join(PLATFORMS[version])}, but is `{folder}`"
             yield Finding("binary.folder", f"binaries/{folder}", message)
-    if not known and not others and not any(n.startswith("sources/") for n in names):
+    if not known and not others and (folders or not any(n.startswith("sources/") for n in names)):
         has = "binaries for no platform that FMI names" if folders else "neither"
         yield Finding("binary.none", "binaries", f"an FMU must have binaries or sources, but has {has}")
     elif here(version) not in known:
