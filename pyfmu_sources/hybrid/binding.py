@@ -37,7 +37,7 @@ class _WrittenOut(ast.NodeTransformer):
         made = node.args[0] if node.args else None
         if not isinstance(made, ast.GeneratorExp) or not isinstance(made.generators[0].target, ast.Name):
             return self.generic_visit(node)
-        count = self._given[made.generators[0].iter.args[0].id]  # type: ignore[attr-defined] - of `range(COUNT)`
+        count = self._given[made.generators[0].iter.args[0].id]  # type: ignore[attr-defined]
         variable = made.generators[0].target.id
         return ast.Tuple([_Numbered(variable, n).visit(copy.deepcopy(made.elt)) for n in range(count)], ast.Load())
 
