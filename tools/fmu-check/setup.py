@@ -16,6 +16,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 PARTS = (
     "LICENSE",
     "orchestrator/__init__.py",
+    "orchestrator/__init__.pyi",
     "orchestrator/__main__.py",
     "orchestrator/errors.py",
     "orchestrator/plain_text.py",
@@ -35,6 +36,7 @@ PARTS = (
     "orchestrator/shared/*.py",
     "orchestrator/shared/isolation/*.py",
     "orchestrator/shared/results/__init__.py",
+    "orchestrator/shared/results/fields.py",
 )
 
 
