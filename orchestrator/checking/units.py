@@ -1,36 +1,82 @@
 """What names of units mean beyond doubt, so that the exponents, factors and offsets of a description can be checked."""
 
+import math
 import re
 from dataclasses import dataclass
 
-from orchestrator.shared.units import EXPONENTS, KnownUnit, parse_unit
+from orchestrator.shared.units import EXPONENTS
 
-# Names that may mean two things (`g`, `t`, `U`) are not among them.
-_NAMES = (
-    "rad radian deg degree rev % kg m mm cm km um s ms min h A mA K degC mol cd Hz rpm N kN J kJ Pa kPa MPa mbar bar "
-    "W kW V Ohm H Wb T"
-)
-_SURE = frozenset(_NAMES.split())
+# Unit: factor to the base units, exponents of these. Names that may mean two things (`g`, `t`, `U`) are not among them.
+_TABLE = """
+1 1 | rad 1 rad | radian 1 rad | deg DEG rad | degree DEG rad | rev REV rad | sr 1 | % 0.01
+kg 1 kg | m 1 m | mm 1e-3 m | cm 1e-2 m | km 1e3 m | um 1e-6 m
+s 1 s | ms 1e-3 s | min 60 s | h 3600 s | A 1 A | mA 1e-3 A | K 1 K | degC 1 K | mol 1 mol | cd 1 cd
+Hz 1 s-1 | rpm RPM rad s-1 | N 1 kg m s-2 | kN 1e3 kg m s-2 | J 1 kg m2 s-2 | kJ 1e3 kg m2 s-2
+Pa 1 kg m-1 s-2 | kPa 1e3 kg m-1 s-2 | MPa 1e6 kg m-1 s-2 | mbar 100 kg m-1 s-2 | bar 1e5 kg m-1 s-2
+W 1 kg m2 s-3 | kW 1e3 kg m2 s-3 | V 1 kg m2 s-3 A-1 | Ohm 1 kg m2 s-3 A-2
+H 1 kg m2 s-2 A-2 | Wb 1 kg m2 s-2 A-1 | T 1 kg s-2 A-1
+"""
+_ANGLES = {"DEG": math.pi / 180.0, "REV": 2.0 * math.pi, "RPM": math.pi / 30.0}
+_OFFSETS = {"degC": 273.15}
 _TOLERANCE = 0.01  # of a factor or an offset: rounded ones are right, wrong ones are off by more
+_MOST_POWER = 9
+_FACTOR = re.compile(r"([A-Za-z%]+|1)\^?(-?[0-9]+)?")
+_POWER = re.compile(r"([A-Za-z]+)(-?\d*)")
 
 
-def known_unit(name: str) -> KnownUnit | None:
+@dataclass(frozen=True)
+class UnitMeaning:
+    """``value in base units = factor * value + offset``; the exponents are those of ``EXPONENTS``."""
+
+    exponents: tuple[int, ...]
+    factor: float
+    offset: float = 0.0
+
+
+def _read_table() -> dict[str, UnitMeaning]:
+    units = {}
+    for entry in _TABLE.replace("\n", "|").split("|"):
+        if entry.strip():
+            name, factor, *powers = entry.split()
+            pairs = [_POWER.fullmatch(power) for power in powers]
+            found = {pair[1]: int(pair[2] or 1) for pair in pairs if pair}
+            value = _ANGLES[factor] if factor in _ANGLES else float(factor)
+            units[name] = UnitMeaning(tuple(found.get(e, 0) for e in EXPONENTS), value, _OFFSETS.get(name, 0.0))
+    return units
+
+
+_UNITS = _read_table()
+
+
+def known_unit(name: str) -> UnitMeaning | None:
     """What a name such as ``N.m.s/rad`` means; None when that is not certain."""
-    plain = name.replace(" ", "")
-    if plain not in ("1", "degC"):
-        if not _is_simple(plain) or not _SURE.issuperset(re.findall("[A-Za-z]+|[^-0-9./*^()]", plain)):
+    if name in _UNITS:
+        return _UNITS[name]
+    exponents, factor, sign = [0] * len(EXPONENTS), 1.0, 1
+    for part in re.split(r"([/.*])", name.replace(" ", "").replace("(", "").replace(")", "") if _simple(name) else "?"):
+        if part in (".", "*"):
+            continue
+        if part == "/":
+            sign = -1
+            continue
+        match = _FACTOR.fullmatch(part)
+        if match is None or match[1] not in _UNITS:
             return None
-        plain = plain.replace("degC", "K")  # in a product it is a difference
-    return parse_unit(plain)
+        power, unit = sign * int(match[2] or 1), _UNITS[match[1]]
+        if abs(power) > _MOST_POWER:
+            return None
+        factor *= unit.factor**power
+        exponents = [total + power * e for total, e in zip(exponents, unit.exponents, strict=True)]
+    return UnitMeaning(tuple(exponents), factor)
 
 
 def dimension_of(name: str) -> dict[str, int] | None:
     """Exponents of SI base units by name, zeros may lack, angles left out; None when it is not understood."""
     unit = known_unit(name)
-    return None if unit is None else dict(zip(EXPONENTS[:-1], unit.dimension, strict=False))
+    return None if unit is None else dict(zip(EXPONENTS[:-1], unit.exponents, strict=False))
 
 
-def _is_simple(name: str) -> bool:
+def _simple(name: str) -> bool:
     """One fraction bar at most; what follows it is all below the bar when it is in brackets or a single unit."""
     if name.count("/") > 1:
         return False
@@ -69,14 +115,14 @@ def lacks_angle(name: str, rad: int) -> bool:
     known = known_unit(name)
     if known is None or rad or not name.startswith(("rad", "deg")):
         return False
-    exponents = dict(zip(EXPONENTS, known.dimension[:-1], strict=True))
+    exponents = dict(zip(EXPONENTS, known.exponents, strict=True))
     return exponents.pop("rad") == 1 and not any(e for base, e in exponents.items() if base != "s")
 
 
 def base_conversion(name: str, exponents: dict[str, int]) -> Conversion | None:
     """From a unit to the SI base units, by its name; None where that is not certain, or the exponents are others."""
     known = known_unit(name)
-    if known is None or known.dimension[:-1] != tuple(exponents.values()) or not any(known.dimension):
+    if known is None or known.exponents != tuple(exponents.values()) or not any(known.exponents):
         return None
     return Conversion(known.factor, known.offset)
 
@@ -86,8 +132,8 @@ def display_conversion(name: str, shown: str) -> Conversion | None:
     unit, display = known_unit(name), known_unit(shown)
     if unit is None or display is None:
         return None
-    if unit.dimension == display.dimension:
+    if unit.exponents == display.exponents:
         return Conversion(unit.factor / display.factor, (unit.offset - display.offset) / display.factor)
-    if unit.dimension == tuple(-e for e in display.dimension):
+    if unit.exponents == tuple(-e for e in display.exponents):
         return Conversion(1.0 / (unit.factor * display.factor), 0.0, True)
     return None
