@@ -50,7 +50,7 @@ def columns(draw):
             stated["offset"] = draw(st.floats(-3.0, 3.0))
         ways = ["modulo", "sign_bit", "", ""] if unit == "counts" or name == "u" else [""]
         if way := draw(st.sampled_from(ways)):
-            stated[way] = {"modulo": 65536.0, "sign_bit": 32768.0}[way]
+            stated[way] = {"modulo": 65536.0, "sign_bit": 2.0**23}[way]  # the motion is at most 4e5 counts
             if name != "u" and way == "modulo":
                 stated["modulo"] = float(stated["counts_per_rev"])
                 stated.pop("factor", None)
