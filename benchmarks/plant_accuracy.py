@@ -8,10 +8,10 @@ from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
-from orchestrator.plants.reference import ReferencePlant
 from pyfmu_sources.drivetrain.equations import parameters
 from pyfmu_sources.laws.backlash_models import BACKLASH_MODELS
 from tests.support.compiled_plants import compiled_plant
+from tests.support.reference_plant import ReferencePlant
 from tests.support.reference_runs import linear_solution, reference_solution
 
 H, STEPS = 1e-3, 2000

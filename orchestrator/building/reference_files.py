@@ -2,7 +2,7 @@
 
 The experiment's own format is the Modelica Association's for experiments (XML; it was an appendix of FMI-LS-REF
 before it became a specification of its own), its parameter set is SSP's SSV. The results come from
-:mod:`orchestrator.building.reference_runs`, not from the FMU.
+:mod:`tools.reference_runs`, not from the FMU.
 """
 
 import csv

@@ -1,1 +1,1 @@
-"""The plants: compiled sources, description, coarse runs, controller design, an independent reference."""
+"""The plants: compiled sources, description, coarse runs, controller design."""

@@ -14,9 +14,9 @@ from orchestrator.building import build
 from orchestrator.building.archive import read_archive
 from orchestrator.building.launcher import find_toolchain
 from orchestrator.building.reference_files import DATA, FOLDER, PARAMETERS
-from orchestrator.building.reference_runs import reference_run
-from orchestrator.building.starts import default_starts, design_starts
+from orchestrator.building.starts import default_starts
 from tests.support.fmu_calls import OK, RawFmu
+from tools.reference_runs import design_starts, reference_run
 
 NAMES = tuple(PARAMETERS)
 LAYERED = "{http://fmi-standard.org/fmi-ls-manifest}"

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from orchestrator.plants.reference import ReferencePlant
 from pyfmu_sources.drivetrain import drivetrain, linear_mode
 from pyfmu_sources.drivetrain.equations import NAMES, parameters
 from pyfmu_sources.laws.backlash_models import BACKLASH_MODELS
 from pyfmu_sources.laws.parameter_rows import with_values
 from tests.support.compiled_plants import compiled_plant
+from tests.support.reference_plant import ReferencePlant
 from tests.support.reference_runs import linear_solution, reference_solution
 
 H = 1e-3

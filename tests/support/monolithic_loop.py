@@ -5,7 +5,7 @@ It shares the gains with the project, which are parameters, and no code of the l
 
 import numpy as np
 
-from orchestrator.plants.reference import ReferencePlant, first_flank, reference_sample
+from tests.support.reference_plant import ReferencePlant, first_flank, reference_sample
 
 
 def monolithic_loop(experiment, alpha, errors=None):

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from orchestrator.plants.reference import ReferencePlant, first_flank, reference_sample
+from tests.support.reference_plant import ReferencePlant, first_flank, reference_sample
 
 Array = NDArray[np.float64]
 

@@ -1,8 +1,10 @@
 """The reference experiments of our FMUs, computed without them: where ``data/*_reference.csv`` comes from.
 
-The plant's is the event-located solution of :mod:`orchestrator.plants.reference`; controller and estimator are their
-defining formulas in matrix form. ``python -m orchestrator.building.reference_runs`` writes the files anew; a test holds
-them to what is computed here and to what the FMUs do.
+python -m tools.reference_runs
+
+The plant's is the event-located solution of :mod:`tests.support.reference_plant`; controller and estimator are their
+defining formulas in matrix form. The files are written anew; a test holds them to what is computed here and to what
+the FMUs do.
 """
 
 import csv
@@ -15,13 +17,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.building.reference_files import DATA, PARAMETERS, STEPS
-from orchestrator.building.starts import STORED, default_starts, design_starts
-from orchestrator.plants.reference import ReferencePlant, first_flank, reference_sample
+from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, STORED, TORQUE_WEIGHT, default_starts
+from orchestrator.plants.design import (
+    DrivetrainValues,
+    design_estimator,
+    design_regulator,
+    five_state_model,
+    six_state_model,
+)
+from tests.support.reference_plant import ReferencePlant, first_flank, reference_sample
+from tools import refuse_arguments
 
 Array = NDArray[np.float64]
 HALF_GAP = PARAMETERS["Drivetrain"]["alpha"]
 PLANT_STEP = STEPS["Drivetrain"]
 SAMPLE = STEPS["LqrController"]
+TORQUE_LIMIT = 300.0
+PROCESS_NOISE = (0.0, 0.0, 0.0, 1e-2, 10.0, 400.0)
+ENCODER_NOISE = 1e-4
 
 Row = dict[str, float]
 
@@ -111,6 +124,36 @@ def _as_csv(rows: list[Row]) -> bytes:
     return text.getvalue().encode("ascii")
 
 
+def design_starts() -> dict[str, dict[str, float]]:
+    """Return the start values as this machine designs them, by class name, to twelve digits."""
+    controller = _design_controller()
+    designs = {"LqrController": controller, "KalmanEstimator": _design_estimator(), "BacklashCompensator": controller}
+    return {name: {key: float(f"{value:.12g}") for key, value in values.items()} for name, values in designs.items()}
+
+
+def _design_controller() -> dict[str, float]:
+    values = DrivetrainValues()
+    regulator = design_regulator(five_state_model(values), np.diag(STATE_WEIGHTS), TORQUE_WEIGHT, SAMPLE_TIME)
+    gains = {f"K[{n}]": gain for n, gain in enumerate(regulator.gains, start=1)}
+    return gains | {"i": values.i, "compliance": 1.0 / values.k, "u_max": TORQUE_LIMIT, "sample_time": SAMPLE_TIME}
+
+
+def _design_estimator() -> dict[str, float]:
+    variances = np.full(2, ENCODER_NOISE**2)
+    e = design_estimator(six_state_model(DrivetrainValues()), np.array(PROCESS_NOISE), variances, SAMPLE_TIME)
+    entries: dict[str, float] = {"sample_time": SAMPLE_TIME}
+    for r in range(6):
+        entries |= {f"A_d[{r + 1},{c + 1}]": float(e.A[r, c]) for c in range(6)}
+        entries |= {f"B_d[{r + 1}]": float(e.B[r])}
+        entries |= {f"K_f[{r + 1},{c + 1}]": float(e.L[r, c]) for c in range(2)}
+    inverse = e.S_inverse
+    return entries | {
+        "S_inv[1,1]": float(inverse[0, 0]),
+        "S_inv[1,2]": float(inverse[0, 1]),
+        "S_inv[2,2]": float(inverse[1, 1]),
+    }
+
+
 def main() -> None:
     """Write the files, the start values first: the runs use them."""
     STORED.write_text(json.dumps(design_starts(), indent=1) + "\n", encoding="ascii")
@@ -119,4 +162,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    refuse_arguments(__doc__)
     main()
