@@ -36,8 +36,6 @@ from orchestrator.api.ssp import ExportedSsp as ExportedSsp
 from orchestrator.api.ssp import export_ssp as export_ssp
 from orchestrator.api.sweep import SweepResult as SweepResult
 from orchestrator.api.sweep import sweep as sweep
-from orchestrator.api.thesis import ThesisResult as ThesisResult
-from orchestrator.api.thesis import thesis as thesis
 from orchestrator.errors import CalibrationError as CalibrationError
 from orchestrator.errors import ConvergenceError as ConvergenceError
 from orchestrator.errors import FmuError as FmuError

@@ -25,7 +25,6 @@ COMMANDS = {
     "calibrate": "fit parameters of any FMU to a measured record, with intervals",
     "regulator": "design an LQR, and predict the limit cycle that the gap causes",
     "compensate": "design a controller that crosses the gap softly, and test it on simulated plants",
-    "thesis": "compare the thesis's published numbers with recomputed ones",
     "ssp": "export the pair of loops as an SSP file, or run any SSP file",
     "workbench": "run the commands from the browser, on this machine only",
     "report": "rebuild the HTML report of a result directory",

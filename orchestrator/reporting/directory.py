@@ -15,7 +15,7 @@ from orchestrator.shared.output import write_whole
 PAGE = "report.html"
 COMMANDS = (
     "build", "check", "simulate", "sweep", "inspect", "estimate", "diagnose", "calibrate", "regulator", "compensate",
-    "thesis", "ssp",
+    "ssp",
 )  # fmt: skip
 
 

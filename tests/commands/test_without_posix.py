@@ -44,7 +44,6 @@ COMMANDS = (
     "report results/simulate",
 )
 AT_NIGHT = (
-    "thesis",
     "build ServoAxis --out built --force",
     "calibrate axis.csv --fmu built/ServoAxis.fmu --map axis_map.toml",
     "diagnose machine.csv --model machine.toml",

@@ -1,10 +1,10 @@
-"""What ``thesis.json`` holds: published numbers beside recomputed ones."""
+"""Published numbers beside recomputed ones, as rows of tables."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
 
-from orchestrator.shared.results import ResultData
 from orchestrator.shared.results.fields import Display, ReportTable, TableColumn, fields_table
 
 
@@ -43,13 +43,6 @@ class TableComparison(msgspec.Struct, frozen=True):
     mse: float
 
 
-class ThesisTable(TableComparison, frozen=True):
-    """The same with the rows as printed, and with our estimates [rad] of their sizes."""
-
-    rows: tuple[TableRow, ...]
-    our_estimates: tuple[float, ...]
-
-
 class Erratum(msgspec.Struct, frozen=True):
     """What is printed, what is right, and the numbers that show it."""
 
@@ -68,25 +61,15 @@ class OtherResult(msgspec.Struct, frozen=True):
     figure: Annotated[str, Display("figure")]
 
 
-class ThesisFound(ResultData, frozen=True, kw_only=True):
-    """``thesis``: models and gains, Table 4.1, errata, and what others found."""
-
-    gains: tuple[Comparison, ...]
-    table: ThesisTable
-    errata: tuple[Erratum, ...]
-    others: tuple[OtherResult, ...] = ()
-
-
-def thesis_tables(results: ThesisFound) -> tuple[ReportTable, ReportTable, ReportTable, ReportTable]:
-    """Return model and gains, Table 4.1, errata, and results of others."""
-    table = results.table
-    ours = [100.0 * abs(own - row.alpha) / row.alpha for row, own in zip(table.rows, table.our_estimates, strict=True)]
-    sizes = fields_table("Table 4.1", table.rows)
+def thesis_tables(
+    gains: Sequence[Comparison], rows: Sequence[TableRow], table: TableComparison, our_estimates: Sequence[float]
+) -> tuple[ReportTable, ReportTable]:
+    """Return model and gains, and Table 4.1 with what the thesis's map and our estimates [rad] make of it."""
+    ours = [100.0 * abs(own - row.alpha) / row.alpha for row, own in zip(rows, our_estimates, strict=True)]
+    sizes = fields_table("Table 4.1", rows)
     for label, unit, digits, cells in (
         ("by the quadratic", "rad", 5, table.estimates), ("its error", "%", 4, table.errors_percent),
-        ("our estimate", "rad", 6, table.our_estimates), ("our error", "%", 4, ours),
+        ("our estimate", "rad", 6, our_estimates), ("our error", "%", 4, ours),
     ):  # fmt: skip
         sizes = sizes.with_column(TableColumn(label, unit, digits), cells)
-    gains = fields_table("Model and gains, recomputed with the A that the thesis used", results.gains)
-    others = fields_table("Results of others, as the thesis quotes them", results.others)
-    return gains, sizes, fields_table("Errata", results.errata), others
+    return fields_table("Model and gains, recomputed with the A that the thesis used", gains), sizes

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_continuous_are
 from scipy.optimize import minimize_scalar
 
-from orchestrator.paired.thesis import published
+from benchmarks.thesis import published
+from benchmarks.thesis.tables import Comparison, TableComparison
 from orchestrator.plants.design import DrivetrainValues, six_state_model
-from orchestrator.shared.results.thesis import Comparison, TableComparison
 
 Array = NDArray[np.float64]
 C = np.array([[1.0, 0.0, 1.0, 0.0, 0.0, 0.0]])

@@ -1,6 +1,6 @@
 """What the thesis printed."""
 
-from orchestrator.shared.results.thesis import OtherResult, TableRow
+from benchmarks.thesis.tables import OtherResult, TableRow
 
 # Rows 2 and 4 of A in Fig. A.1.
 A_ROW_2 = (-519.8, -5.73, 2071.0, 0.6275, 0.0, 2.5)

@@ -2,11 +2,8 @@
 
 import numpy as np
 
-from orchestrator.errors import DesignError
-from orchestrator.paired.compiled_loop import make_loop
-from orchestrator.paired.experiment import thesis_experiment
-from orchestrator.paired.thesis import published
-from orchestrator.paired.thesis.recompute import (
+from benchmarks.thesis import published
+from benchmarks.thesis.recompute import (
     C_L,
     C,
     error_covariance,
@@ -15,6 +12,10 @@ from orchestrator.paired.thesis.recompute import (
     size_hidden_in_the_filter,
     table_comparison,
 )
+from benchmarks.thesis.tables import Erratum
+from orchestrator.errors import DesignError
+from orchestrator.paired.compiled_loop import make_loop
+from orchestrator.paired.experiment import thesis_experiment
 from orchestrator.plants.design import (
     DrivetrainValues,
     design_regulator,
@@ -22,7 +23,6 @@ from orchestrator.plants.design import (
     rank_report,
     six_state_model,
 )
-from orchestrator.shared.results.thesis import Erratum
 
 
 def errata() -> list[Erratum]:
