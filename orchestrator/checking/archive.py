@@ -48,11 +48,7 @@ class FmuFiles(Protocol):
         """Paths of the files, with forward slashes, folders left out."""
 
     def read(self, name: str, limit: int) -> bytes:
-        """At most ``limit`` + 1 bytes of a file, so that a longer one can be told.
-
-        Returns:
-            The bytes; more than ``limit`` of them when the file is longer.
-        """
+        """At most ``limit`` + 1 bytes of a file, so that a longer one can be told."""
 
     def extract(self, target: Path) -> None:
         """Copy all files below ``target``."""

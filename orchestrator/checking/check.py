@@ -38,11 +38,7 @@ class CheckOptions:
 
 
 def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
-    """Check an FMU file or an unpacked FMU.
-
-    Returns:
-        All findings; nothing of the FMU has been executed unless ``executed`` is set.
-    """
+    """All findings on an FMU, a file or unpacked; nothing of it is executed unless ``executed`` is set."""
     options = options or CheckOptions()
     result = check_static(path, options.archive)
     findings = list(result.findings)

@@ -153,11 +153,7 @@ class Description:
         return None if number is None else self.numbered.get(number)
 
     def size(self, v: DescribedVariable) -> int | None:
-        """Number of values of a variable at its initial dimensions.
-
-        Returns:
-            The number, or None when it cannot be told.
-        """
+        """Number of values of a variable at its initial dimensions, or None when it cannot be told."""
         sizes = [self.extent(dimension) for dimension in v.dimensions]
         known = [size for size in sizes if size is not None]
         return prod(known) if len(known) == len(sizes) else None
@@ -170,11 +166,7 @@ class Description:
         return None if holder is None else integer(holder.start)
 
     def experiment(self, name: str) -> float | None:
-        """A number of DefaultExperiment.
-
-        Returns:
-            The number [s] (a tolerance without unit), or None when it is absent.
-        """
+        """A number of DefaultExperiment [s] (a tolerance without unit), or None when it is absent."""
         element = self.root.find("DefaultExperiment")
         value = None if element is None else number(element.get(name), "Real")
         return None if value is None else float(value)

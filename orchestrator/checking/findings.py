@@ -144,11 +144,7 @@ def list_names(names: Sequence[str], most: int = 12) -> str:
 
 
 def order_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Errors first, each kept in the order found, equal ones as one, at most ``MOST_PER_RULE`` of one rule.
-
-    Returns:
-        The findings that a report shows.
-    """
+    """Errors first, each kept in the order found, equal ones as one, at most ``MOST_PER_RULE`` of one rule."""
     seen: Counter[str] = Counter()
     kept = []
     for finding in _group(findings):

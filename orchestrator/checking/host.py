@@ -299,11 +299,7 @@ class Host:
             return thread.submit(self.call, instance, function, arguments).result()
 
     def calls(self, instance: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]) -> list[Returned]:
-        """Call several functions, up to the first that returns neither OK nor Warning.
-
-        Returns:
-            For each function that was called what ``call`` returns.
-        """
+        """Call several functions, up to the first that fails; return what ``call`` does of each."""
         done = []
         for function, arguments in requests:
             done.append(self.call(instance, function, arguments))

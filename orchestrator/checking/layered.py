@@ -84,11 +84,7 @@ def _documents(d: Description, names: set[str]) -> Iterator[Finding]:
 
 
 def check_layered(d: Description, files: FmuFiles) -> tuple[list[ReferenceResult], list[Finding]]:
-    """Check every manifest of a layered standard, and read the reference results of FMI-LS-REF.
-
-    Returns:
-        The reference results that can be read, and the findings.
-    """
+    """The reference results of FMI-LS-REF that can be read, and findings on every manifest of a layered standard."""
     findings: list[Finding] = []
     results: list[ReferenceResult] = []
     names = set(files.names())

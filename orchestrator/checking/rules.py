@@ -120,11 +120,7 @@ class Rule:
         return tuple(self.anchor)
 
     def link(self, version: Version) -> str:
-        """Where the standard's text says so.
-
-        Returns:
-            An address, at the section's heading where the text has names for them; empty for a rule of our own.
-        """
+        """Address of the standard's text, at its heading where it has names for them; empty for a rule of our own."""
         section = self.anchor[version]
         if not section:
             return ""

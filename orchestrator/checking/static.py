@@ -48,11 +48,7 @@ class StaticResult:
 
 
 def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
-    """Check one FMU (file or unpacked folder) without executing anything of it.
-
-    Returns:
-        Findings, and what the probes need: files, description, reference results, facts.
-    """
+    """Check one FMU (file or unpacked folder) without executing anything of it."""
     files, findings = open_fmu(path, limits)
     stages = dict.fromkeys(STAGES, "the archive cannot be read") | {"archive": ""}
     if files is None:

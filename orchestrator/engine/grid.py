@@ -50,14 +50,12 @@ class Listed(Design):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The one name."""
         return (self.name,)
 
     def __len__(self) -> int:
         return len(self.values)
 
     def row(self, index: int) -> tuple[Value, ...]:
-        """Return the value at ``index``."""
         return (self.values[index],)
 
     def definition(self) -> Mapping[str, Any]:
@@ -86,7 +84,6 @@ class Ranged(Design):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The one name."""
         return (self.name,)
 
     def __len__(self) -> int:
@@ -233,7 +230,6 @@ class DesignCases(Cases):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the varied parameters."""
         return self.design.names
 
     def __len__(self) -> int:

@@ -49,7 +49,6 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
     # A run ---------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Exit initialisation mode, into event mode."""
         super().start()
         self._in_event_mode = True
         self._next_event = math.inf
@@ -60,7 +59,6 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
         self._next_event = math.inf
 
     def step(self, time: float, step: float) -> StepOutcome:
-        """Advance from ``time`` by at most ``step`` [s]; stop at the first event."""
         if self._worst >= ERROR:
             self._alive("fmi3DoStep")
         end = self._last.value = time + step
@@ -85,7 +83,6 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
         return StepOutcome(self._reached, event, TERMINATES if ends else "")
 
     def do_step(self, time: float, step: float) -> None:
-        """Advance from ``time`` to ``time + step`` [s]; events on the way are taken, by this slave alone."""
         if self.model.input_clocks:
             names = ", ".join(self.model.input_clocks)
             raise SlaveError(f"{self.name}: its clocks ({names}) must be ticked, but this run knows no events")
@@ -97,19 +94,16 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
     # Event mode ------------------------------------------------------------------------------------------------
 
     def enter_event_mode(self) -> None:
-        """Take an event at the present time."""
         self._call("EnterEventMode")
         self._in_event_mode = True
         self._clocks.enter_event_mode(self._reached or 0.0)
 
     def update_discrete_states(self) -> EventUpdate:
-        """End an instant in event mode."""
         again, ends_run, _, self._next_event = self._end_instant()
         ticks = self._clocks.end_instant(self._reached or 0.0)
         return EventUpdate(again or ticks, next_event(self._next_event, self._clocks), ends_run)
 
     def leave_event_mode(self) -> None:
-        """Go on in time."""
         self._clocks.leave_event_mode()
         self._call("EnterStepMode")
         self._in_event_mode = False
@@ -117,14 +111,12 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
     # Values ------------------------------------------------------------------------------------------------------
 
     def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
-        """Say what continuous inputs are inside steps, from now on."""
         for name in names:
             if name not in self._description.events.inside:
                 raise SlaveError(f"{self.name}: {name} must be an input that may be set inside steps, but is not")
         self._updates.feed(self._functions, self._accesses(names), values)
 
     def output_rates(self, names: Sequence[str], order: int = 1) -> list[float]:
-        """Return derivatives of outputs with respect to time at the end of the last step."""
         accesses = self._accesses(names)
         firsts: dict[int, int] = {}
         total = 0

@@ -45,18 +45,15 @@ class Exchange3Slave(ClockedSlave, ExchangeSlave, Fmu3Instance):
         return min(super()._due(), self._clocks.next_time())
 
     def enter_event_mode(self) -> None:
-        """Take an event at the present time."""
         super().enter_event_mode()
         self._clocks.enter_event_mode(self._reached or 0.0)
 
     def update_discrete_states(self) -> EventUpdate:
-        """End an instant in event mode."""
         update = super().update_discrete_states()
         ticks = self._clocks.end_instant(self._reached or 0.0)
         return replace(update, again=update.again or ticks, next_event=next_event(self._next_event, self._clocks))
 
     def leave_event_mode(self) -> None:
-        """Go on in time."""
         self._clocks.leave_event_mode()
         super().leave_event_mode()
 

@@ -16,11 +16,7 @@ _root: tuple[int, Scratch] | None = None
 
 
 def content_hash(path: Path) -> str:
-    """Return the SHA-256 of a file's content in hexadecimal.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Return the SHA-256 of a file's content: 64 hexadecimal digits."""
     digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:

@@ -109,7 +109,6 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         return self._next_event
 
     def step(self, time: float, step: float) -> StepOutcome:
-        """Advance from ``time`` by at most ``step`` [s]; stop at the first event."""
         end = time + step
         integrator = self._ready(time)
         near = 1e-13 * max(1.0, abs(end))
@@ -179,7 +178,6 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
     # Event mode ------------------------------------------------------------------------------------------------
 
     def enter_event_mode(self) -> None:
-        """Take an event at the present time."""
         self._call("EnterEventMode")
         self._in_event_mode, self._goes_on = True, False
 
@@ -192,7 +190,6 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         return frozenset()
 
     def update_discrete_states(self) -> EventUpdate:
-        """End an instant in event mode."""
         found = self._update()
         self._next_event, self._rescaled = found.next_event, self._rescaled or found.rescaled
         coming = found.next_event if math.isfinite(found.next_event) else None
@@ -203,7 +200,6 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         """End an instant."""
 
     def leave_event_mode(self) -> None:
-        """Go on in time."""
         self._call("EnterContinuousTimeMode")
         self._in_event_mode = False
         self._integrator.signs = self._equations.read_signs()
@@ -233,7 +229,6 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         return send
 
     def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
-        """Say what continuous inputs are inside steps, from now on."""
         for name in names:
             if name not in self._description.inputs:
                 raise SlaveError(f"{self.name}: {name} must be a continuous input, but is not")

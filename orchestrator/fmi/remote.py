@@ -42,11 +42,7 @@ class Undone(NamedTuple):
 
 
 def open_instance(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, tuple[Any, ...]]], Any]:
-    """Make the instance in the child, and return what calls it.
-
-    Returns:
-        Called with a method's name and arguments, it gives what that returns.
-    """
+    """Make the instance in the child; return what calls its methods, given a name and arguments."""
     host = _Host(make_slave(*request))
     return lambda asked: getattr(host, asked[0])(*asked[1])
 

@@ -156,11 +156,7 @@ class FmuSlave(Slave):
         return ""
 
     def last_successful_time(self) -> float | None:
-        """Return how far the FMU came in a step that it discarded.
-
-        Returns:
-            The time [s]; None where it does not say.
-        """
+        """Return how far [s] the FMU came in a step that it discarded; None where it does not say."""
         return self._reached
 
     def take_remarks(self) -> list[RunRemark]:
@@ -194,7 +190,6 @@ class FmuSlave(Slave):
         return [self._description.access[name] for name in names]
 
     def set(self, values: Mapping[str, Value]) -> None:
-        """Set variables of any type by name."""
         self._alive(f"{self.PREFIX}Set")
         names = tuple(values)
         kept = self._sets.get(names)
@@ -221,7 +216,6 @@ class FmuSlave(Slave):
         return f"{batch.function} of {some}" + (", ..." if len(batch.positions) > 3 else "")
 
     def get(self, names: Sequence[str]) -> list[Value]:
-        """Return variables of any type by name."""
         self._alive(f"{self.PREFIX}Get")
         found: list[Value] = [0.0] * len(names)
         for batch in self._functions.batches(self._accesses(names), "Get"):
@@ -233,7 +227,6 @@ class FmuSlave(Slave):
         return found
 
     def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        """Return a call that sets the numeric variables ``names`` from ``buffer``; shape (len(names),)."""
         batches = self._functions.batches(self._accesses(names), "Set", buffer)
         if len(batches) == 1 and isinstance(batches[0].values, ctypes.Array) and shares(batches[0].values, buffer):
             return self._direct(batches[0])
@@ -250,7 +243,6 @@ class FmuSlave(Slave):
         return send
 
     def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        """Return a call that reads the numeric variables ``names`` into ``buffer``; shape (len(names),)."""
         batches = self._functions.batches(self._accesses(names), "Get", buffer)
         if len(batches) == 1 and shares(batches[0].values, buffer):
             return self._direct(batches[0])
@@ -285,13 +277,11 @@ class FmuSlave(Slave):
         self._call("ExitInitializationMode")
 
     def get_state(self) -> Any:
-        """Return a handle of a copy of the whole state."""
         state = ctypes.c_void_p()
         self._call(f"Get{self.STATE}", ctypes.byref(state))
         return state
 
     def set_state(self, state: Any) -> None:
-        """Return to a state; the handle stays valid."""
         self._call(f"Set{self.STATE}", state)
 
     def free_state(self, state: Any) -> None:
@@ -300,11 +290,9 @@ class FmuSlave(Slave):
             self._call(f"Free{self.STATE}", ctypes.byref(state))
 
     def terminate(self) -> None:
-        """End the run."""
         self._call("Terminate")
 
     def reset(self) -> None:
-        """Return to the condition of a new instance."""
         self._call("Reset")
         self._reached = None
         self._forget_arrays()

@@ -107,7 +107,6 @@ class Fmu2Slave(Fmu2Instance):
         return time.value if status == OK and math.isfinite(time.value) else None
 
     def do_step(self, time: float, step: float) -> None:
-        """Advance from ``time`` to ``time + step`` [s], inputs held."""
         if self._worst >= ERROR:
             self._alive("fmi2DoStep")
         status = self._step(self._component, time, step, 1)

@@ -108,7 +108,6 @@ class Fmu3Instance(FmuSlave):
             free_library(self._library)
 
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        """Enter initialisation mode."""
         self.messages.clear()
         self._tolerance = tolerance
         self._call(
@@ -156,7 +155,6 @@ class Fmu3Slave(Fmu3Instance):
         return (ctypes.c_uint * 0)(), None
 
     def do_step(self, time: float, step: float) -> None:
-        """Advance from ``time`` to ``time + step`` [s], inputs held."""
         if self._worst >= ERROR:
             self._alive("fmi3DoStep")
         end = self._last.value = time + step

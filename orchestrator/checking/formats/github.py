@@ -17,11 +17,7 @@ _LEVELS: Mapping[Severity, str] = {"error": "error", "warning": "warning", "info
 
 
 def as_annotations(verdicts: Sequence[Verdict]) -> list[str]:
-    """Write the issues that the baseline does not have as workflow commands.
-
-    Returns:
-        The lines, at most ``MOST_ANNOTATIONS`` of each level.
-    """
+    """The issues that the baseline does not have as workflow commands, at most ``MOST_ANNOTATIONS`` of each level."""
     lines = []
     seen: Counter[str] = Counter()
     for verdict, issue in _new_issues(verdicts):

@@ -27,11 +27,7 @@ _LEVELS: Mapping[Severity, str] = {"error": "error", "warning": "warning", "info
 
 
 def as_sarif(verdicts: Sequence[Verdict]) -> str:
-    """Write one run.
-
-    Returns:
-        The document; it has at most ``MOST_RESULTS`` results, the worst, and a notification where there are more.
-    """
+    """One run; at most ``MOST_RESULTS`` results, the worst, and a notification where there are more."""
     names = sorted(
         {o.rule for v in verdicts for o in v.outcomes} | {i.finding.rule for v in verdicts for i in v.issues}
     )

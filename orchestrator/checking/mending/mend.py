@@ -36,11 +36,7 @@ class Repair:
 
 
 def mend_fmu(path: Path, target: Path, limits: ArchiveLimits | None = None) -> Repair:
-    """Write an FMU anew without the faults that can be mended without its source. Nothing of it is executed.
-
-    Returns:
-        What was mended, and what was not.
-    """
+    """Write an FMU anew without faults that need no source, executing nothing; return what was mended, and not."""
     limits = limits or ArchiveLimits()
     if target.exists() and target.samefile(path):
         raise FmuError(f"the mended FMU must be another file, but is {path} itself")

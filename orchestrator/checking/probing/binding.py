@@ -79,11 +79,7 @@ class Library:
         self._known = {(_LETTERS.get(v.base, ""), v.reference): v.name for v in reversed(variables)}
 
     def load(self, path: str) -> str:
-        """Load the library at ``path``; return why that fails, or nothing.
-
-        Returns:
-            The reason, empty when it is loaded.
-        """
+        """Load the library at ``path``; return why that fails, or nothing."""
         self._path, self._loaded = path, _stamp(path)
         names = self.names
         texts, makers = names.names_with("GetVersion", "GetTypesPlatform"), names.names_with("Instantiate")
@@ -164,11 +160,7 @@ class Library:
     def raw_many(
         self, number: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]
     ) -> list[tuple[int, list[Any]]]:
-        """Call functions of an instance in one go, up to the first that fails.
-
-        Returns:
-            Status and values of each that was called.
-        """
+        """Call functions of an instance in one go, up to the first that fails; return status and values of each."""
         doing = ", ".join(dict.fromkeys(function for function, _ in requests))
         answers = self._ask(list[Returned], doing, "calls", number, requests)
         done: list[tuple[int, list[Any]]] = []

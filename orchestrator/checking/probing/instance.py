@@ -49,11 +49,7 @@ class FmuInstance:
         return status, found
 
     def call(self, function: str, *values: Any, when: str = "") -> list[Any]:
-        """Call a function that must return OK or Warning; return what its output arguments hold.
-
-        Returns:
-            A value per output argument, in their order.
-        """
+        """Call a function that must return OK or Warning; return a value per output argument, in their order."""
         status, found = self.raw(function, *values)
         if status not in (OK, WARNING):
             raise self.status_error(function, status, when)
@@ -69,11 +65,7 @@ class FmuInstance:
             self.remarks[rule] = (count + 1, first)
 
     def call_many(self, requests: Sequence[Request], when: str = "") -> list[list[Any]]:
-        """Call functions in one go, each of which must return OK or Warning.
-
-        Returns:
-            What the output arguments of each hold.
-        """
+        """Call functions in one go, as ``call`` does; return what the output arguments of each hold."""
         if not requests:
             return []
         names = self.library.names

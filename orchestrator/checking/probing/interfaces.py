@@ -37,11 +37,7 @@ class InterfaceRun:
 
 
 def compare_interfaces(a: InterfaceRun, b: InterfaceRun, report: Callable[..., None]) -> str:
-    """Report outputs that are far from each other at most points of a run, also of a driven one.
-
-    Returns:
-        Why they were not compared; empty when they were.
-    """
+    """Report outputs that are far from each other at most points of a run, or return why they were not compared."""
     if a.job.outputs() != b.job.outputs() or a.job.step != b.job.step or min(len(a.quiet), len(b.quiet)) < _FEWEST:
         return "the runs of the two interfaces are not the same"
     equal = a.movement == b.movement and a.job.steps == b.job.steps and a.job.inputs() == b.job.inputs()

@@ -127,11 +127,7 @@ class ProbeJob:
         return [label for v in self.outputs() for label in v.labels]
 
     def inputs(self) -> list[ProbedVariable]:
-        """Floating point inputs that may be set at any communication point; in model exchange the continuous ones.
-
-        Returns:
-            Variables, in the order of the description.
-        """
+        """Floating point inputs that may be set at any communication point; in model exchange the continuous ones."""
         found = (v for v in self.variables if v.causality == "input" and v.real and not v.clocks)
         return [v for v in found if v.variability == "continuous" or self.interface != "ModelExchange"]
 

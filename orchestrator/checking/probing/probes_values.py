@@ -86,11 +86,7 @@ def _judge_types(context: Context) -> None:
 
 
 def _kept_before(context: Context, movement: Mapping[ProbedVariable, Values]) -> bool:
-    """What is set before and in initialisation mode is there in it, and parameters and states also afterwards.
-
-    Returns:
-        Whether it is so.
-    """
+    """Whether what is set before and in initialisation mode is there in it, parameters and states also afterwards."""
     bench, job = context.bench, context.bench.job
     # Others that have a start value may be computed anew: it is what they were before.
     states = {v.key for v in job.state_variables or ()}

@@ -63,7 +63,6 @@ class _Apart(RecordSource):
             raise self._failure(f"it has {len(self.heads)} channels")
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        """Return the values of some channels."""
         found = self._ask(list(places), list[tuple[str, Any]])
         if len(found) != len(places):
             raise self._failure("another number of channels came back")

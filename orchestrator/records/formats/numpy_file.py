@@ -51,7 +51,6 @@ class ArraySource(RecordSource):
         self.rate = None
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        """Return the values of some arrays."""
         return [as_numbers(self._arrays[place], self.heads[place].name, self._path) for place in places]
 
 

@@ -83,7 +83,6 @@ class _Within(RecordSource):
         self.heads, self.dialect, self.rate = source.heads, source.dialect, source.rate
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        """Return the values of some channels."""
         return [
             values[self._rows] if self.heads[place].raster == self._raster else values
             for place, values in zip(places, self._source.load(places), strict=True)
@@ -105,11 +104,7 @@ def as_numbers(values: NDArray[Any], name: str, path: Path) -> NDArray[Any]:
 
 
 def in_a_line(error: BaseException) -> str:
-    """Return what a library says of a broken file, short enough for a message.
-
-    Returns:
-        At most 120 characters without line breaks.
-    """
+    """Return what a library says of a broken file in at most 120 characters, without line breaks."""
     return " ".join(str(error).split())[:120]
 
 

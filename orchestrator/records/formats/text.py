@@ -43,11 +43,9 @@ class TextSource(RecordSource):
         return self._rows.describe() if self._rows.broken else ""
 
     def times(self, place: int) -> NDArray[Any]:
-        """Return a column as ``load`` does, with NaN or NaT where there is no value."""
         return self._read([place], strict=False)[0]
 
     def pieces(self, places: Sequence[int], most: int | None = None) -> Iterator[tuple[int, int, list[NDArray[Any]]]]:
-        """Yield numbers block by block."""
         for whole in self._rows.blocks(self._part):
             block = whole
             if most is not None and whole.count > most:

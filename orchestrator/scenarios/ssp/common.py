@@ -156,11 +156,7 @@ def solver_tolerance(system: etree._Element) -> float | None:
 
 
 def oms_step(system: etree._Element) -> float | None:
-    """Return the communication step that a system states where OMSimulator looks for it.
-
-    Returns:
-        The step [s]; None where there is none.
-    """
+    """Return the communication step [s] that a system states where OMSimulator looks for it, or None."""
     stated = _numbers_of(system, tag("oms", "FixedStepMaster"), "stepSize")
     return next((value for value in stated if 0.0 < value < float("inf")), None)
 
