@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import subprocess
 import sys
 import tomllib
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.example_record import copy_examples
 from tools import release
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,10 +22,15 @@ assert "site-packages" in oc.__file__, oc.__file__
 pair = oc.run_pair(alpha=0.02)
 print(abs(pair.estimate.alpha - 0.02) < 1e-6, oc.__version__)
 """
+LACKING = """
+from orchestrator.building.installing import INSTALLED, LIBRARIES, library_file, library_stem
+print([name for name, checked in LIBRARIES if not (INSTALLED / library_file(library_stem(name, checked))).exists()])
+"""
 
 
-def run(words, folder):
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}  # or it finds this tree
+def run(words, folder, environment=None):
+    if environment is None:  # without this tree
+        environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout
@@ -73,10 +80,10 @@ def built(tmp_path_factory):
     return made(tmp_path_factory.mktemp("built"))
 
 
-def made(folder):
+def made(folder, *platforms):
     source = folder / "source"
     run(["git", "-C", str(ROOT), "checkout-index", "-a", f"--prefix={source}/"], folder)
-    return release.build(source, folder / "dist", 1_700_000_000)
+    return release.build(source, folder / "dist", 1_700_000_000, platforms)
 
 
 @pytest.mark.slow
@@ -90,6 +97,35 @@ def test_the_same_sources_give_the_same_artefacts(tmp_path, built):
     assert [p.read_bytes() for p in again] == [p.read_bytes() for p in built]
 
 
+def installed(wheel, folder, blocked=()):
+    """A fresh environment with a wheel and the libraries of this one; return its interpreter. No index is asked."""
+    venv.create(folder, with_pip=False)
+    site = next((folder / "lib").glob("python*")) / "site-packages"
+    zipfile.ZipFile(wheel).extractall(site)
+    here = next(p for p in sys.path if p.endswith("site-packages"))
+    (site / "libraries.pth").write_text(here + "\n")  # the editable project's own finder is in a .pth of that folder
+    (site / "sitecustomize.py").write_text(f"import sys\nsys.modules.update(dict.fromkeys({list(blocked)!r}))\n")
+    return str(folder / "bin" / "python")
+
+
+@pytest.mark.night
+@pytest.mark.skipif((sys.platform, platform.machine()) != ("linux", "x86_64"), reason="the wheel is for Linux, x86-64")
+def test_the_wheel_of_a_platform_diagnoses_without_a_compiler(tmp_path):
+    """Of an environment in which no compiler is found, by its path or as a package."""
+    pytest.importorskip("ziglang")
+    *_, wheel = made(tmp_path, "manylinux_2_17_x86_64")
+    python = installed(wheel, tmp_path / "venv", ["ziglang"])
+    copy_examples(tmp_path / "examples", whole=True)
+    for name in ("bin", "cache"):
+        (tmp_path / name).mkdir()
+    bare = {"PATH": str(tmp_path / "bin"), "XDG_CACHE_HOME": str(tmp_path / "cache"), "HOME": str(tmp_path)}
+    assert run([python, "-c", LACKING], tmp_path, bare) == "[]\n"
+    words = [python, "-m", "orchestrator", "diagnose", "machine.csv", "--model", "machine.toml", "--out", "out"]
+    run(words, tmp_path / "examples", bare)
+    found = json.loads((tmp_path / "examples" / "out" / "diagnose.json").read_text())["results"]
+    assert {effect["name"] for effect in found["effects"]} == {"backlash", "coulomb_friction"}
+
+
 @pytest.mark.slow
 def test_the_wheel_works_from_another_folder(tmp_path, built):
     """No index is asked: the environment sees the libraries of this one, and the project from the wheel alone."""
@@ -98,13 +134,7 @@ def test_the_wheel_works_from_another_folder(tmp_path, built):
     for needed in ("orchestrator/py.typed", "orchestrator/__init__.pyi", "orchestrator/reporting/templates/plot.js"):
         assert needed in names
     assert not [name for name in names if name.startswith(("tests/", "tools/", "benchmarks/"))]
-    place = tmp_path / "venv"
-    venv.create(place, with_pip=False)
-    site = next((place / "lib").glob("python*")) / "site-packages"
-    zipfile.ZipFile(wheel).extractall(site)
-    here = next(p for p in sys.path if p.endswith("site-packages"))
-    (site / "libraries.pth").write_text(here + "\n")  # the editable project's own finder is in a .pth of that folder
-    python = str(place / "bin" / "python")
+    python = installed(wheel, tmp_path / "venv")
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     assert run([python, "-c", PROGRAM], elsewhere).split()[0] == "True"
