@@ -20,8 +20,8 @@ WORKFLOWS: tuple[tuple[str, str, type[Settings]], ...] = (
 )
 HEAD = """# Settings
 
-Every threshold of a workflow is a setting. A TOML file changes those that it names, by group; the rest keeps its
-default (those of a calibration have no groups):
+Every threshold of a workflow is a setting. A TOML file sets the settings that it names, by group; all others keep
+their defaults. The settings of a calibration have no groups:
 
 ```toml
 [selection]
@@ -34,9 +34,8 @@ likely_share = 0.05
     python -m orchestrator diagnose DATA.csv --settings FILE.toml
     python -m orchestrator sweep --settings FILE.toml
 
-From Python, `settings=` takes the same object. The result file holds all settings that were used, under `settings`.
-A name that does not exist, or a value out of its bounds, is refused. This page is written by
-`python -m tools.settings_page`.
+In Python, pass the same object as `settings=`. The result file contains all settings of the run under `settings`.
+Unknown names and values out of bounds are refused. `python -m tools.settings_page` writes this page.
 """
 
 
@@ -59,7 +58,7 @@ def _rules() -> str:
     ]
     rows = [f"| {' | '.join(row)} |" for row in cells]
     head = "| rule | grade where it does not hold | statistic | threshold | reason |\n|---|---|---|---|---|\n"
-    text = "An effect is certain unless a rule lowers it. A threshold that every effect reaches switches its rule off."
+    text = "An effect is certain unless a rule lowers its grade. A threshold that all effects reach disables its rule."
     return "\n## Rules\n\n" + text + "\n\n" + head + "\n".join(rows) + "\n"
 
 

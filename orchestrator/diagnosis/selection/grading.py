@@ -82,14 +82,14 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "large share", Grade.LIKELY, lambda e, r, s: _explains_much(e, r, s.grades),
-        "share of the missing torque, or of what is left without it; what a curve still takes over what it takes",
+        "share of the missing torque, or of the torque left without it; of a curve, over its own",
         "grades.certain_share",
-        "it explains little, or little beside what follows a signal: it may stand for part of another law",
+        "it explains little, or the rest still follows a signal: it may be part of another law",
     ),
     GradeRule(
         "enough share", Grade.POSSIBLE, lambda e, r, s: _explains_enough(e, s.grades),
-        "share of the missing torque, or of what is left without it", "grades.likely_share",
-        "it explains so little that it may only follow what another law leaves",
+        "share of the missing torque, or of the torque left without it", "grades.likely_share",
+        "it explains so little that it may only fit the residual of another law",
     ),
     GradeRule(
         "sure size", Grade.LIKELY, lambda e, r, s: e.size_t >= s.grades.certain_size_t, "size over its error",
@@ -97,7 +97,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "size", Grade.POSSIBLE, lambda e, r, s: e.size_t >= s.grades.likely_t, "size over its error",
-        "grades.likely_t", "its size may be zero, or changes along the record so that none holds for all of it",
+        "grades.likely_t", "its size may be zero, or changes along the record",
     ),
     GradeRule(
         "inertia seen", Grade.LIKELY, lambda e, r, s: r.inertia_error < s.grades.inertia_error,
@@ -116,7 +116,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "confirmed", Grade.LIKELY,
         lambda e, r, s: _is_confirmed(e, s.grades),
         "share of the motion's misfit, or of the torque's, on test data", "grades.confirmed_share",
-        "test data do not confirm it: what stands for another law fits a record and predicts nothing",
+        "test data do not confirm it: an effect in place of the true one fits the record but predicts nothing",
     ),
     GradeRule(
         "not refuted", Grade.POSSIBLE,
@@ -126,8 +126,8 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "little left", Grade.POSSIBLE, lambda e, r, s: _left(e, r) < s.grades.most_left,
-        "share of the torque that is left; of a limit: of its own, where it acts", "grades.most_left",
-        "too much of the torque remains, and a law then fits whatever is missing",
+        "share of the torque that is left; for a limit, where it acts", "grades.most_left",
+        "too much of the torque remains unexplained, and a law then fits whatever is missing",
     ),
 )  # fmt: skip
 
