@@ -47,7 +47,7 @@ ALL_FILES = ("inspect.json", "report.html", "inspect_record.npz", "inspect_recor
 """What an inspection leaves beside the model file; a later one that refuses its log takes them away."""
 OF_GIVEN = "of the model that was given"
 OF_FMU = "ASSUMED: what the FMU has when nothing is said; put in the machine's"
-ROUGHLY = "inertias, stiffness, friction and lag roughly, from the record; see the model file"
+ROUGHLY = "roughly, from the record; see the model file"
 SHOWN_EXPERIMENTS = 3
 
 
@@ -253,16 +253,14 @@ def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Mode
         return base, said_of | dict.fromkeys(set(said_of) - set(base.stated), OF_FMU), ()
     rough = rough_machine(record)
     if given and any(name in base.stated for name in said_of):
-        return (
-            _completed(base, rough),
-            {**rough.origin, **{n: OF_GIVEN for n in base.stated if n in said_of}},
-            (ROUGHLY,),
-        )
+        lacking = [name for name in said_of if name not in base.stated]
+        origin = {**rough.origin, **{n: OF_GIVEN for n in base.stated if n in said_of}}
+        return _completed(base, rough), origin, (f"{', '.join(lacking)} {ROUGHLY}",)
     if not record.has_torque:
         return as_model(rough, base), rough.origin, ()
     if sure and is_of(record, base):
         return base, dict.fromkeys(base.plant.linear, OF_DEFAULT), ("the default model's values, each known to 5 %",)
-    return as_model(rough, base), rough.origin, (ROUGHLY,)
+    return as_model(rough, base), rough.origin, (f"inertias, stiffness, friction and lag {ROUGHLY}",)
 
 
 def _completed(base: Model, rough: RoughMachine) -> Model:

@@ -40,6 +40,7 @@ MEANING = {
     "i": "gear ratio: motor angle over load angle; gearbox: ratio",
     "tau": "time constant of the drive's torque; drive: 1/(2 pi bandwidth of the current loop), 0.5 to 5 ms of a servo",
 }
+UNCERTAIN = {"i": 0.0, "c": 0.3, "b_m": 0.3, "b_l": 0.3}  # relative, where a data sheet is not good to 5 %
 DRAFT_LAG = 0.002  # s, of the current loop of a servo drive
 EXAMPLES = {"u": "A", "theta_m": "counts", "theta_l": "counts"}
 UNIT_KINDS = {"u": "current", "theta_m": "counts", "theta_l": "counts", "time": "time"}
@@ -139,9 +140,13 @@ def blank_starter(path: Path, columns: Mapping[str, Column], header: int | None,
     """
     seen = preview_log(path, columns, header)
     labels = [channel.label for channel in seen.channels]
-    lines = [f"# A model of the machine that made {plain_text(path.name)}, with blanks. Delete the `#` before a line,",
-             "# and fill it in. The log was refused:", f"# {plain_text(problem)}", "", 'fmu = "Drivetrain"', "",
-             f"# Columns of the log: {plain_text(', '.join(labels)) or 'none were found'}", ""]  # fmt: skip
+    lines = [
+        f"# A model of the machine that made {plain_text(path.name)}, with blanks. The log was refused:",
+        f"# {plain_text(problem)}",
+        "# Fill in the blanks of the columns and delete the `#` before them. Then run `inspect` again with this file",
+        "# as `--model`: it proposes the parameters that you leave out.\n",
+        f'fmu = "Drivetrain"\n\n# Columns of the log: {plain_text(", ".join(labels)) or "none were found"}\n',
+    ]
     for taken in seen.columns:
         stated = columns.get(taken.column, Column())
         name = labels[taken.place] if taken.place is not None else stated.name
@@ -157,15 +162,11 @@ def blank_starter(path: Path, columns: Mapping[str, Column], header: int | None,
         needs = taken.needs or (() if column.unit else NEEDED.get(UNIT_KINDS[taken.column], ()))
         lines += [*(f"# {key} =    # FILL IN: {SHEET[key]}" for key in needs if getattr(column, key) is None), ""]
     model = read_model(None)
+    lines.append("[parameters]   # of the data sheets")
     for name, meaning in MEANING.items():
-        value = f" {DRAFT_LAG:g}" if name == "tau" else ""
-        lines += [
-            f"# {meaning}",
-            f"# [parameters.{name}]",
-            f"# value ={value}   # {model.parameters[name].unit or '1'}; FILL IN",
-            "# relative_uncertainty = 0.05   # off by at most this share; the fit finds the value",
-            "",
-        ]
+        value, share = DRAFT_LAG if name == "tau" else "", UNCERTAIN.get(name, 0.05)
+        entry = f"{name} = {{ value = {value}, relative_uncertainty = {share} }}"
+        lines.append(f"# {entry}   # {model.parameters[name].unit or '1'}; FILL IN: {meaning}")
     return "\n".join(lines).rstrip() + "\n"
 
 

@@ -75,8 +75,8 @@ SHEET = {"J_m": 0.004, "J_l": 1.9, "k": 9000.0, "c": 4.0, "b_m": 0.006, "b_l": 2
 def _fill(text: str) -> str:
     """Fill in the blanks of a drafted file, as its first lines say."""
     for name, value in SHEET.items():
-        text = re.sub(rf"# (\[parameters\.{name}\])\n# value =(.*)\n# (.*)", rf"\1\nvalue = {value}\2\n\3", text)
-    text = re.sub(r"# (\[parameters\.tau\])\n# (value = .*)\n# (.*)", r"\1\n\2\n\3", text)
+        text = re.sub(rf"# ({name} = {{ value = ),", rf"\g<1>{value},", text)
+    text = text.replace("# tau = ", "tau = ")
     for name, counts in (("theta_m", COUNTS[0]), ("theta_l", COUNTS[1])):
         blanks = rf"(\[columns\.{name}\].*\nname = .*\n)# (unit = .*)\n# (counts_per_rev =)"
         text = re.sub(blanks, rf"\1\2\n\3 {counts}", text)
