@@ -46,8 +46,8 @@ def _far_turns(angle: np.ndarray) -> int:
 def _shift(record: Record, motor: float, load: float) -> Record:
     if motor == 0.0 and load == 0.0:
         return record
-    shifts = [f"{name} from {shift:.9g} rad" for name, shift in (("theta_m", motor), ("theta_l", load)) if shift]
-    note = f"encoders' zeros lie elsewhere: angles count {' and '.join(shifts)} on"
+    shifts = [f"{shift:.9g} rad from {name}" for name, shift in (("theta_m", motor), ("theta_l", load)) if shift]
+    note = f"the encoders' zeros differ: subtracted {' and '.join(shifts)}"
     theta_l = None if record.theta_l is None else record.theta_l - load
     return replace(
         record, theta_m=record.theta_m - motor, theta_l=theta_l, notes=(*record.notes, note), zeros_set=motor != 0.0

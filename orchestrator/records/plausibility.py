@@ -216,7 +216,7 @@ def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
             "against it: the sign of `u` or of the angles is wrong; say `[columns.u] factor = -1` (`model`)"
         )
     if abs(relative) < 3.0 / DEGREES:
-        shown = f"(the torque would move {abs(moved):.2g} of the model's {own:.2g} kg.m2)"
+        shown = f"(the motion fits {abs(moved):.2g} kg.m2, the model has {own:.2g} kg.m2)"
         if abs(math.log(max(abs(relative), 1e-12) * DEGREES)) < NEAR_DEGREES:
             raise RecordError(
                 f"{record.source}: column `theta_m` must be in radians, but seems to be in degrees {shown}: say "
@@ -224,12 +224,12 @@ def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
             )
         raise RecordError(
             f"{record.source}: the model's inertia must be the machine's, but is {1.0 / max(abs(relative), 1e-12):.3g} "
-            f"times as large as what the torque moves {shown}: say {machine}, or the right `unit` in `[columns.u]` and "
+            f"times as large {shown}: say {machine}, or the right `unit` in `[columns.u]` and "
             "`[columns.theta_m]`"
         )
     if relative > DEGREES / 3.0:
         raise RecordError(
-            f"{record.source}: column `u` must be in N.m and `theta_m` in radians, but the torque would move "
+            f"{record.source}: column `u` must be in N.m and `theta_m` in radians, but the motion fits "
             f"{relative:.3g} times the model's inertia: say `[columns.u] unit` and `[columns.theta_m] unit`, or the "
             f"{machine.removeprefix('the ')}"
         )

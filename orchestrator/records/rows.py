@@ -94,8 +94,8 @@ def describe_failed(rows: NDArray[np.int64], label: str) -> str:
     """Return the words for readings that are left out."""
     shown = ", ".join(str(row + 1) for row in rows[:6].tolist()) + (", ..." if rows.size > 6 else "")
     if rows.size == 1:
-        return f"row {shown} of `{label}` leaves the motion and comes back: a reading that failed, taken as missing"
-    return f"rows {shown} of `{label}` leave the motion and come back: readings that failed, taken as missing"
+        return f"row {shown} of `{label}` jumps away from the motion and back: a failed reading, treated as missing"
+    return f"rows {shown} of `{label}` jump away from the motion and back: failed readings, treated as missing"
 
 
 def check_clock(time: Array, angles: Mapping[str, Array], where: str, cure: str) -> None:
