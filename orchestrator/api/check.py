@@ -102,7 +102,7 @@ def check(
         trust: run FMUs without the kernel's walls around them; limits remain.
         policy: which rules count, and how much: a file such as ``fmu-check.toml`` (default: all rules, as they are).
         time_limit: wall time that one call may take [s].
-        total_limit: time that all calls of an FMU may take [s]; what that leaves out is named.
+        total_limit: time limit of all calls of an FMU [s]; the result names skipped probes.
         memory_limit: memory that the running FMU may take [MiB].
         size_limit: size that the unpacked FMU may have [MiB].
         progress: called with the verdict on each FMU as it is ready.

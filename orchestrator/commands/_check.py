@@ -62,7 +62,7 @@ def add_check_arguments(parser: argparse.ArgumentParser) -> None:
     limits, archive = Limits(), ArchiveLimits()
     for name, default, metavar, what in (
         ("time", limits.time, "S", "wall time limit of one call"),
-        ("total", TOTAL, "S", "time that all calls of an FMU may take; what that leaves out is named"),
+        ("total", TOTAL, "S", "time limit of all calls of an FMU; the result names skipped probes"),
         ("memory", limits.memory / MEBIBYTE, "MIB", "memory that the running FMU may take"),
         ("size", archive.total / MEBIBYTE, "MIB", "size that the unpacked FMU may have"),
     ):

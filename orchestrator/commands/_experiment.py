@@ -15,7 +15,7 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
         "--backlash-model",
         default="dead_zone",
         metavar="MODEL",
-        help=f"of the loop with a gap: {', '.join(BACKLASH_MODELS)} (default: %(default)s)",
+        help=f"model of the gap: {', '.join(BACKLASH_MODELS)} (default: %(default)s)",
     )
 
 

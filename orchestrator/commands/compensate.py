@@ -22,23 +22,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for flag, unit, text in (
         ("--alpha", "RAD", "half-gap (default: the model's, else 0.02)"),
         ("--tau", "S", "without a model, time constant of the drive (default: 0.005)"),
-        ("--impact-speed", "RAD/S", "at which the teeth shall meet (default: by the machine, without a model 0.1)"),
-        ("--friction", "N.M", "without a model, dry friction at the load, which no law knows (default: 2)"),
-        ("--torque-limit", "N.M", "of the drive (default: the model's, else the record's largest request)"),
+        ("--impact-speed", "RAD/S", "speed at which the teeth meet (default: from the machine, without a model 0.1)"),
+        ("--friction", "N.M", "without a model, dry friction at the load that no controller models (default: 2)"),
+        ("--torque-limit", "N.M", "limit of the drive (default: the model's, else the record's largest request)"),
     ):
         parser.add_argument(flag, type=float, metavar=unit, help=text)
     parser.add_argument(
-        "--state-weights", metavar="Q,Q,Q,Q,Q", help="of the LQR, at 1 for the request (default: searched)"
+        "--state-weights", metavar="Q,Q,Q,Q,Q", help="weights of the LQR; the request has 1 (default: searched)"
     )
     parser.add_argument(
-        "--sample-time", type=float, default=SAMPLE_TIME, metavar="S", help="of the controller (default: %(default)s)"
+        "--sample-time", type=float, default=SAMPLE_TIME, metavar="S", help="sample time (default: %(default)s)"
     )
     parser.add_argument("--plants", type=int, metavar="N", help="number of plants (default: 100, without a model 5)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of plants and noise (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all draws (default: %(default)s)")
     parser.add_argument("--mpc", action="store_true", help="also run a model predictive controller (extra `mpc`)")
     parser.add_argument("--native", action="store_true", help="write native FMUs, which need no Python at run time")
     parser.add_argument(
-        "--fmi", type=int, choices=(2, 3), default=2, help="of these FMUs (default: 2); those of 3 are native"
+        "--fmi", type=int, choices=(2, 3), default=2, help="FMI version (default: 2); 3 means native FMUs"
     )
     parser.add_argument("--force", action="store_true", help="continue although the model cannot be trusted")
 

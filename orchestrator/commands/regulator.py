@@ -27,11 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--gains", metavar="K,K,K,K,K", help="evaluate these gains instead of a design")
     parser.add_argument(
-        "--sample-time", type=float, default=SAMPLE_TIME, metavar="S", help="of the controller (default: %(default)s)"
+        "--sample-time", type=float, default=SAMPLE_TIME, metavar="S", help="sample time (default: %(default)s)"
     )
-    parser.add_argument(
-        "--delay", type=int, default=0, metavar="N", help="of the request, in samples (default: %(default)s)"
-    )
+    parser.add_argument("--delay", type=int, default=0, metavar="N", help="samples of delay (default: %(default)s)")
 
 
 def run(arguments: argparse.Namespace) -> int:
