@@ -143,8 +143,8 @@ def blank_starter(path: Path, columns: Mapping[str, Column], header: int | None,
     lines = [
         f"# A model of the machine that made {plain_text(path.name)}, with blanks. The log was refused:",
         f"# {plain_text(problem)}",
-        "# Fill in the blanks of the columns and delete the `#` before them. Then run `inspect` again with this file",
-        "# as `--model`: it proposes the parameters that you leave out.\n",
+        "# Fill in the blanks of the columns and delete the `#` before them. Then inspect the log again with this",
+        "# file as its model: parameters that you leave out are proposed.\n",
         f'fmu = "Drivetrain"\n\n# Columns of the log: {plain_text(", ".join(labels)) or "none were found"}\n',
     ]
     for taken in seen.columns:
