@@ -25,7 +25,7 @@ SLOW = {"diagnose", "benchmark", "calibrate", "design"}
 def place(tmp_path, monkeypatch, fmus, build_native):
     """A folder with the files that the docs speak of, as the current one; hundreds of runs of the axis are quick."""
     copy_examples(tmp_path)
-    shutil.copy(fmus["Drivetrain"], tmp_path / "other.fmu")
+    shutil.copy(fmus["LqrController"], tmp_path / "other.fmu")  # that is soon checked
     shutil.copy(build_native(["ServoAxis"])["ServoAxis"], tmp_path / "axis.fmu")
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -3,6 +3,7 @@
 import importlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,25 +32,32 @@ def native(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
     return build_native(list(NAMES))
 
 
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.night) for n in (1, 2, 3))])
 @pytest.mark.parametrize("name", NAMES)
-def test_random_calls_give_the_same_as_the_python_fmu(native: dict[str, Path], name: str) -> None:
+def test_random_calls_give_the_same_as_the_python_fmu(native: dict[str, Path], name: str, seed: int) -> None:
     python = ensure_built([name])[name]
     table = getattr(importlib.import_module(f"pyfmu_sources.{recipe_of(name).module}"), name).table
-    count, seeds = (60, 1) if name == "BacklashEstimator" else (300, 4)
-    stepped = sum(random_calls([Driver(python), Driver(native[name])], table, count, seed) for seed in range(seeds))
-    assert stepped > count * seeds // 6
+    count = 60 if name == "BacklashEstimator" else 300
+    assert random_calls([Driver(python), Driver(native[name])], table, count, seed) > count // 6
 
 
-@pytest.mark.parametrize("effect", ["no effect", *EFFECTS])
-def test_every_bit_of_every_model_and_effect(native: dict[str, Path], effect: str) -> None:
+def models_and_effects() -> list[Any]:
+    """Every pair of a model and an effect; by day three models of each effect, so that all are met in turn."""
+    pairs = [(model, effect) for effect in range(len(EFFECTS) + 1) for model in range(len(MODELS))]
+    names = ["no effect", *EFFECTS]
+    return [
+        pytest.param(model + 1, names[effect], marks=[pytest.mark.night] if (model + effect) % 2 else [])
+        for model, effect in pairs
+    ]
+
+
+@pytest.mark.parametrize(("model", "effect"), models_and_effects())
+def test_every_bit_of_every_model_and_effect(native: dict[str, Path], model: int, effect: str) -> None:
     """A sample; ``python -m benchmarks.native_bits`` does a million."""
-    for model in range(1, len(MODELS) + 1):
-        comparison = Comparison(
-            native["Drivetrain"], drivetrain_values(model, EFFECTS.get(effect, {})), seed=10 + model
-        )
-        for n in range(150):
-            assert comparison.step(), f"{MODELS[model - 1]}, {effect}: step {n}"
-        assert comparison.taken > 130
+    comparison = Comparison(native["Drivetrain"], drivetrain_values(model, EFFECTS.get(effect, {})), seed=10 + model)
+    for n in range(150):
+        assert comparison.step(), f"{MODELS[model - 1]}, {effect}: step {n}"
+    assert comparison.taken > 130
 
 
 @pytest.mark.parametrize("case", TRAIN)

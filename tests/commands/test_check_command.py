@@ -113,6 +113,7 @@ def test_nothing_is_loaded_of_what_cannot_be_read(tmp_path: Path, monkeypatch: p
     assert mark.exists()
 
 
+@pytest.mark.night  # CI runs this command itself at each push
 def test_our_own_fmus_have_no_finding(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert check(tmp_path) == 0
     counts = results(tmp_path)["counts"]

@@ -86,7 +86,12 @@ def test_the_commands_give_the_same_numbers(tmp_path: Path, commands: tuple[str,
         assert not cost or re.fullmatch(cost, done.stderr), (words, done.stderr[-2000:])
         assert "Traceback" not in done.stderr, (words, done.stderr[-2000:])
         assert done.returncode == 0, (words, done.stderr[-2000:])
-        assert run("orchestrator", words, here).returncode == 0
+    together = f"from orchestrator.cli import main; print([main(words.split()) for words in {commands!r}])"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", together], check=False, cwd=here, env=environment, capture_output=True, text=True
+    )
+    assert done.stdout.splitlines()[-1] == str([0] * len(commands)), done.stderr[-2000:]
     written = sorted(p.relative_to(here) for p in (*here.rglob("results/*/*.json"), *here.glob("built/*.json")))
     named = {words.split()[0] for words in commands} - {"--help", "report"}
     assert {path.stem for path in written} >= named - {"regulator", "ssp"}
@@ -107,9 +112,14 @@ def test_a_child_without_a_group_is_ended_alone(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.delattr(os, "killpg")
     monkeypatch.delattr(signal, "pthread_sigmask")
     assert operating_system.command_options() == {}
-    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+    # A shell in the background gives its children an ignored SIGINT.
+    program = "import signal, time; signal.signal(signal.SIGINT, signal.default_int_handler); print(flush=True); "
+    child = subprocess.Popen([sys.executable, "-c", program + "time.sleep(600)"], stdout=subprocess.PIPE)
+    assert child.stdout is not None
+    child.stdout.readline()
     assert operating_system.signal_group(child.pid, signal.SIGINT)
     assert child.wait(60) != 0
+    child.stdout.close()
 
 
 def test_one_module_alone_imports_what_one_system_has() -> None:

@@ -52,7 +52,9 @@ def test_exact_parameters_are_none() -> None:
         ({"Fc_l": 2.0}, "coulomb_friction@load", "torque", 2.0, 0.03),
         ({"delay": 0.012}, "input_delay@actuator", "delay", 0.012, 0.02),
         ({"rip": 0.8, "rip_n": 6.0}, "torque_ripple@motor", "amplitude", 0.8, 0.03),
-        ({"grav": 6.0, "grav_ph": 0.4}, "gravity_load@load", "amplitude", 6.0, 0.03),
+        pytest.param(
+            {"grav": 6.0, "grav_ph": 0.4}, "gravity_load@load", "amplitude", 6.0, 0.03, marks=pytest.mark.night
+        ),
     ],
 )
 def test_one_effect_is_named_with_its_size(effects, label, parameter, value, tolerance) -> None:

@@ -88,7 +88,11 @@ def test_error_controlled_master_needs_few_steps_in_a_smooth_loop(folder: Path) 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("alpha", "tolerance", "bound"),
-    [(0.01, 1e-7, 5e-7), (0.02, 1e-7, 5e-7), (0.05, 1e-7, 5e-7), (0.05, 1e-8, 1e-7)],
+    [
+        (0.01, 1e-7, 5e-7),
+        (0.05, 1e-8, 1e-7),
+        *(pytest.param(alpha, 1e-7, 5e-7, marks=pytest.mark.night) for alpha in (0.02, 0.05)),
+    ],
 )
 def test_error_controlled_master_reaches_a_microradian_with_backlash(
     folder: Path, alpha: float, tolerance: float, bound: float

@@ -56,7 +56,10 @@ def made(tmp_path):
         (TANKS, "input_saturation", 0.01),
         (SPRING, "hysteresis", 0.05),  # its standard error is 16 %
         pytest.param(
-            CIRCUIT, "input_quantisation", 1e-3, marks=pytest.mark.xfail(reason="parameters leave 1.4 times the noise")
+            CIRCUIT,
+            "input_quantisation",
+            1e-3,
+            marks=[pytest.mark.night, pytest.mark.xfail(reason="parameters leave 1.4 times the noise")],
         ),
     ],
     ids=lambda v: getattr(v, "name", str(v)),
@@ -164,7 +167,7 @@ def test_a_drafted_map_can_be_used_as_it_is(made, tmp_path):
      "setup_forgets", "stop_told"],
 )  # fmt: skip
 def test_an_fmu_that_misbehaves_mildly_is_diagnosed_all_the_same(made, fault):
-    _, *files = made(SPRING, ("quadratic_drag",), rows=500, fault=fault)
+    _, *files = made(SPRING, ("quadratic_drag",), rows=300, fault=fault)
     if fault == "input_reversed":
         text = files[2].read_text().replace('hold = "zero"', 'hold = "zero", factor = -1.0')
         files[2].write_text(text)
