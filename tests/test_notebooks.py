@@ -37,8 +37,13 @@ def test_no_outputs_are_kept(path):
     assert not [cell for cell in cells if cell.get("outputs") or cell.get("execution_count")]
 
 
+# By day docs/python.md makes the calls of the notebook of a record.
 @pytest.mark.slow
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(p, marks=pytest.mark.night if p.stem == "record" else ()) for p in NOTEBOOKS],
+    ids=lambda p: p.stem,
+)
 def test_a_notebook_runs(path, tmp_path, fmus):
     copy_examples(tmp_path / "here")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}

@@ -179,7 +179,7 @@ def design(
         ScenarioError: a number is out of its range, or the model has effects that estimators would not see.
 
     Examples:
-        >>> plan = oc.design(size=0.005, duration=4.0)
+        >>> plan = oc.design(size=0.005, duration=2.0)
         >>> plan.shows
         True
         >>> plan.write_csv("excitation.csv")

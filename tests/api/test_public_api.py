@@ -18,7 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FUNCTIONS = sorted(name for name in oc.__all__ if name.islower() and not name.startswith("_"))
 # Examples that take more than a few seconds.
-SLOW = {"diagnose", "benchmark", "calibrate", "design"}
+SLOW = {"benchmark", "calibrate", "design"}
+AT_NIGHT = {"diagnose", "estimate"}  # the same calls as those of the page
 
 
 @pytest.fixture
@@ -89,7 +90,11 @@ def test_the_page_runs_as_written(place):
     assert done.stderr == ""
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in FUNCTIONS])
+def marks_of(name):
+    return pytest.mark.night if name in AT_NIGHT else pytest.mark.slow if name in SLOW else ()
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=marks_of(n)) for n in FUNCTIONS])
 def test_example_of_the_docstring(place, name):
     function = getattr(oc, name)
     example = doctest.DocTestParser().get_doctest(function.__doc__, {"oc": oc}, name, None, 0)

@@ -38,15 +38,29 @@ def test_contacts_between_both_halves(halves: dict[str, Path]) -> None:
     assert sum(run.statistics.do_steps.values()) < 35_000
 
 
-@needs_compiler
-def test_the_reference_that_comes_with_them(halves: dict[str, Path]) -> None:
-    """The files are not made by the FMUs; both agree to 1e-9 s and the tolerance."""
+def reference() -> tuple[np.ndarray, list[float]]:
+    """Angles and contacts of the files that come with the FMUs."""
     with (FOLDER / "reference.csv").open(encoding="ascii") as stream:
         rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(stream)]
     contacts = [float(line) for line in (FOLDER / "contacts.csv").read_text(encoding="ascii").split()[1:]]
+    return np.array([[row["theta_m"], row["theta_l"]] for row in rows]), contacts
+
+
+def test_the_reference_that_comes_with_them_is_the_solution() -> None:
+    """Beside the FMUs it is put at night; by day these are compared with the solution."""
+    angles, contacts = reference()
+    rows, found = solve(0.01, np.linspace(0.0, STOP, len(angles)))
+    np.testing.assert_allclose(found, contacts, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(rows[:, [0, 3]], angles, rtol=0.0, atol=1e-8)
+
+
+@needs_compiler
+@pytest.mark.night
+def test_the_reference_that_comes_with_them(halves: dict[str, Path]) -> None:
+    """The files are not made by the FMUs; both agree to 1e-9 s and the tolerance."""
+    expected, contacts = reference()
     run = simulate(halves, 0.01, Adaptive(1e-3, 1e-8))
     np.testing.assert_allclose(run.statistics.events.times, contacts, rtol=0.0, atol=1e-9)
-    expected = [[row["theta_m"], row["theta_l"]] for row in rows]
     np.testing.assert_allclose(run.values.T[::10], expected, rtol=0.0, atol=3e-8)
 
 

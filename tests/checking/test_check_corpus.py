@@ -10,7 +10,7 @@ from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.shared.isolation.limits import Limits
 from tests.support.broken_ball3 import behavioural
 from tests.support.broken_ball3_xml import static
-from tests.support.broken_fmus import QUICK, Broken, corpus, good
+from tests.support.broken_fmus import ALONE, QUICK, Broken, corpus, good, is_of_the_day
 from tests.support.broken_plants import broken_plants
 from tests.support.c_fmu import REFERENCE, build_c_fmu, fmu_files, have_compiler, write_fmu
 from tests.support.outlined_findings import outline_of, outlines
@@ -31,7 +31,19 @@ def test_the_good_fmu_has_no_finding(tmp_path: Path) -> None:
     assert report.executed
 
 
-@pytest.mark.parametrize("broken", CORPUS, ids=lambda b: b.name)
+IN_FMI_3 = {mutant.name.partition(" ")[2] for mutant in behavioural() if mutant.name.startswith("CoSimulation")}
+
+
+def is_by_day(broken: Broken) -> bool:
+    kind, _, fault = broken.name.partition(" ")
+    return kind != "behaviour" or (fault not in ALONE and is_of_the_day(fault, "2.0", IN_FMI_3))
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [pytest.param(b, marks=() if is_by_day(b) else pytest.mark.night) for b in CORPUS],
+    ids=lambda b: b.name,
+)
 def test_names_the_rule(broken: Broken, tmp_path: Path) -> None:
     path = tmp_path / "broken.fmu"
     broken.make(path)

@@ -27,6 +27,7 @@ from tests.support.broken_ball3 import (
 )
 from tests.support.broken_ball3 import STATIC as STATIC_ONLY
 from tests.support.broken_ball3_xml import static
+from tests.support.broken_fmus import is_of_the_day
 from tests.support.c_fmu import have_compiler, write_fmu
 from tests.support.c_fmu import model_description as model_description_2
 from tests.support.fuzz_fmu import damaged_tree
@@ -38,7 +39,6 @@ pytestmark = pytest.mark.skipif(
 STATIC = static()
 BEHAVIOURAL = behavioural()
 OUTLINES = outlines("3")
-FIRST = {mutant.rule: mutant.name for mutant in reversed(BEHAVIOURAL)}
 NOBODYS = (
     # What none of four other checkers saw.
     "xml identifier of no library", "files library is text", "files folder misspelt", "xml build file missing",
@@ -139,9 +139,21 @@ def test_what_is_read_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> No
     _check_findings(mutant, tmp_path)
 
 
+IN_FMI_3 = {mutant.name.partition(" ")[2] for mutant in BEHAVIOURAL if mutant.name.startswith("CoSimulation")}
+# By day for another interface, or with the plants of test_check_plants.py.
+AT_NIGHT = ("CoSimulation reset_clock", "CoSimulation state_clock", "ModelExchange directional_wrong")
+
+
+def is_by_day(mutant: Mutant) -> bool:
+    interface, _, fault = mutant.name.partition(" ")
+    if interface == "CoSimulation" and not is_of_the_day(fault, "3.0", IN_FMI_3):
+        return False
+    return mutant.name not in AT_NIGHT
+
+
 @pytest.mark.parametrize(
     "mutant",
-    [pytest.param(m, marks=() if FIRST[m.rule] == m.name else pytest.mark.slow) for m in BEHAVIOURAL],
+    [pytest.param(m, marks=() if is_by_day(m) else pytest.mark.night) for m in BEHAVIOURAL],
     ids=lambda m: m.name,
 )
 def test_behaviour_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:

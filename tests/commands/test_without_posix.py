@@ -80,18 +80,21 @@ def test_the_commands_give_the_same_numbers(tmp_path: Path, commands: tuple[str,
     for folder in (here, hidden):
         folder.mkdir()
         copy_examples(folder)
+        log = folder / "machine.csv"
+        log.write_text("".join(log.read_text().splitlines(keepends=True)[:801]))
     for words in commands:
         done = run("tests.support.without_posix", words, hidden)
         cost = r"The fit of \d+ rows will take about \d+ s of processor time\n" if "estimate" in words else ""
         assert not cost or re.fullmatch(cost, done.stderr), (words, done.stderr[-2000:])
         assert "Traceback" not in done.stderr, (words, done.stderr[-2000:])
         assert done.returncode == 0, (words, done.stderr[-2000:])
-    together = f"from orchestrator.cli import main; print([main(words.split()) for words in {commands!r}])"
+    lines = [words for words in commands if words != "--help"]  # which ends the process
+    together = f"from orchestrator.cli import main; print([main(words.split()) for words in {lines!r}])"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-c", together], check=False, cwd=here, env=environment, capture_output=True, text=True
     )
-    assert done.stdout.splitlines()[-1] == str([0] * len(commands)), done.stderr[-2000:]
+    assert done.stdout.splitlines()[-1] == str([0] * len(lines)), done.stderr[-2000:]
     written = sorted(p.relative_to(here) for p in (*here.rglob("results/*/*.json"), *here.glob("built/*.json")))
     named = {words.split()[0] for words in commands} - {"--help", "report"}
     assert {path.stem for path in written} >= named - {"regulator", "ssp"}

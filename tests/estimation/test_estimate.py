@@ -132,7 +132,7 @@ def test_the_motor_encoder_alone_is_enough() -> None:
 @pytest.mark.slow
 def test_the_motor_encoder_of_a_weak_drive_is_enough() -> None:
     """A loop that asks for 0.3 N.m: torque noise that a strong drive hardly feels would hide all of the motion."""
-    case = one_encoder_case(715003, 15.0)
+    case = one_encoder_case(715003, 8.0)
     problem = make_problem(case.record, model_of(case))
     assert problem.torque_units[0] == pytest.approx(0.1, rel=0.5)
     fit = fit_record(Likelihood(problem))
@@ -231,18 +231,19 @@ def test_design_keeps_the_limits_and_beats_a_bad_excitation() -> None:
 
 
 @pytest.mark.slow
-def test_a_designed_record_measures_better_on_other_machines() -> None:
+@pytest.mark.parametrize("seed", [43, pytest.param(44, marks=pytest.mark.night)])
+def test_a_designed_record_measures_better_on_other_machines(seed: int) -> None:
     _, candidates = design(MODEL, 0.01, MachineLimits(250.0, 50.0), duration=3.0)
-    errors: dict[str, list[float]] = {"designed": [], "default": []}
-    for seed in (43, 44):
-        for name, u in (("designed", candidates[0].u), ("default", None)):
-            record, truth = _record(0.01, seed, 3.0, u=u)
-            result = estimator("maximum_likelihood")(record, MODEL)
-            assert abs(result.alpha - 0.01) < 4.0 * result.standard_error
-            errors[name].append(result.standard_error)
-            assert np.abs(record.u).max() < 260.0
-            assert np.abs(truth["states"][:, 1]).max() < 50.0
-    assert np.mean(errors["designed"]) < 0.7 * np.mean(errors["default"])
+    errors = []
+    for u in (candidates[0].u, None):
+        record, truth = _record(0.01, seed, 3.0, u=u)
+        result = estimator("maximum_likelihood")(record, MODEL)
+        assert abs(result.alpha - 0.01) < 4.0 * result.standard_error
+        errors.append(result.standard_error)
+        assert np.abs(record.u).max() < 260.0
+        assert np.abs(truth["states"][:, 1]).max() < 50.0
+    designed, default = errors
+    assert designed < 0.7 * default
 
 
 def test_limits_that_show_nothing_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

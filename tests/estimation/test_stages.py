@@ -156,7 +156,12 @@ def test_the_kernel_in_machine_code_has_the_bits_of_plain_python(tmp_path, monke
 
 
 @pytest.mark.parametrize(
-    ("halves", "answer"), [((0.02, 0.0), "1"), ((0.0, 0.012), "2"), ((0.014, 0.008), "both")]
+    ("halves", "answer"), [
+        ((0.02, 0.0), "1"),
+        # By day the command names stage 2, and the intervals of both are looked at.
+        pytest.param((0.0, 0.012), "2", marks=pytest.mark.night),
+        pytest.param((0.014, 0.008), "both", marks=pytest.mark.night),
+    ],
 )  # fmt: skip
 def test_the_stage_is_named_and_its_gap_measured(tmp_path, halves, answer):
     """Friction that the model lacks, a torque 2 ms late and other noise: 4 % are far more than the fits err by."""
