@@ -186,9 +186,16 @@ def test_where_derivatives_are_refused_the_integrator_gives_up_with_its_own_word
 # Under the master -----------------------------------------------------------------------------------------------------
 
 
-@VERSIONS
-@pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi", "iterated"])
-@pytest.mark.parametrize("once", [False, True])
+# Half of them hold every pair of version, algorithm and process; the whole runs at night.
+BALLS = [
+    pytest.param(version, algorithm, once, marks=[] if (version + n + once) % 2 else [pytest.mark.night])
+    for n, algorithm in enumerate(("gauss_seidel", "jacobi", "iterated"))
+    for version in (2, 3)
+    for once in (False, True)
+]
+
+
+@pytest.mark.parametrize(("version", "algorithm", "once"), BALLS)
 def test_two_balls_bounce_behind_the_walls(tmp_path: Path, version: int, algorithm: str, once: bool) -> None:
     """Alone in a process or not; a discrete value goes from the one to the other."""
     result = simulate(scenario(tmp_path, version, more=f'algorithm = "{algorithm}"', once=once))
@@ -265,7 +272,7 @@ def run(path: Path, algorithm: Algorithm, events: bool = True, stop: float = 0.4
     return first
 
 
-@VERSIONS
+@pytest.mark.parametrize("version", [pytest.param(2, marks=pytest.mark.night), 3])
 def test_adaptive_feeds_it(tmp_path: Path, version: int) -> None:
     path = build_exchange_fmu(tmp_path, version)
     result = run(path, Adaptive(0.05, tolerance=1e-8))
