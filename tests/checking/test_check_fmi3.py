@@ -5,6 +5,7 @@ import sys
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import pytest
 from lxml import etree
@@ -39,6 +40,7 @@ pytestmark = pytest.mark.skipif(
 STATIC = static()
 BEHAVIOURAL = behavioural()
 OUTLINES = outlines("3")
+FIRST = {mutant.rule: mutant.name for mutant in reversed(BEHAVIOURAL)}
 NOBODYS = (
     # What none of four other checkers saw.
     "xml identifier of no library", "files library is text", "files folder misspelt", "xml build file missing",
@@ -144,18 +146,14 @@ IN_FMI_3 = {mutant.name.partition(" ")[2] for mutant in BEHAVIOURAL if mutant.na
 AT_NIGHT = ("CoSimulation reset_clock", "CoSimulation state_clock", "ModelExchange directional_wrong")
 
 
-def is_by_day(mutant: Mutant) -> bool:
+def marks_of(mutant: Mutant) -> Any:
     interface, _, fault = mutant.name.partition(" ")
-    if interface == "CoSimulation" and not is_of_the_day(fault, "3.0", IN_FMI_3):
-        return False
-    return mutant.name not in AT_NIGHT
+    if mutant.name in AT_NIGHT or (interface == "CoSimulation" and not is_of_the_day(fault, "3.0", IN_FMI_3)):
+        return pytest.mark.night
+    return () if FIRST[mutant.rule] == mutant.name else pytest.mark.slow
 
 
-@pytest.mark.parametrize(
-    "mutant",
-    [pytest.param(m, marks=() if is_by_day(m) else pytest.mark.night) for m in BEHAVIOURAL],
-    ids=lambda m: m.name,
-)
+@pytest.mark.parametrize("mutant", [pytest.param(m, marks=marks_of(m)) for m in BEHAVIOURAL], ids=lambda m: m.name)
 def test_behaviour_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:
     _check_findings(mutant, tmp_path)
 

@@ -15,14 +15,14 @@ pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
 )
 TUNABLE = '"parameter" variability="tunable" initial="exact"'
-EXPERIMENT = '<DefaultExperiment startTime="0" stopTime="3" stepSize="0.03"/>'
+EXPERIMENT = '<DefaultExperiment startTime="0" stopTime="1.5" stepSize="0.03"/>'
 CATEGORIES = '<LogCategories><Category name="logStatusError"/><Category name="logAll"/></LogCategories>'
 ALIAS = (
     '<ScalarVariable name="y of old" valueReference="10" causality="local" variability="continuous" '
     'initial="calculated"><Real/></ScalarVariable>\n  </ModelVariables>'
 )
 BESIDE = '></Float64>\n<Float64 name="z"'
-BEFORE = [('startTime="0"', 'startTime="-7.5"'), ('stopTime="3"', 'stopTime="-4.5"')]
+BEFORE = [('startTime="0"', 'startTime="-7.5"'), ('stopTime="1.5"', 'stopTime="-6"')]
 NO_INPUTS = {
     "Output y": "x",
     "Output o": "",
@@ -54,7 +54,7 @@ CASES: dict[str, tuple[str, str, dict[str, str], list[tuple[str, str]]]] = {
     "min is max": ("2.0", "CS", ONE_VALUE, []),
     "min is max, 3": ("3.0", "ME", ONE_VALUE, []),
     "no dependencies told": ("3.0", "CS", UNTOLD, []),
-    "no stop time": ("2.0", "CS", {}, [(' stopTime="3"', "")]),
+    "no stop time": ("2.0", "CS", {}, [(' stopTime="1.5"', "")]),
     "no experiment": ("3.0", "CS", {}, [(EXPERIMENT, "")]),
     "no log categories": ("3.0", "CS", {}, [(CATEGORIES, "")]),
     "steps of one size": ("2.0", "CS", {"fixed steps": ""}, []),
@@ -67,7 +67,7 @@ AT_NIGHT = ("negative start time, 3", "names of any letters", "min is max, 3")  
 @pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.night if c in AT_NIGHT else ()) for c in CASES])
 def test_a_legal_fmu_is_clean(case: str, tmp_path: Path) -> None:
     version, interfaces, changes, texts = CASES[case]
-    description = describe(version, interfaces, changes)
+    description = describe(version, interfaces, {"stop": "1.5"} | changes)
     for old, new in texts:
         assert old in description
         description = description.replace(old, new)

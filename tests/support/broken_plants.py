@@ -288,9 +288,10 @@ class BrokenPlant:
         """What clock the plant has; empty: none."""
         return dict(self.changes).get("clock", "")
 
-    def build(self, path: Path) -> Path:
-        """Build it at ``path`` and return that."""
-        return build_plant(path, self.version, self.interfaces, self.fault.strip("-"), dict(self.changes))
+    def build(self, path: Path, stop: str = "3") -> Path:
+        """Build it at ``path``, with an experiment until ``stop`` [s], and return that."""
+        changes = {"stop": stop} | dict(self.changes)
+        return build_plant(path, self.version, self.interfaces, self.fault.strip("-"), changes)
 
 
 def broken_plants() -> list[BrokenPlant]:
