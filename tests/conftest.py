@@ -3,6 +3,7 @@
 import gc
 import os
 import shutil
+import signal
 import tempfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from functools import partial
@@ -80,7 +81,12 @@ def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> 
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Name failures as they happen: a run that is cut says what it has found."""
+    """Name failures as they happen: a run that is cut says what it has found.
+
+    A shell gives what it runs in the background an ignored SIGINT; tests send that to their own children.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     config.pluginmanager.register(_Failures(config))
 
 
