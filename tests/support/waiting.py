@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-HANGS = 400.0  # s, after which what ends by itself hangs: far more than a busy computer takes
+HANGS = 600.0  # s, after which what ends by itself hangs: far more than a busy computer takes
 
 
 def wait_until(holds: Callable[[], Any], said: Callable[[], object] = str, pause: float = 0.02) -> Any:
