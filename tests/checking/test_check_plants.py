@@ -9,7 +9,7 @@ import pytest
 from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.shared.isolation.limits import Limits
-from tests.support.broken_plants import BrokenPlant, broken_plants
+from tests.support.broken_plants import BrokenPlant, broken_plants, options_for
 from tests.support.c_fmu import have_compiler
 from tests.support.plant import build_plant
 
@@ -66,7 +66,7 @@ def is_of_the_night(key: tuple[str, str]) -> bool:
     ids=lambda p: p.name,
 )
 def test_a_fault_is_named_by_its_rule(plant: BrokenPlant, tmp_path: Path) -> None:
-    report = check_fmu(plant.build(tmp_path / "plant.fmu", STOP), OPTIONS)
+    report = check_fmu(plant.build(tmp_path / "plant.fmu", STOP), options_for(plant.rule))
     assert plant.rule in {f.rule for f in report.findings}
 
 
