@@ -128,7 +128,7 @@ def test_the_tutorial_goes_from_a_log_in_amperes_to_an_fmu_of_the_machine(tmp_pa
 
 @pytest.mark.slow
 def test_the_tour_ends_with_a_controller_of_the_machine(tmp_path):
-    copy_examples(tmp_path / "docs" / "examples")
+    copy_examples(tmp_path / "docs" / "examples", whole=True)
     for line in TO_A_CONTROLLER:
         assert done_there(tmp_path, line)
 

@@ -38,7 +38,7 @@ def test_random_calls_give_the_same_as_the_python_fmu(native: dict[str, Path], n
     python = ensure_built([name])[name]
     table = getattr(importlib.import_module(f"pyfmu_sources.{recipe_of(name).module}"), name).table
     count = 60 if name == "BacklashEstimator" else 300
-    assert random_calls([Driver(python), Driver(native[name])], table, count, seed) > count // 6
+    assert random_calls([Driver(python), Driver(native[name])], table, count, seed) > count // 10
 
 
 def models_and_effects() -> list[Any]:
