@@ -7,9 +7,6 @@ description has otherwise.
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.checking.catalogue import RULES
-from orchestrator.checking.check import CheckOptions
-from orchestrator.shared.isolation.limits import Limits
 from tests.support.plant import build_plant
 
 _TABLE = """
@@ -291,16 +288,9 @@ class BrokenPlant:
         """What clock the plant has; empty: none."""
         return dict(self.changes).get("clock", "")
 
-    def build(self, path: Path, stop: str = "3") -> Path:
-        """Build it at ``path``, with an experiment until ``stop`` [s], and return that."""
-        changes = {"stop": stop} | dict(self.changes)
-        return build_plant(path, self.version, self.interfaces, self.fault.strip("-"), changes)
-
-
-def options_for(rule: str) -> CheckOptions:
-    """Options that carry out the probe of a rule and those that it builds on."""
-    probes = () if RULES[rule].stage == "interfaces" else ("life cycle", "inputs", "setting", RULES[rule].stage)
-    return CheckOptions(limits=Limits(time=10.0), probes=probes)
+    def build(self, path: Path) -> Path:
+        """Build it at ``path`` and return that."""
+        return build_plant(path, self.version, self.interfaces, self.fault.strip("-"), dict(self.changes))
 
 
 def broken_plants() -> list[BrokenPlant]:
