@@ -1,9 +1,11 @@
 """Fixtures that all areas share, and the order in which files run."""
 
+import compileall
 import gc
 import os
 import shutil
 import signal
+import sys
 import tempfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from functools import partial
@@ -87,7 +89,17 @@ def pytest_configure(config: pytest.Config) -> None:
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    _keep_compiled_modules()
     config.pluginmanager.register(_Failures(config))
+
+
+def _keep_compiled_modules() -> None:
+    """Compile what hundreds of children import, which without this each of them would compile again."""
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        for package in ("orchestrator", "pyfmu_sources"):
+            compileall.compile_dir(Path(__file__).parents[1] / package, quiet=2)
 
 
 class _Failures:
