@@ -24,11 +24,12 @@ MORE = (
     "early_only", "derived_early", "clipped_far", "text_plain", "tunable_late", "text_shared", "reset_initialising",
     "restored_local", "state_in_place", "bytes_pointer", "bytes_overrun", "feeds_unswitched", "asked_alone",
     "output_cached", "rates_by_steps", "quiet_count", "count_in_steps", "step_after_end",
+    "last_before", "ends_early",
 )  # fmt: skip
 CHOSEN = {(plant.cause, plant.version): plant for plant in reversed(PLANTS)}
 CHOSEN |= {
-    (plant.fault, ""): plant for plant in PLANTS for n, fault in enumerate(MORE)
-    if plant.fault == fault and plant.version == ("2.0", "3.0")[n % 2]
+    (fault, ""): plant for n, fault in enumerate(MORE)
+    for plant in sorted(PLANTS, key=lambda p: p.version == ("2.0", "3.0")[n % 2]) if plant.fault == fault
 }  # fmt: skip
 SOUND = [
     ("2.0", "CS ME", {}),

@@ -239,6 +239,8 @@ _TABLE = """
 2 3 | CS | start_negative    | start.time
 2 3 | CS | clock_at_zero     | start.time
 2 3 | CS | step_after_end    | misuse.step-after-end
+3   | CS | last_before       | step.last-time
+3   | CS | ends_early        | run.skipped
 
 [own step inside]
 2 3 | CS | own_step          | steps.internal | step=0.015

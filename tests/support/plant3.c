@@ -313,7 +313,8 @@ API fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 t, fmi3Float64 h, fmi3Bool
     if (IS(chatty_late) && self->s.steps == 40) say(self, fmi3OK, "logAll", "a step");
     go(self, t, h);
     *event = *end = *early = false;
-    *last = t + h;
+    *last = IS(last_before) ? t : t + h;
+    *end = IS(ends_early) && self->s.steps > 20;
     return fmi3OK;
 }
 API fmi3Status fmi3ActivateModelPartition(fmi3Instance self, Reference clock, fmi3Float64 t) { REFUSE("not supported"); }

@@ -14,7 +14,7 @@ from orchestrator.checking.rules import declare
 
 declare("""
 [life cycle]
-step.last-time | E | - | 4.2.1 | lastSuccessfulTime lies in the step | return the time that was reached
+step.last-time | E | - | 4.2.1 | lastSuccessfulTime lies in the step, and is the time that the independent variable has | return the time that was reached
 step.no-progress | E | - | 4.2.1 | a step gets on | return early only after an event that is new
 step.early-return | E | - | 4.1.3 | fmi3DoStep returns early only where the flags and earlyReturnAllowed allow it | set mightReturnEarlyFromDoStep, or go on to the end of the step
 event.not-used | E | - | 4.2.1 | no event is announced where event mode is not used | handle it inside the step
@@ -101,6 +101,7 @@ class CoSimulation3(EventDriver):
         if not t - slack <= last <= goal + slack:
             text = f"lastSuccessfulTime must lie in the step from {t:g} to {goal:g}, but is {last:g} {when}"
             raise StatusError("fmi3DoStep", 0, text, "step.last-time")
+        self.reached = float(last)
         if early and not (self.early and self._may_return_early()):
             why = "mightReturnEarlyFromDoStep is not set" if self.early else "earlyReturnAllowed was false"
             self.report("step.early-return", f"fmi3DoStep must not return early, because {why}, but does", when=when)

@@ -56,11 +56,13 @@ class Driver(FmuInstance):
         report: called with rule, message, path and the time of the first one in words (``when``).
         driven: whether inputs that are not continuous change in its runs.
         habits: how its calls are made where the standard leaves that open.
+        reached: lastSuccessfulTime of the last step [s]; None: the interface has none.
     """
 
     driven = False
     habits = Habits()
     maker = ""
+    reached: float | None = None
 
     def __init__(self, library: Library, number: int, job: ProbeJob, report: Report) -> None:
         super().__init__(library, number)

@@ -44,8 +44,13 @@ def own_time(context: Context) -> None:
     if v is None or job.interface != "CoSimulation":
         raise SkippedError("the time inside cannot be read")
     found = job.start
-    for n, found in enumerate(context.observation.values_of(v)):
+    run = context.observation
+    for n, (found, reached) in enumerate(zip(run.values_of(v), run.reached, strict=False)):
         if not _judge_time(context, v, found, job.start + (n + 1) * job.step):
+            return
+        if reached is not None and abs(reached - found) > _TIME * job.step:
+            text = f"lastSuccessfulTime must be the time of `{v.name}` after a step, {found:.9g}, but is {reached:.9g}"
+            context.report("step.last-time", text, v.name)
             return
     if not found > job.start:
         context.report("steps.time", f"`{v.name}` must be later after {job.steps} steps, but is not", v.name)

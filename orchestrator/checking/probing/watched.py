@@ -24,12 +24,14 @@ class WatchedRun:
         variables: outputs, the time, values of narrow types, states with their derivatives; aliases once.
         initial: their values in initialisation mode; empty where they are not read there.
         rows: their values after each step, [step][value].
+        reached: lastSuccessfulTime of each step [s]; None: the interface has none.
         notes: how many messages there were that are neither warnings nor errors, and the first of them.
     """
 
     variables: tuple[ProbedVariable, ...]
     initial: list[Any]
     rows: list[list[Any]]
+    reached: list[float | None]
     notes: tuple[int, str]
 
     def values_of(self, v: ProbedVariable) -> list[Any]:
@@ -64,6 +66,7 @@ def _run(bench: Bench, variables: tuple[ProbedVariable, ...]) -> WatchedRun:
     job = bench.job
     initial: list[Any] = []
     rows: list[list[Any]] = []
+    reached: list[float | None] = []
     bench.library.notes()
     with bench.instance(initialised=False, logging=False) as driver:
         driver.driven = True
@@ -78,11 +81,12 @@ def _run(bench: Bench, variables: tuple[ProbedVariable, ...]) -> WatchedRun:
         try:
             for n in range(job.steps):
                 bench.run(driver, n, n + 1, read=False)
+                reached.append(driver.reached)
                 rows.append(driver.read(variables, f"at t = {job.start + (n + 1) * job.step:g}"))
             driver.terminate()
         except TerminatedError:
             pass  # what was seen before is what there is to see
-        return WatchedRun(variables, initial, rows, bench.library.notes())
+        return WatchedRun(variables, initial, rows, reached, bench.library.notes())
 
 
 def _discrete(job: ProbeJob) -> list[ProbedVariable]:
