@@ -240,7 +240,11 @@ class _Watcher:
         if problem:
             self.add("load.library", f"the library must load, but: {problem}")
             return
-        probes.load(library, self.add)
+        try:
+            probes.load(library, self.add)
+        except StatusError as error:  # a function that is not there
+            self.add(_rule_of(error), str(error))
+            return
         self.stages["load"] = ""
         single = "canBeInstantiatedOnlyOncePerProcess" in job.flags
         context = probes.Context(trajectory.Bench(job, library, self.add), self.add, single=single)

@@ -151,11 +151,10 @@ class Host:
             self._handle = ctypes.CDLL(path)
         except OSError as error:
             return str(error)
-        for name in texts:
-            getattr(self._handle, name).restype = c_char_p
-        for name in makers:
-            getattr(self._handle, name).restype = c_void_p
-        getattr(self._handle, freer).restype = None
+        kinds = {**dict.fromkeys(texts, c_char_p), **dict.fromkeys(makers, c_void_p), freer: None}
+        for name, kind in kinds.items():
+            if hasattr(self._handle, name):  # what is not there is told when it is called
+                getattr(self._handle, name).restype = kind
         self._around.look("loading the library")
         return ""
 

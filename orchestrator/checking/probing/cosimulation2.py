@@ -3,9 +3,7 @@
 import time
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import MOST_PARTS, Driver
-from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import DISCARD, OK, PENDING, WARNING, TerminatedError
 
 _DO_STEP_STATUS, _TERMINATED = 0, 3
@@ -14,20 +12,6 @@ NOT_DONE = "is discarded, and the end of the run asked for: a step that is done 
 
 class CoSimulation2(Driver):
     """Co-simulation of FMI 2.0."""
-
-    maker = "fmi2Instantiate"
-    kind = 1
-
-    @classmethod
-    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
-        return library.make(
-            cls.maker, "instantiate_2", name, cls.kind, token, job.resources, options.get("logging", True)
-        )
-
-    def enter_initialisation(self, start: float, stop: float | None) -> None:
-        tolerance = self.job.tolerance
-        self.call("SetupExperiment", tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0)
-        self.call("EnterInitializationMode")
 
     def advance(self, t: float, size: float, when: str = "") -> None:
         parts, done = 1, 0

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import MOST_PARTS
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
@@ -33,40 +32,23 @@ class CoSimulation3(EventDriver):
         events: whether event mode is used.
     """
 
-    maker = "fmi3InstantiateCoSimulation"
     early = True
-    events = True
 
     def options(self, **options: bool) -> None:
         self.early = options.get("early", True)
         self.events = options.get("events", "hasEventMode" in self.job.flags)
 
     @classmethod
-    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
+    def flags(cls, job: ProbeJob, **options: bool) -> tuple[list[bool], list[int]]:
         events = options.get("events", "hasEventMode" in job.flags)
         flags = [events, options.get("early", True), options.get("intermediate", False)]
-        required = [v.reference for v in job.variables if v.intermediate] if flags[2] else []
-        return library.make(
-            cls.maker,
-            "instantiate_3",
-            cls.maker,
-            name,
-            token,
-            job.resources,
-            flags,
-            required,
-            options.get("logging", True),
-        )
-
-    def enter_initialisation(self, start: float, stop: float | None) -> None:
-        enter_initialisation_3(self, start, stop)
-        self.start_clocks()
+        return flags, [v.reference for v in job.variables if v.intermediate] if flags[2] else []
 
     def exit_initialisation(self) -> None:
         self.call("ExitInitializationMode")
         if self.events:
             self.settle(self.job.start, "after initialisation")
-            self.call("EnterStepMode")
+            self.call(self.leave)
 
     def advance(self, t: float, size: float, when: str = "") -> None:
         end, h = t + size, size
@@ -116,18 +98,13 @@ class CoSimulation3(EventDriver):
         if not self.events:
             super().set_discrete(values, t)
             return
-        when = f"at t = {t:g}"
-        self.call("EnterEventMode", when=when)
-        super().set_discrete(values, t)
-        self.settle(t, when)
-        self.call("EnterStepMode", when=when)
+        with self.event_mode(t, f"at t = {t:g}"):
+            super().set_discrete(values, t)
 
     def pause(self, t: float) -> None:
         if self.habits.idle and self.events and self.next_instant(math.inf) > t + _SMALL * max(abs(t), self.job.step):
-            when = f"in event mode without a cause at t = {t:g}"
-            self.call("EnterEventMode", when=when)
-            self.settle(t, when)
-            self.call("EnterStepMode", when=when)
+            with self.event_mode(t, f"in event mode without a cause at t = {t:g}"):
+                pass
 
     def _may_return_early(self) -> bool:
         flags = {"mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate"}
@@ -154,12 +131,4 @@ class CoSimulation3(EventDriver):
                 self.report("event.without-cause", text, when=f"at t = {t:g}")
         elif wanted:
             self.memory["visible"] = t
-        self.call("EnterStepMode", when=when)
-
-
-def enter_initialisation_3(driver: Any, start: float, stop: float | None) -> None:
-    """Into initialisation mode of FMI 3.0, for an experiment from ``start`` to ``stop`` [s]."""
-    tolerance = driver.job.tolerance
-    driver.call(
-        "EnterInitializationMode", tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0
-    )
+        self.call(self.leave, when=when)

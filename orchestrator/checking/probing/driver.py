@@ -61,7 +61,6 @@ class Driver(FmuInstance):
 
     driven = False
     habits = Habits()
-    maker = ""
     reached: float | None = None
 
     def __init__(self, library: Library, number: int, job: ProbeJob, report: Report) -> None:
@@ -72,7 +71,18 @@ class Driver(FmuInstance):
     @classmethod
     def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
         """Ask the FMU for an instance. Return its number, or None when the FMU returns null."""
-        raise NotImplementedError
+        logging = options.get("logging", True)
+        if job.version == "2.0":
+            kind = int(job.interface == "CoSimulation")
+            return library.make("fmi2Instantiate", "instantiate_2", name, kind, token, job.resources, logging)
+        function = f"fmi3Instantiate{job.interface}"
+        flags, required = cls.flags(job, **options)
+        return library.make(function, "instantiate_3", function, name, token, job.resources, flags, required, logging)
+
+    @classmethod
+    def flags(cls, job: ProbeJob, **options: bool) -> tuple[list[bool], list[int]]:
+        """What FMI 3.0 asks for at instantiation besides: flags, and variables of intermediate updates."""
+        return [], []
 
     def options(self, **options: bool) -> None:
         """Take note of the options of the instantiation."""
@@ -137,7 +147,13 @@ class Driver(FmuInstance):
 
     def enter_initialisation(self, start: float, stop: float | None) -> None:
         """From a new or reset instance into initialisation, for an experiment from ``start`` to ``stop`` [s]."""
-        raise NotImplementedError
+        tolerance = self.job.tolerance
+        experiment = (tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0)
+        if self.job.version == "2.0":
+            self.call("SetupExperiment", *experiment)
+            self.call("EnterInitializationMode")
+        else:
+            self.call("EnterInitializationMode", *experiment)
 
     def exit_initialisation(self) -> None:
         """From initialisation to the first communication point."""

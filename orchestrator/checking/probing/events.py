@@ -4,7 +4,8 @@ In all functions: ``t``: time [s].
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,8 +47,25 @@ class EventDriver(Driver):
     "given" (values that clocked inputs get at ticks, by reference; else their start values).
     """
 
+    leave = "EnterStepMode"
+    """The function that leaves event mode."""
+    events = True
+    """Whether event mode is used."""
     reads_back = False
     """Whether clocked inputs are read after they were set."""
+
+    def enter_initialisation(self, start: float, stop: float | None) -> None:
+        super().enter_initialisation(start, stop)
+        if self.job.version == "3.0":
+            self.start_clocks()
+
+    @contextmanager
+    def event_mode(self, t: float, when: str, triggered: Sequence[ProbedClock] = ()) -> Iterator[None]:
+        """Enter event mode, do there what is to be done, settle, and leave it."""
+        self.call("EnterEventMode", when=when)
+        yield
+        self.settle(t, when, triggered)
+        self.call(self.leave, when=when)
 
     def start_clocks(self) -> None:
         """Ask for what the description does not say of the clocks; in initialisation mode."""

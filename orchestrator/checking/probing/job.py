@@ -97,6 +97,11 @@ class ProbeJob:
     careful: bool = False
 
     @property
+    def has_events(self) -> bool:
+        """Whether an importer takes part in events."""
+        return self.interface == "ModelExchange" or (self.interface == "CoSimulation" and "hasEventMode" in self.flags)
+
+    @property
     def varies(self) -> bool:
         """Whether communication steps may be of any size."""
         return "canHandleVariableCommunicationStepSize" in self.flags

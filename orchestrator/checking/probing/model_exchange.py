@@ -8,11 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library
-from orchestrator.checking.probing.cosimulation2 import CoSimulation2
-from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
 from orchestrator.checking.probing.events import EventDriver
-from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import DISCARD, StatusError, TerminatedError
 from orchestrator.checking.probing.variables import ProbedVariable, finite, shown
 from orchestrator.checking.rules import declare
@@ -43,29 +39,12 @@ class ModelExchange(EventDriver):
     """
 
     watched: Sequence[ProbedVariable] | None = None
-
-    @classmethod
-    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
-        if job.version == "2.0":
-            return library.make(
-                "fmi2Instantiate", "instantiate_2", name, 0, token, job.resources, options.get("logging", True)
-            )
-        function = "fmi3InstantiateModelExchange"
-        return library.make(
-            function, "instantiate_3", function, name, token, job.resources, [], [], options.get("logging", True)
-        )
-
-    def enter_initialisation(self, start: float, stop: float | None) -> None:
-        if self.job.version == "2.0":
-            CoSimulation2.enter_initialisation(self, start, stop)  # type: ignore[arg-type]
-        else:
-            enter_initialisation_3(self, start, stop)
-            self.start_clocks()
+    leave = "EnterContinuousTimeMode"
 
     def exit_initialisation(self) -> None:
         self.call("ExitInitializationMode")
         self.settle(self.job.start, "after initialisation")
-        self.call("EnterContinuousTimeMode")
+        self.call(self.leave)
         self.memory["states"] = self._count("ContinuousStates", self.job.states, "states.count")
         self.memory["indicators"] = self._count("EventIndicators", self.job.indicators, "indicators.count")
         nominals = self._values("GetNominalsOfContinuousStates", "states", "after initialisation")
@@ -248,7 +227,7 @@ class ModelExchange(EventDriver):
         """Update the discrete states and go back to continuous time; the states after it."""
         before = self._values("GetContinuousStates", "states", when)
         outcomes = self.settle(t, when)
-        self.call("EnterContinuousTimeMode", when=when)
+        self.call(self.leave, when=when)
         self.memory["signs"] = self.signs(when)
         after = self._values("GetContinuousStates", "states", when)
         self._judge_event(before, after, any(o.states_changed for o in outcomes), when)

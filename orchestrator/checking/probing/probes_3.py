@@ -34,7 +34,6 @@ _FEW_TICKS = 4
 _STEPS_RESIZED = 3
 _MOST_NAMED = 5
 _LARGEST = 8
-_LEAVING = {"CoSimulation": "EnterStepMode", "ModelExchange": "EnterContinuousTimeMode"}
 
 
 def early_return(context: Context) -> None:
@@ -143,9 +142,8 @@ def _probe_triggered_clocks(context: Context) -> None:
         with bench.instance() as driver:
             assert isinstance(driver, EventDriver)
             bench.run(driver, 0, 1)
-            driver.call("EnterEventMode")
-            driver.settle(job.start + job.step, f"while the clock `{clock.name}` ticks", [clock])
-            driver.call(_LEAVING[job.interface])
+            with driver.event_mode(job.start + job.step, f"while the clock `{clock.name}` ticks", [clock]):
+                pass
             bench.run(driver, 1, min(2, job.steps))
 
 

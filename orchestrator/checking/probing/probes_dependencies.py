@@ -1,12 +1,13 @@
 """The probe of dependencies: what reacts at once to what, held against ModelStructure."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbedUnknown
 from orchestrator.checking.probing.measured import Measured
-from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.movement import Values, moved
 from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context
@@ -96,29 +97,14 @@ def _switch(
     if not inputs:
         return
     driver = point.driver
-    leave = _enter_event_mode(driver)
     variables = [u.variable for u in unknowns]
-    for v in inputs:
-        base = driver.get([v])
-        other = moved(v, base, 0)
-        if other is None:
-            continue
-        if (rows := _rows_beside(driver, v, base, other, variables)) is not None:
-            measured.look(unknowns, v, rows, None, f"at t = {point.time:g}")
-    if leave:
-        driver.settle(point.time, "at a point of a run")  # type: ignore[attr-defined]
-        driver.call(leave)
-
-
-def _enter_event_mode(driver: Driver) -> str:
-    """The function that leaves it; empty where there is none."""
-    if isinstance(driver, ModelExchange):
-        driver.call("EnterEventMode")
-        return "EnterContinuousTimeMode"
-    if driver.job.version == "3.0" and getattr(driver, "events", False):
-        driver.call("EnterEventMode")
-        return "EnterStepMode"
-    return ""
+    eventful = isinstance(driver, EventDriver) and driver.events
+    with driver.event_mode(point.time, "at a point of a run") if eventful else nullcontext():  # type: ignore[attr-defined]
+        for v in inputs:
+            base = driver.get([v])
+            other = moved(v, base, 0)
+            if other is not None and (rows := _rows_beside(driver, v, base, other, variables)) is not None:
+                measured.look(unknowns, v, rows, None, f"at t = {point.time:g}")
 
 
 def _in_initialisation(context: Context, measured: Measured, budget: Stopwatch) -> None:

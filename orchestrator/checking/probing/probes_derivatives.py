@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from typing import Any
 
-from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.job import references
 from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context
@@ -89,9 +88,9 @@ def _partial(
                 return
             matrices = {}
             if directional:
-                matrices["directional"] = _columns(context, point, unknowns, knowns)
+                matrices["directional"] = _matrix(context, point, "Directional", unknowns, knowns)
             if adjoint:
-                matrices["adjoint"] = _rows(context, point, unknowns, knowns)
+                matrices["adjoint"] = _matrix(context, point, "Adjoint", unknowns, knowns)
             if _judge(context, point, matrices, (unknowns, knowns)):
                 return
 
@@ -136,44 +135,29 @@ def _mask(matrix: Matrix, counts: list[list[bool]]) -> Matrix:
     return [[x if c else 0.0 for x, c in zip(r, s, strict=True)] for r, s in zip(matrix, counts, strict=True)]
 
 
-def _columns(
-    context: Context, point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]
+def _matrix(
+    context: Context, point: RestPoint, kind: str, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]
 ) -> Matrix:
-    """The matrix by directional derivatives."""
-    units = _unit_seeds(len(_labels(knowns)))
-    columns = [_sensitivities(point.driver, "Directional", unknowns, knowns, seed) for seed in units]
-    matrix = [list(row) for row in zip(*columns, strict=True)]
-    seed = _mix_seed(len(units))
-    found = _sensitivities(point.driver, "Directional", unknowns, knowns, seed)
-    wanted = [sum(a * b for a, b in zip(row, seed, strict=True)) for row in matrix]
-    _judge_mixed(context, "directional", found, wanted, unknowns)
-    for order in (unknowns[::-1], unknowns[-1:]):
-        again = _sensitivities(point.driver, "Directional", order, knowns, seed)
-        _judge_order(context, "directional", by_variable(order, again), by_variable(unknowns, found))
-    return matrix
+    """The matrix by derivatives of a ``kind``: "Directional" (a seed of the knowns) or "Adjoint" (of the unknowns)."""
+    columns = kind == "Directional"
+    seeded, asked = (knowns, unknowns) if columns else (unknowns, knowns)
 
+    def ask(variables: list[ProbedVariable], seed: list[float]) -> list[float]:
+        pair = (variables, seeded) if columns else (seeded, variables)
+        size = sum(v.size for v in variables)
+        return list(point.driver.call(f"Get{kind}Derivative", *map(references, pair), seed, size)[0])
 
-def _rows(context: Context, point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable]) -> Matrix:
-    """The matrix by adjoint derivatives."""
-    units = _unit_seeds(len(_labels(unknowns)))
-    matrix = [_sensitivities(point.driver, "Adjoint", unknowns, knowns, seed) for seed in units]
-    seed = _mix_seed(len(units))
-    found = _sensitivities(point.driver, "Adjoint", unknowns, knowns, seed)
-    wanted = [sum(a * b for a, b in zip(column, seed, strict=True)) for column in zip(*matrix, strict=True)]
-    _judge_mixed(context, "adjoint", found, wanted, knowns)
-    for order in (knowns[::-1], knowns[-1:]):
-        again = _sensitivities(point.driver, "Adjoint", unknowns, order, seed)
-        _judge_order(context, "adjoint", by_variable(order, again), by_variable(knowns, found))
-    return matrix
-
-
-def _unit_seeds(count: int) -> list[list[float]]:
-    return [[float(k == at) for k in range(count)] for at in range(count)]
-
-
-def _mix_seed(count: int) -> list[float]:
-    """A seed of several directions at once, each of another size."""
-    return [(-1.0) ** k * (1.7 + 0.3 * k) for k in range(count)]
+    count = len(_labels(seeded))
+    parts = [ask(asked, [float(k == at) for k in range(count)]) for at in range(count)]
+    # Several directions at once, each of another size.
+    seed = [(-1.0) ** k * (1.7 + 0.3 * k) for k in range(count)]
+    found = ask(asked, seed)
+    across = [list(row) for row in zip(*parts, strict=True)]
+    wanted = [sum(a * b for a, b in zip(row, seed, strict=True)) for row in across]
+    _judge_mixed(context, kind.lower(), found, wanted, asked)
+    for order in (asked[::-1], asked[-1:]):
+        _judge_order(context, kind.lower(), by_variable(order, ask(order, seed)), by_variable(asked, found))
+    return across if columns else parts
 
 
 def _judge_mixed(
@@ -203,15 +187,6 @@ def _judge_order(
                 when = f"is {a:.6g} instead of {b:.6g} when variables are left out or stand in another order"
                 context.report("derivative.value", text, v.name, when)
                 return
-
-
-def _sensitivities(
-    driver: Driver, kind: str, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], seed: list[float]
-) -> list[float]:
-    """The product of the matrix with a seed of the knowns (directional), or of a seed of the unknowns with it."""
-    asked = sum(v.size for v in (unknowns if kind == "Directional" else knowns))
-    (values,) = driver.call(f"Get{kind}Derivative", references(unknowns), references(knowns), seed, asked)
-    return list(values)
 
 
 def _by_changes(point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], width: float) -> Matrix:

@@ -1,6 +1,10 @@
 """Calls that an FMU must refuse. They come last, for an FMU may break on them."""
 
+from collections.abc import Iterator
+from typing import Any
+
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.movement import moved
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import OK, WARNING, StatusError
@@ -37,14 +41,34 @@ def misuse(context: Context) -> None:
     _set_fixed(context)
     if job.interface == "CoSimulation":
         _steps(context)
-    with bench.instance() as driver:
-        real = next((v.base for v in job.variables if v.real), "Real" if job.version == "2.0" else "Float64")
-        unknown = max((v.reference for v in job.variables), default=0) + 12345
-        if _get(driver, real, [unknown], 1) in _NOT_REFUSED:
-            message = f"{prefix}Get{real} must refuse the unknown value reference {unknown}, but does not"
-            context.report("misuse.value-reference", message)
-    if job.version == "3.0":
-        _of_version_3(context)
+    for rule, function, arguments, wanted, options in _wrong_calls(job):
+        with bench.instance(**options) as driver:
+            if driver.raw(function, *arguments)[0] in _NOT_REFUSED:
+                context.report(rule, f"{prefix}{function} must {wanted}")
+
+
+WrongCall = tuple[str, str, tuple[Any, ...], str, dict[str, bool]]
+"""Rule, function with its arguments, what must be done with the call, and options of the instance."""
+
+
+def _wrong_calls(job: ProbeJob) -> Iterator[WrongCall]:
+    """Calls at the first communication point that must be refused."""
+    real = next((v.base for v in job.variables if v.real), "Real" if job.version == "2.0" else "Float64")
+    unknown = max((v.reference for v in job.variables), default=0) + 12345
+    text = f"refuse the unknown value reference {unknown}, but does not"
+    yield "misuse.value-reference", f"Get{real}", ([unknown], 1), text, {}
+    if job.version == "2.0":
+        return
+    numbers = [v for v in job.variables if v.real and not v.clocks]
+    for v in [v for v in numbers if v.size == 1][:1]:
+        text = f"refuse two values for the scalar `{v.name}`, but does not"
+        yield "misuse.value-count", f"Get{v.base}", ([v.reference], 2), text, {}
+    for v in [v for v in numbers if v.causality == "output"][:1]:
+        text = f"refuse to set the output `{v.name}`, but does not"
+        yield "misuse.set-output", f"Set{v.base}", ([v.reference], [1.0] * v.size), text, {}
+    if job.interface == "CoSimulation" and not job.clocks:  # with clocks event mode must be used
+        text = "be refused where event mode is not used, but is not"
+        yield "misuse.event-mode", "EnterEventMode", (), text, {"events": False}
 
 
 def _wrong_tokens(token: str) -> list[tuple[str, str]]:
@@ -86,10 +110,6 @@ def _set_fixed(context: Context) -> None:
             return
 
 
-def _get(driver: Driver, base: str, references: list[int], size: int) -> int:
-    return driver.raw(f"Get{base}", references, max(size, len(references)))[0]
-
-
 def _steps(context: Context) -> None:
     bench, job = context.bench, context.bench.job
     prefix = bench.library.names.prefix
@@ -115,25 +135,3 @@ def _try_step(driver: Driver, size: float, t: float | None = None) -> int:
     more = (0,) if driver.job.version == "2.0" else (True, 0.0)
     with driver.library.limit_calls(_SOON):
         return driver.raw("DoStep", driver.job.start if t is None else t, size, *more)[0]
-
-
-def _of_version_3(context: Context) -> None:
-    bench, job = context.bench, context.bench.job
-    scalar = next((v for v in job.variables if v.real and v.size == 1 and not v.clocks), None)
-    if scalar is not None:
-        with bench.instance() as driver:
-            if _get(driver, scalar.base, [scalar.reference], 2) in _NOT_REFUSED:
-                message = f"fmi3Get{scalar.base} must refuse two values for the scalar `{scalar.name}`, but does not"
-                context.report("misuse.value-count", message)
-    output = next((v for v in job.variables if v.real and v.causality == "output" and not v.clocks), None)
-    if output is not None:
-        with bench.instance() as driver:
-            status, _ = driver.raw(f"Set{output.base}", [output.reference], [1.0] * output.size)
-            if status in _NOT_REFUSED:
-                message = f"fmi3Set{output.base} must refuse to set the output `{output.name}`, but does not"
-                context.report("misuse.set-output", message)
-    if job.interface == "CoSimulation" and not job.clocks:  # with clocks event mode must be used
-        with bench.instance(events=False) as driver:
-            if driver.raw("EnterEventMode")[0] in _NOT_REFUSED:
-                message = "fmi3EnterEventMode must be refused where event mode is not used, but is not"
-                context.report("misuse.event-mode", message)

@@ -11,7 +11,6 @@ from typing import Any
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbedUnknown, ProbeJob, references
-from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.variables import ProbedVariable
@@ -95,7 +94,7 @@ def promises(context: Context) -> None:
     refused: set[str] = set()
     for promise in PROMISES:
         calls = promise.calls(job)
-        if not calls or (promise.moment == "event" and not _has_events(job)):
+        if not calls or (promise.moment == "event" and not job.has_events):
             continue
         with bench.instance(initialised=False) as driver:
             leave = _go(context, driver, promise.moment)
@@ -118,10 +117,6 @@ def promises(context: Context) -> None:
         _elements(context)
 
 
-def _has_events(job: ProbeJob) -> bool:
-    return job.interface == "ModelExchange" or (job.interface == "CoSimulation" and "hasEventMode" in job.flags)
-
-
 def _go(context: Context, driver: Driver, moment: str) -> str:
     """Bring a new instance to a moment. Return the function that leaves event mode, or nothing."""
     job = context.bench.job
@@ -136,7 +131,7 @@ def _go(context: Context, driver: Driver, moment: str) -> str:
         driver.call("EnterEventMode")
         assert isinstance(driver, EventDriver)
         driver.settle(job.start + job.step, "in event mode")
-        return "EnterContinuousTimeMode" if isinstance(driver, ModelExchange) else "EnterStepMode"
+        return driver.leave
     return ""
 
 

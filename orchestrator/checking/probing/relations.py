@@ -57,10 +57,6 @@ class Variation:
     applies: Callable[[ProbeJob], bool]
 
 
-def _has_events(job: ProbeJob) -> bool:
-    return job.interface == "ModelExchange" or (job.interface == "CoSimulation" and "hasEventMode" in job.flags)
-
-
 def _exchanges(job: ProbeJob) -> bool:
     return job.interface == "ModelExchange"
 
@@ -71,10 +67,13 @@ VARIATIONS = (
         Habits(alone=True), "value.order", "a run must be the same when values are set and read one by one",
         lambda job: job.interface != "ScheduledExecution",
     ),
-    Variation(Habits(idle=True), "event.idle", "a run must be the same with event mode without a cause", _has_events),
+    Variation(
+        Habits(idle=True), "event.idle", "a run must be the same with event mode without a cause",
+        lambda job: job.has_events,
+    ),
     Variation(
         Habits(again=True), "event.again", "a run must be the same with one more update of the discrete states",
-        _has_events,
+        lambda job: job.has_events,
     ),
     Variation(
         Habits(completes=False), "promise.completed-step", "a run must be the same without completed steps being told",

@@ -1,9 +1,6 @@
 """The driver of scheduled execution: model partitions are activated when their clocks tick."""
 
-from orchestrator.checking.probing.binding import Library
-from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
 from orchestrator.checking.probing.events import EventDriver
-from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.rules import declare
 
 declare("""
@@ -14,18 +11,6 @@ partition.preemption | E | - | 5.2.1 | preemption is unlocked as often as it is 
 
 class ScheduledExecution(EventDriver):
     """Scheduled execution of FMI 3.0."""
-
-    maker = "fmi3InstantiateScheduledExecution"
-
-    @classmethod
-    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
-        return library.make(
-            cls.maker, "instantiate_3", cls.maker, name, token, job.resources, [], [], options.get("logging", True)
-        )
-
-    def enter_initialisation(self, start: float, stop: float | None) -> None:
-        enter_initialisation_3(self, start, stop)
-        self.start_clocks()
 
     def advance(self, t: float, size: float, when: str = "") -> None:
         end = t + size
