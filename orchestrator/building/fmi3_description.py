@@ -7,10 +7,11 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.building.arrays import Array, arrays
+from orchestrator.building.native_description import unknowns
 from orchestrator.building.translation.slave import has_states
 from orchestrator.fmi.clocks import SELF_SAMPLING
 from pyfmu_sources.adapters.fmu_variables import FmuVariable, unit_exponents
-from pyfmu_sources.adapters.model_xml import AUTHOR, DATE, ENUMERATIONS, LICENSE, LOG_CATEGORIES
+from pyfmu_sources.adapters.model_xml import model_description
 
 TYPES = {"Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration"}
 INDICATOR, CLOCK = "indicator", "sample"
@@ -18,22 +19,10 @@ INDICATOR, CLOCK = "indicator", "sample"
 
 def fmi3_description(cls: Any, name: str) -> Element:
     """Return the root element without fingerprint and token."""
-    root = Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": "3.0",
-            "modelName": name,
-            "instantiationToken": "",
-            "description": cls.title,
-            "author": AUTHOR,
-            "version": "",
-            "copyright": f"{AUTHOR}, {LICENSE} license",
-            "license": LICENSE,
-            "generationTool": "backlash-cosim",
-            "generationDateAndTime": DATE,
-            "variableNamingConvention": "structured",
-        },
-    )
+    second = model_description(cls, name)
+    renamed = {"guid": "instantiationToken"}
+    attributes = {renamed.get(key, key): value for key, value in second.attrib.items()}
+    root = Element(second.tag, attributes | {"fmiVersion": "3.0", "generationTool": "backlash-cosim"})
     shared = {"modelIdentifier": name} | _flags(
         canGetAndSetFMUState=True,
         canSerializeFMUState=True,
@@ -51,12 +40,8 @@ def fmi3_description(cls: Any, name: str) -> Element:
     )
     SubElement(root, "CoSimulation", shared | step | {"maxOutputDerivativeOrder": str(int(plant))})
     _units(root, cls.table)
-    _types(root, cls.table)
-    categories = SubElement(root, "LogCategories")
-    for category, text in LOG_CATEGORIES:
-        SubElement(categories, "Category", {"name": category, "description": text})
-    experiment = {"startTime": 0.0, "stopTime": cls.stop_time, "stepSize": cls.step_size}
-    SubElement(root, "DefaultExperiment", {key: repr(value) for key, value in experiment.items()})
+    _types(root, second)
+    root.extend(second.findall("LogCategories") + second.findall("DefaultExperiment"))
     _variables(root, cls)
     _structure(root, cls)
     return root
@@ -85,15 +70,11 @@ def _unit(array: Array) -> str:
     return units.pop() if len(units) == 1 else ""
 
 
-def _types(root: Element, table: tuple[FmuVariable, ...]) -> None:
-    names = sorted({variable.declared_type for variable in table if variable.declared_type})
-    if not names:
-        return
-    types = SubElement(root, "TypeDefinitions")
-    for name in names:
-        enumeration = SubElement(types, "EnumerationType", {"name": name})
-        for value, (item, text) in enumerate(ENUMERATIONS[name], start=1):
-            SubElement(enumeration, "Item", {"name": item, "value": str(value), "description": text})
+def _types(root: Element, second: Element) -> None:
+    if (known := second.find("TypeDefinitions")) is not None:
+        types = SubElement(root, "TypeDefinitions")
+        for simple in known:
+            SubElement(types, "EnumerationType", simple.attrib).extend(simple[0])
 
 
 def _variables(root: Element, cls: Any) -> None:
@@ -170,34 +151,25 @@ def _number(variable: FmuVariable, value: float | int | None) -> str:
     return repr(float(value)) if variable.type == "Real" else str(int(value))
 
 
+_SECTIONS = {"Outputs": "Output", "Derivatives": "ContinuousStateDerivative", "InitialUnknowns": "InitialUnknown"}
+
+
 def _structure(root: Element, cls: Any) -> None:
     """Name outputs, derivatives, initial unknowns and event indicators, and what they depend on."""
-    table: tuple[FmuVariable, ...] = cls.table
-    place = {variable.name: array.first for array in arrays(table) for variable in array.variables}
-    states = [variable.derivative_of for variable in table if variable.derivative_of]
-    rates = [variable.name for variable in table if variable.derivative_of]
-    inputs = [variable.name for variable in table if variable.causality == "input"]
-    parameters = [variable.name for variable in table if variable.causality == "parameter"]
-    at_once = getattr(cls, "exchange_depends_on", {})
+    place = {variable.name: array.first for array in arrays(cls.table) for variable in array.variables}
+    place |= {CLOCK: int(_clock_reference(cls))}
     structure = SubElement(root, "ModelStructure")
-
-    if is_sampled(cls):
-        place[CLOCK] = int(_clock_reference(cls))
-    clock = [CLOCK] if is_sampled(cls) else []
 
     def add(tag: str, name: str, depends_on: Iterable[str]) -> None:
         words = " ".join(map(str, sorted({place[other] for other in depends_on})))
         SubElement(structure, tag, {"valueReference": str(place[name]), "dependencies": words})
 
-    outputs = [variable for variable in table if variable.causality == "output"]
-    for variable in outputs:
-        add("Output", variable.name, (*variable.depends_on, *at_once.get(variable.name, ()), *states, *clock))
-    for name in rates:
-        add("ContinuousStateDerivative", name, (*inputs, *states))
-    for variable in () if is_sampled(cls) else outputs:  # those of clocks need no place there
-        add("InitialUnknown", variable.name, variable.starts_from)
-    for name in (*states, *rates):
-        add("InitialUnknown", name, (*inputs, *parameters))
+    for section, name, names in unknowns(cls):
+        if not is_sampled(cls):
+            add(_SECTIONS[section], name, names)
+        elif section == "Outputs":  # those of clocks need no place among the initial unknowns
+            add("Output", name, (*names, CLOCK))
     indicators = f"{INDICATOR}[1]"
     if indicators in place:
-        add("EventIndicator", indicators, (*inputs, *states))
+        inputs = [variable.name for variable in cls.table if variable.causality == "input"]
+        add("EventIndicator", indicators, (*inputs, *(v.derivative_of for v in cls.table if v.derivative_of)))

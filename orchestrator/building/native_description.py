@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Iterator, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -38,34 +39,33 @@ def native_description(recipe: Recipe, cls: Any, indicators: int) -> Element:
 def _states(root: Element, cls: Any) -> None:
     """Name states and derivatives, and what depends on them."""
     index = {variable.name: position for position, variable in enumerate(cls.table, start=1)}
-    rates = {variable.name: variable.derivative_of for variable in cls.table if variable.derivative_of}
-    jumping = {variable.name for variable in cls.table if variable.reinit}
-    for variable in root.iter("ScalarVariable"):
-        if variable.attrib["name"] in jumping:
-            variable[0].set("reinit", "true")
-        if variable.attrib["name"] in rates:
-            variable[0].set("derivative", str(index[rates[variable.attrib["name"]]]))
-    states = sorted(index[name] for name in rates.values())
-    inputs = sorted(index[variable.name] for variable in cls.table if variable.causality == "input")
+    variables = {variable.attrib["name"]: variable[0] for variable in root.iter("ScalarVariable")}
+    for variable in cls.table:
+        if variable.reinit:
+            variables[variable.name].set("reinit", "true")
+        if variable.derivative_of:
+            variables[variable.name].set("derivative", str(index[variable.derivative_of]))
     structure = root.find("ModelStructure")
     assert structure is not None
-    outputs, initial = structure.find("Outputs"), structure.find("InitialUnknowns")
-    assert outputs is not None
-    assert initial is not None
-    names = [variable.name for variable in cls.table]
+    structure.clear()
+    sections = {section: SubElement(structure, section) for section in ("Outputs", "Derivatives", "InitialUnknowns")}
+    for section, name, names in unknowns(cls):
+        words = " ".join(map(str, sorted({index[other] for other in names})))
+        SubElement(sections[section], "Unknown", {"index": str(index[name]), "dependencies": words})
+
+
+def unknowns(cls: Any) -> Iterator[tuple[str, str, Sequence[str]]]:
+    """Yield the entries of ModelStructure: section of FMI 2.0, name, and names of what each depends on."""
+    names = {c: [v.name for v in cls.table if v.causality == c] for c in ("input", "parameter")}
+    outputs = [variable for variable in cls.table if variable.causality == "output"]
+    states = [variable.derivative_of for variable in cls.table if variable.derivative_of]
+    rates = [variable.name for variable in cls.table if variable.derivative_of]
     at_once = getattr(cls, "exchange_depends_on", {})
-    for unknown in outputs:
-        given = {int(word) for word in unknown.attrib["dependencies"].split()}
-        given |= {index[name] for name in at_once.get(names[int(unknown.attrib["index"]) - 1], ())}
-        unknown.set("dependencies", _words([*given, *states]))
-    derivatives = Element("Derivatives")
-    structure.insert(1, derivatives)
-    parameters = sorted(index[variable.name] for variable in cls.table if variable.causality == "parameter")
+    for variable in outputs:
+        yield "Outputs", variable.name, (*variable.depends_on, *at_once.get(variable.name, ()), *states)
     for name in rates:
-        SubElement(derivatives, "Unknown", {"index": str(index[name]), "dependencies": _words(inputs + states)})
-    for position in [*states, *(index[name] for name in rates)]:
-        SubElement(initial, "Unknown", {"index": str(position), "dependencies": _words(inputs + parameters)})
-
-
-def _words(numbers: list[int]) -> str:
-    return " ".join(str(number) for number in sorted(numbers))
+        yield "Derivatives", name, (*names["input"], *states)
+    for variable in outputs:
+        yield "InitialUnknowns", variable.name, variable.starts_from
+    for name in (*states, *rates):
+        yield "InitialUnknowns", name, (*names["input"], *names["parameter"])

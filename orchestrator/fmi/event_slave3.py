@@ -22,7 +22,6 @@ class _State(NamedTuple):
 
     handle: Any
     next_event: float
-    ticks: dict[int, object]
     reached: float | None
 
 
@@ -138,12 +137,11 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
     # Saved states --------------------------------------------------------------------------------------------------
 
     def get_state(self) -> Any:
-        return _State(super().get_state(), self._next_event, self._clocks.state(), self._reached)
+        return _State(super().get_state(), self._next_event, self._reached)
 
     def set_state(self, state: Any) -> None:
         super().set_state(state.handle)
         self._next_event, self._reached = state.next_event, state.reached
-        self._clocks.restore(state.ticks)
 
     def free_state(self, state: Any) -> None:
         super().free_state(state.handle)

@@ -57,16 +57,6 @@ class Exchange3Slave(ClockedSlave, ExchangeSlave, Fmu3Instance):
         self._clocks.leave_event_mode()
         super().leave_event_mode()
 
-    def get_state(self) -> Any:
-        return super().get_state(), self._clocks.state()
-
-    def set_state(self, state: Any) -> None:
-        super().set_state(state[0])
-        self._clocks.restore(state[1])
-
-    def free_state(self, state: Any) -> None:
-        super().free_state(state[0])
-
     # Functions of the version ----------------------------------------------------------------------------------------
 
     def _instance(self, library: Any, first: tuple[Any, ...], last: tuple[Any, ...]) -> int | None:

@@ -4,6 +4,7 @@ import ctypes
 import math
 from collections.abc import Sequence
 from ctypes import c_bool, c_double, c_size_t
+from typing import Any
 
 from orchestrator.fmi.clocked import ClockedTransfers
 from orchestrator.fmi.model_description import FmuDescription
@@ -134,6 +135,16 @@ class ClockedSlave(Fmu3Instance):
     def reset(self) -> None:
         super().reset()
         self._clocks.reset()
+
+    def get_state(self) -> Any:
+        return super().get_state(), self._clocks.state()
+
+    def set_state(self, state: Any) -> None:
+        super().set_state(state[0])
+        self._clocks.restore(state[1])
+
+    def free_state(self, state: Any) -> None:
+        super().free_state(state[0])
 
     def tick(self, clocks: Sequence[str]) -> None:
         """Activate input clocks for this instant, in event mode."""

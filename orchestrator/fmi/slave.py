@@ -338,3 +338,9 @@ class FmuSlave(Slave):
         """
         self._reached, self._size = time, size
         self._check(status, function)
+
+
+def experiment(flag: Any, start: float, stop: float | None, tolerance: float | None) -> tuple[Any, ...]:
+    """Return an experiment as arguments in C; ``flag``: the type of a truth value."""
+    limits = flag(stop is not None), ctypes.c_double(stop or 0.0)
+    return flag(tolerance is not None), ctypes.c_double(tolerance or 0.0), ctypes.c_double(start), *limits

@@ -11,7 +11,7 @@ from orchestrator.fmi.extraction import extract_fmu, library_of
 from orchestrator.fmi.farewell import ends_cleanly
 from orchestrator.fmi.messages import ERROR, OK, make_callbacks
 from orchestrator.fmi.model_description import FmuDescription
-from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.slave import FmuSlave, experiment
 from orchestrator.master.protocol import Value
 
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # of fmi2StatusKind
@@ -68,14 +68,7 @@ class Fmu2Instance(FmuSlave):
         """Set the experiment up and enter initialisation mode."""
         self.messages.clear()
         self._tolerance = tolerance
-        self._call(
-            "SetupExperiment",
-            ctypes.c_int(tolerance is not None),
-            ctypes.c_double(tolerance or 0.0),
-            ctypes.c_double(start),
-            ctypes.c_int(stop is not None),
-            ctypes.c_double(stop or 0.0),
-        )
+        self._call("SetupExperiment", *experiment(ctypes.c_int, start, stop, tolerance))
         early, self._early = self._early or [], None
         for values in early:  # 20-sim's FMUs forget in fmi2SetupExperiment what was set before it
             self.set(values)

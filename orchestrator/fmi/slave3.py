@@ -13,7 +13,7 @@ from orchestrator.fmi.farewell import ends_cleanly
 from orchestrator.fmi.libraries import free_library, load_library
 from orchestrator.fmi.messages import ERROR, log_message_callback
 from orchestrator.fmi.model_description import FmuDescription
-from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.slave import FmuSlave, experiment
 from orchestrator.master.native_calls import ENDED
 from orchestrator.master.protocol import RunEndedError
 from orchestrator.master.result import RunRemark
@@ -110,14 +110,7 @@ class Fmu3Instance(FmuSlave):
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
         self.messages.clear()
         self._tolerance = tolerance
-        self._call(
-            "EnterInitializationMode",
-            c_bool(tolerance is not None),
-            c_double(tolerance or 0.0),
-            c_double(start),
-            c_bool(stop is not None),
-            c_double(stop or 0.0),
-        )
+        self._call("EnterInitializationMode", *experiment(c_bool, start, stop, tolerance))
         self._reached = start
 
 
