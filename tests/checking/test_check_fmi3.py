@@ -1,6 +1,7 @@
 """FMI 3.0: the good FMU has no finding, and every broken one is named by the rule that is meant."""
 
 import random
+import subprocess
 import sys
 from dataclasses import replace
 from importlib.resources import files
@@ -13,7 +14,7 @@ from lxml import etree
 from benchmarks.fuzz_check import one_case
 from orchestrator.checking.check import check_fmu
 from orchestrator.checking.grammar import check_grammar
-from tests.support.ball3 import INTERFACES, XML, ball_files, build_ball, model_description
+from tests.support.ball3 import INTERFACES, LIBRARY, XML, ball_files, build_ball, model_description
 from tests.support.broken_ball3 import (
     KICKED,
     PARTIAL,
@@ -206,3 +207,11 @@ def test_damage_gives_findings_and_nothing_else(tmp_path: Path) -> None:
     codes = [one_case(rng, tmp_path, run_share=0.05, version="3.0")[0] for _ in range(40)]
     assert set(codes) <= {0, 1}
     assert 1 in codes
+
+
+def test_a_library_without_functions_is_a_finding(tmp_path: Path) -> None:
+    subprocess.run(["cc", "-shared", "-xc", "-", "-o", str(tmp_path / "empty")], input=b"int empty;", check=True)
+    library = (tmp_path / "empty").read_bytes()
+    report = check_fmu(write_fmu(tmp_path / "Empty.fmu", ball_files() | {LIBRARY: library}))
+    told = {f.message for f in report.findings if f.rule == "binary.exports"}
+    assert "fmi3GetVersion must be exported, but is not" in told
