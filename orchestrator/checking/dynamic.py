@@ -35,7 +35,6 @@ from orchestrator.checking.probing.describing import make_job
 from orchestrator.checking.probing.interfaces import InterfaceRun, compare_interfaces
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.statuses import PENDING, DiscardedError, StatusError, TerminatedError
-from orchestrator.checking.process import Process
 from orchestrator.checking.rules import RULES, Version, declare
 from orchestrator.errors import ChildError, OutputError
 from orchestrator.plain_text import name_folder, plain_text
@@ -219,15 +218,14 @@ class _Watcher:
         """The findings of one child."""
         before = _snapshot(self.fmu)
         self.begun = time.monotonic()
-        with Process(self._start) as process:
-            library = Library(process, job.version, job.variables, self.add)
+        with Library(self._start, job.version, job.variables, self.add) as library:
             try:
                 self._probes(library, job, names)
             except ChildError as error:
                 self._report_end(error, library.current, names)
-            left = process.jail.finish() or process.left
+            left = library.jail.finish() or library.left
             self._report_skipped(names)
-            self._report_remains(before, process.jail, left)
+            self._report_remains(before, library.jail, left)
             self.stages |= dict.fromkeys(("run", "process", "afterwards"), "")
         return self.findings
 

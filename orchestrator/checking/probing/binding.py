@@ -13,11 +13,10 @@ from typing import Any
 from orchestrator.checking.host import Made, Returned, Update
 from orchestrator.checking.probing.statuses import ERROR, StatusError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
-from orchestrator.checking.process import Process
 from orchestrator.checking.rules import Version, declare
 from orchestrator.checking.tables.functions import FUNCTIONS
 from orchestrator.errors import ChildError, SimulationError
-from orchestrator.shared.isolation.jail import Answer
+from orchestrator.shared.isolation.jail import Answer, Jail
 
 declare("""
 [life cycle]
@@ -45,9 +44,11 @@ def _stamp(path: str) -> tuple[int, ...] | None:
 
 
 class Library:
-    """The shared library of an FMU.
+    """The shared library of an FMU, in a child process that does the calls; another one can take its place.
 
     Attributes:
+        jail: the present child.
+        left: whether a process outlived one of those before.
         current: the function under way; empty when none is.
         ended: whether the child process is gone.
         epoch: how often another process took its place; instances and states are of one epoch.
@@ -57,12 +58,14 @@ class Library:
 
     def __init__(
         self,
-        process: Process,
+        start: Callable[[], Jail],
         version: Version = "2.0",
         variables: Sequence[ProbedVariable] = (),
         report: Callable[[str, str], None] = lambda _rule, _message: None,
     ) -> None:
-        self.process, self._report = process, report
+        self._start, self._report = start, report
+        self.jail, self.left = start(), False
+        self._most: float | None = None  # seconds that a call may take; None: as the limits say
         self.names = FUNCTIONS[version]
         self.current = ""
         self.ended = False
@@ -78,6 +81,12 @@ class Library:
         self._loaded: tuple[int, ...] | None = None
         self._known = {(_LETTERS.get(v.base, ""), v.reference): v.name for v in reversed(variables)}
 
+    def __enter__(self) -> "Library":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.jail.close()
+
     def load(self, path: str) -> str:
         """Load the library at ``path``; return why that fails, or nothing."""
         self._path, self._loaded = path, _stamp(path)
@@ -91,7 +100,9 @@ class Library:
 
     def renew(self) -> None:
         """Load the library anew in another process; its instances and states are gone."""
-        self.process.renew()
+        self.left |= self.jail.finish()
+        self.jail.close()
+        self.jail = self._start()
         self.epoch += 1
         self.ended = False
         self.current = ""
@@ -101,7 +112,7 @@ class Library:
         """Let the child do something; where that ends the child, ``current`` keeps what it was."""
         self.current = doing
         try:
-            answer = self.process.call(request, kind)
+            answer = self.jail.call(request, kind, self._most)
         except ChildError:
             self.ended = True
             raise
@@ -117,11 +128,11 @@ class Library:
     @contextmanager
     def limit_calls(self, seconds: float) -> Iterator[None]:
         """Let calls take less time than the limits say."""
-        self.process.most = seconds
+        self._most = seconds
         try:
             yield
         finally:
-            self.process.most = None
+            self._most = None
 
     def text(self, function: str) -> str:
         """Call a function that returns a text. Return what it returned; "null" for a null pointer."""

@@ -298,8 +298,8 @@ def _is_text(value: bytes) -> bool:
 def memory(context: Context) -> None:
     """Resident memory over instances and over steps."""
     bench, job = context.bench, context.bench.job
-    process = bench.library.process  # whose jail may be another for every instance
-    if not process.jail.resident():
+    library = bench.library  # whose jail may be another for every instance
+    if not library.jail.resident():
         raise SkippedError("the system does not tell the memory of a process")
     budget = Stopwatch(4.0 * job.budget)
     cycles, before, things = 0, None, (0, 0)
@@ -307,11 +307,11 @@ def memory(context: Context) -> None:
         with bench.instance(moved=False):
             pass
         if n == _WARM:
-            before, things = process.jail.resident(), bench.library.surroundings()
+            before, things = library.jail.resident(), library.surroundings()
         cycles += before is not None
         if budget.over:
             break
-    growth = (process.jail.resident() - (before or 0)) / max(cycles - 1, 1)
+    growth = (library.jail.resident() - (before or 0)) / max(cycles - 1, 1)
     if before is not None and cycles > 5 and growth > _LEAK_PER_INSTANCE:
         context.report(
             "resources.instance-leak", f"an instance must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
@@ -322,9 +322,9 @@ def memory(context: Context) -> None:
     with bench.instance(moved=False) as driver:
         quarter = max(job.steps // 4, 1)
         bench.run(driver, 0, quarter, excited=False, read=False)
-        before, things = process.jail.resident(), bench.library.surroundings()
+        before, things = library.jail.resident(), library.surroundings()
         bench.run(driver, quarter, excited=False, read=False)
-        growth = process.jail.resident() - before
+        growth = library.jail.resident() - before
         _report_things(context, things, job.steps - quarter, "steps")
     if growth > _LEAK_AT_LEAST and growth / max(job.steps - quarter, 1) > _LEAK_PER_STEP:
         per_step = growth / max(job.steps - quarter, 1) / 1024
@@ -341,7 +341,7 @@ def _report_things(context: Context, before: tuple[int, int], times: int, of: st
 def _reset_memory(context: Context, budget: Stopwatch) -> None:
     """Resident memory over resets of one instance."""
     bench = context.bench
-    process = bench.library.process
+    library = bench.library
     if not context.resets or budget.over:
         return
     before = cycles = 0
@@ -353,11 +353,11 @@ def _reset_memory(context: Context, budget: Stopwatch) -> None:
             except StatusError:
                 return  # the probes of resets say so
             if n == _RESETS // 2:
-                before, cycles = process.jail.resident(), 0
+                before, cycles = library.jail.resident(), 0
             cycles += 1
             if budget.over:
                 return
-    growth = (process.jail.resident() - before) / cycles
+    growth = (library.jail.resident() - before) / cycles
     if growth > _LEAK_PER_INSTANCE:
         text = f"a reset must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
         context.report("resources.instance-leak", text)

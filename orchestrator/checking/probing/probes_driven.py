@@ -48,7 +48,7 @@ def inputs(context: Context) -> None:
     if refused is not None:
         context.report("run.input-refused", refused)
         bench.excited = False
-    began = bench.library.process.jail.processor_time()
+    began = bench.library.jail.processor_time()
     try:
         with bench.instance() as driver:
             context.plain = bench.run(driver)
@@ -59,7 +59,7 @@ def inputs(context: Context) -> None:
         bench.excited = False  # the life cycle was possible with the start values
         with bench.instance() as driver:
             context.plain = bench.run(driver)
-    seconds = bench.library.process.jail.processor_time() - began
+    seconds = bench.library.jail.processor_time() - began
     context.trace = context.plain
     search = _Search(context)
     search.find()
@@ -184,7 +184,7 @@ class _Search:
         switched = tuple(v for v in values if v.causality == "input" and not (v.real and v in bench.job.inputs()))
         values |= {v: v.start or () for v in values if numbers and not v.real}
         bench.movement = Movement(values, switched if bench.excited else (), _NEARER_SHARE if which else 1.0)
-        began = bench.library.process.jail.processor_time()
+        began = bench.library.jail.processor_time()
         try:
             with bench.instance() as driver:
                 trace = bench.run(driver, 0, steps)
@@ -199,7 +199,7 @@ class _Search:
             bench.library.renew()
             return False
         self.context.trace = trace
-        self.seconds = bench.library.process.jail.processor_time() - began
+        self.seconds = bench.library.jail.processor_time() - began
         return True
 
 
