@@ -41,14 +41,19 @@ def misuse(context: Context) -> None:
     _set_fixed(context)
     if job.interface == "CoSimulation":
         _steps(context)
-    for rule, function, arguments, wanted, options in _wrong_calls(job):
-        with bench.instance(**options) as driver:
+    for rule, function, arguments, wanted in _wrong_calls(job):
+        with bench.instance() as driver:
             if driver.raw(function, *arguments)[0] in _NOT_REFUSED:
                 context.report(rule, f"{prefix}{function} must {wanted}")
+    if job.version == "3.0" and job.interface == "CoSimulation" and not job.clocks:  # with clocks it must be used
+        with bench.instance(events=False) as driver:
+            if driver.raw("EnterEventMode")[0] in _NOT_REFUSED:
+                message = "fmi3EnterEventMode must be refused where event mode is not used, but is not"
+                context.report("misuse.event-mode", message)
 
 
-WrongCall = tuple[str, str, tuple[Any, ...], str, dict[str, bool]]
-"""Rule, function with its arguments, what must be done with the call, and options of the instance."""
+WrongCall = tuple[str, str, tuple[Any, ...], str]
+"""Rule, function with its arguments, and what must be done with the call."""
 
 
 def _wrong_calls(job: ProbeJob) -> Iterator[WrongCall]:
@@ -56,19 +61,16 @@ def _wrong_calls(job: ProbeJob) -> Iterator[WrongCall]:
     real = next((v.base for v in job.variables if v.real), "Real" if job.version == "2.0" else "Float64")
     unknown = max((v.reference for v in job.variables), default=0) + 12345
     text = f"refuse the unknown value reference {unknown}, but does not"
-    yield "misuse.value-reference", f"Get{real}", ([unknown], 1), text, {}
+    yield "misuse.value-reference", f"Get{real}", ([unknown], 1), text
     if job.version == "2.0":
         return
     numbers = [v for v in job.variables if v.real and not v.clocks]
     for v in [v for v in numbers if v.size == 1][:1]:
         text = f"refuse two values for the scalar `{v.name}`, but does not"
-        yield "misuse.value-count", f"Get{v.base}", ([v.reference], 2), text, {}
+        yield "misuse.value-count", f"Get{v.base}", ([v.reference], 2), text
     for v in [v for v in numbers if v.causality == "output"][:1]:
         text = f"refuse to set the output `{v.name}`, but does not"
-        yield "misuse.set-output", f"Set{v.base}", ([v.reference], [1.0] * v.size), text, {}
-    if job.interface == "CoSimulation" and not job.clocks:  # with clocks event mode must be used
-        text = "be refused where event mode is not used, but is not"
-        yield "misuse.event-mode", "EnterEventMode", (), text, {"events": False}
+        yield "misuse.set-output", f"Set{v.base}", ([v.reference], [1.0] * v.size), text
 
 
 def _wrong_tokens(token: str) -> list[tuple[str, str]]:
