@@ -23,10 +23,10 @@ archive.absolute | E | * | * | all paths are relative | do not unpack this archi
 archive.backslash | E | 2.3 | 2.5.1 | folders are separated by `/` | write the archive with forward slashes
 archive.odd-name | W | * | * | file names work on every platform | rename the file
 archive.long-name | E | * | * | names are short enough to be unpacked | shorten the names
-archive.symlink | E | * | * | there are only files and folders | store the file that the link means
-archive.duplicate | E | * | * | every path is that of one file or folder | write the archive anew; tools differ in which copy they take
+archive.symlink | E | * | * | there are only files and folders | store the file to which the link points
+archive.duplicate | E | * | * | every path occurs once | write the archive anew; tools differ in which copy they take
 archive.repeated | W | * | * | no file is stored twice | write the archive anew, each file once
-archive.case-clash | W | * | * | paths differ by more than upper and lower case | rename one; Windows and macOS keep only one of them
+archive.case-clash | W | * | * | paths differ not only in upper and lower case | rename one; Windows and macOS keep only one of them
 archive.encrypted | E | 2.3 | 2.5.1 | no entry is encrypted | store the entry without a password
 archive.compression | E | 2.3 | 2.5.1 | entries are stored or deflated | pack with deflate
 archive.bomb-ratio | E | * | * | no file unpacks to absurdly more than its packed size | if you trust the file, repack it without compression

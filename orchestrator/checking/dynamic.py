@@ -62,8 +62,8 @@ run.pending | E | 4.2.2 | - | fmi2Pending only with canRunAsynchronuously | retu
 [misuse]
 misuse.crash | W | * | * | misuse neither ends the process nor hangs it | check the arguments and the state of the instance
 [afterwards]
-files.written | W | * | * | the FMU writes no files of its own | write only where a parameter says so
-files.changed | W | * | * | the FMU leaves its own files alone | write to a temporary folder
+files.written | W | * | * | the FMU writes no files of its own | write only to a path that a parameter states
+files.changed | W | * | * | the FMU does not change its own files | write to a temporary folder
 process.left | W | * | * | no process outlives the FMU | end child processes when the instance is freed
 """)  # noqa: E501
 

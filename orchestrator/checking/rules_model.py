@@ -22,13 +22,13 @@ from orchestrator.shared.units import EXPONENTS
 
 declare("""
 [description]
-model.guid | E | 2.2.1 | 2.4.1 | the guid (FMI 3.0: instantiationToken) is not empty | write the same into the XML and the binary
+model.guid | E | 2.2.1 | 2.4.1 | the guid (FMI 3.0: instantiationToken) is not empty | write the same value to the XML and the binary
 model.date | W | 2.2.1 | 2.4.1 | generationDateAndTime is YYYY-MM-DDThh:mm:ssZ | write the time in UTC with a Z
 model.identifier | E | 4.3.1 | 2.4.2 | modelIdentifier is a C identifier | use letters, digits and underscores
 model.interface | E | 2.2.1 | 2.4.1 | there is at least one interface | add CoSimulation, ModelExchange or ScheduledExecution
-model.capability | E | 4.3.1 | 2.4.2 | capability flags fit one another | correct the flag
+model.capability | E | 4.3.1 | 2.4.2 | capability flags do not contradict each other | correct the flag
 model.unknown-flag | W | - | 2.4.2 | flags that the standard does not have are in a namespace | put the flag into a namespace of your own
-model.execution-tool | I | 4.3.1 | 2.5.3 | the FMU runs without its tool | nothing, if the tool is installed; else export a stand-alone FMU
+model.execution-tool | I | 4.3.1 | 2.5.3 | the FMU runs without its tool | if the tool is not installed, export a stand-alone FMU
 model.log-category | E | 2.2.4 | 2.4.5 | log categories are unique | remove the repeated one
 model.vendor-annotation | E | 2.2.6 | - | tool names of vendor annotations are unique | merge the annotations of one tool
 model.experiment | E | 2.2.5 | 2.4.6 | DefaultExperiment makes sense | correct the times

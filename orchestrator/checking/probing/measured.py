@@ -15,10 +15,10 @@ from orchestrator.errors import ChildError
 
 declare("""
 [dependencies]
-dependency.missing | E | 2.2.8 | 2.4.8 | what reacts to a known at once lists it among its dependencies | add it; hosts order their calls by that list
-dependency.initial | E | 2.2.8 | 2.4.8 | what reacts to a known in initialisation mode lists it in InitialUnknowns | add it; hosts initialise loops by that list
-dependency.kind | E | 2.2.8 | 2.4.8 | factors are as dependenciesKind says | write dependent, or leave dependenciesKind out
-dependency.superfluous | I | 2.2.8 | 2.4.8 | dependencies that are stated are seen | see whether the value is used; list dependencies without it where it is none of them
+dependency.missing | E | 2.2.8 | 2.4.8 | a variable that reacts to a known at once lists it among its dependencies | add it; hosts order their calls by that list
+dependency.initial | E | 2.2.8 | 2.4.8 | a variable that reacts to a known in initialisation mode lists it in InitialUnknowns | add it; hosts initialise loops by that list
+dependency.kind | E | 2.2.8 | 2.4.8 | factors are of the declared dependenciesKind | write dependent, or leave dependenciesKind out
+dependency.superfluous | I | 2.2.8 | 2.4.8 | declared dependencies have an effect | check whether the value is used; if it is not, remove it from the list
 """)  # noqa: E501
 
 _SEEN = 1e-6  # of the size of a value: less is what an algebraic loop leaves

@@ -43,7 +43,7 @@ value.text | E | 2.1.2 | 2.2.7.2 | strings are UTF-8 | encode them before they a
 [determinism]
 run.inexact | W | * | * | runs that must be equal are so bit for bit, not only to a thousandth of the range | save and reset the memory of the solver too
 [memory]
-resources.instance-leak | W | * | * | memory does not grow with instances made and freed, or reset | free what is allocated at instantiation, in the reset too
+resources.instance-leak | W | * | * | memory does not grow when instances are made, freed or reset | free what is allocated at instantiation, in the reset too
 resources.step-leak | W | * | * | memory does not grow with steps | free what is allocated in a step
 resources.leak | W | * | * | threads and open files do not grow with instances or steps | end threads and close files when the instance is freed
 """)  # noqa: E501

@@ -11,7 +11,7 @@ declare("""
 [end]
 ended.get | W | 4.2.4 | 2.3.8 | values can be read after the end | allow the functions in the state terminated
 [silence]
-log.off | W | 2.1.5 | 2.3.1 | nothing is logged where logging is off | ask loggingOn before the logger is called
+log.off | W | 2.1.5 | 2.3.1 | nothing is logged if logging is off | check loggingOn before calling the logger
 [another start]
 start.time | W | 2.1.6 | 2.3.2 | an experiment can begin at any time | take the start time from the arguments of the setup
 """)  # noqa: E501

@@ -16,7 +16,7 @@ from orchestrator.errors import ChildError
 
 declare("""
 [values]
-value.batch | E | 2.1.7 | 2.2.7.2 | values that are read in one call are those that are read one by one | go through all value references, and keep each text in a place of its own
+value.batch | E | 2.1.7 | 2.2.7.2 | values that are read in one call are those that are read one by one | go through all value references, and keep each string in its own memory
 """)  # noqa: E501
 
 _MOST = 100  # variables

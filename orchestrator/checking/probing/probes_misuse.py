@@ -18,9 +18,9 @@ misuse.negative-step | W | 4.2.4 | 4.2.1 | a negative step is refused | return a
 misuse.step-after-end | W | 4.2.4 | 4.2 | a step after the end is refused | return an error
 misuse.value-reference | W | 2.1.7 | 2.2.7.2 | unknown value references are refused | return an error
 misuse.set-fixed | I | 2.2.7 | 2.4.7.4 | fixed parameters and constants are not set between steps | return an error
-misuse.value-count | W | - | 2.2.7.2 | a number of values that is not that of the variables is refused | compare nValues with the sizes of the variables
+misuse.value-count | W | - | 2.2.7.2 | a wrong number of values is refused | compare nValues with the sizes of the variables
 misuse.set-output | W | - | 2.2.7.2 | outputs cannot be set at communication points | return an error
-misuse.event-mode | W | - | 4.2 | event mode is refused where it is not used | return an error
+misuse.event-mode | W | - | 4.2 | event mode is refused if it is not used | return an error
 """)  # noqa: E501
 
 _NOT_REFUSED = (OK, WARNING)

@@ -18,7 +18,7 @@ from orchestrator.checking.rules import declare
 
 declare("""
 [promises]
-promise.refused | E | 2.1.5 | 2.4.2 | what a flag or a list promises can be called | implement the function, or clear the flag
+promise.refused | E | 2.1.5 | 2.4.2 | functions declared by a flag or a list can be called | implement the function, or clear the flag
 log.refused | W | 2.1.5 | 2.3.1 | SetDebugLogging takes the categories that are declared | accept them, and return OK
 promise.ignored | W | 4.2.1 | - | derivatives of inputs have an effect with canInterpolateInputs | use them, or clear the flag
 promise.dependencies | W | - | 2.2.9 | per-element dependencies are those of ModelStructure | generate both from one source

@@ -17,8 +17,8 @@ from orchestrator.checking.rules import declare
 
 declare("""
 [states]
-states.order | E | 3.2.1 | 3.2.1 | states stand in the order of ModelStructure, by the attribute derivative | correct the order, or the attribute derivative
-states.rates | E | 3.2.2 | 3.2.1 | derivatives of states are those of their variables, in the order of ModelStructure | compute both from one place
+states.order | E | 3.2.1 | 3.2.1 | states are in the order of ModelStructure, by the attribute derivative | correct the order, or the attribute derivative
+states.rates | E | 3.2.2 | 3.2.1 | derivatives of states equal their variables, in the order of ModelStructure | compute both from one place
 states.nominal-differs | W | 3.2.2 | 3.2.1 | nominal values of states are those of the description | generate both from one source
 states.slope | I | 2.2.7 | 2.4.7.5 | a variable with the attribute derivative is the derivative of that state | correct the variable, or the attribute derivative
 """)  # noqa: E501

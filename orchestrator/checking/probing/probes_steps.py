@@ -14,7 +14,7 @@ declare("""
 [variable steps]
 steps.variable | W | 4.3.1 | 4.4 | results hardly depend on the communication step | integrate over the step given, or clear canHandleVariableCommunicationStepSize
 [inner steps]
-steps.internal | W | 4.2.2 | 4.2.1 | communication steps are multiples of the steps inside | end the last step inside at the communication point, or state a stepSize that is a multiple
+steps.internal | W | 4.2.2 | 4.2.1 | communication steps are multiples of the internal steps | end the last internal step at the communication point, or state a stepSize that is a multiple
 [time]
 steps.time | W | 4.2.2 | 4.2.1 | the independent variable is not later than the communication point | take the time from the arguments of the step
 """)  # noqa: E501

@@ -18,9 +18,9 @@ from orchestrator.checking.rules import declare
 
 declare("""
 [values]
-value.kept | E | 2.1.7 | 2.2.7.2 | a value that is set is there | store the value, every element of it, where it is used and read
-value.lags | W | 2.1.7 | 2.2.7.2 | inputs and tunable parameters that are set at a communication point are there | store the value when it is set, not with the next step
-value.stale | E | 2.2.7 | 2.3.3 | what is read follows what was set before | compute values when they are read, or when something is set
+value.kept | E | 2.1.7 | 2.2.7.2 | a value that was set is returned | store the value, every element of it, where it is used and read
+value.lags | W | 2.1.7 | 2.2.7.2 | inputs and tunable parameters set at a communication point are returned at once | store the value when it is set, not with the next step
+value.stale | E | 2.2.7 | 2.3.3 | values that are read correspond to the values set before | compute values when they are read, or when something is set
 value.calculated | E | 2.2.7 | 2.4.7.4 | calculated parameters follow the parameters that they depend on | compute them when initialisation mode is left
 """)  # noqa: E501
 

@@ -22,9 +22,9 @@ declare("""
 run.determinism | W | * | * | two equal runs are equal | seed random numbers, initialise memory
 log.effect | E | 2.1.5 | 2.3.1 | a run does not depend on logging | compute the same with loggingOn = false
 value.order | E | 2.1.7 | 2.2.7.2 | values can be set and read one by one or together, in any order, and reading changes nothing | store what is set; compute outputs without a memory of having been read
-event.idle | E | 3.2.2 | 2.3.5 | event mode that is entered without a cause changes nothing | ask whether an event is due before something is changed
-event.again | E | 3.2.2 | 2.3.5 | once the discrete states need no update, one more changes nothing | change them where their conditions are fulfilled alone
-promise.completed-step | E | 3.3.1 | 3.4 | completed steps need not be told where the flag says so | do in event mode what depends on them, or correct the flag
+event.idle | E | 3.2.2 | 2.3.5 | event mode without an event changes nothing | change variables only if an event is due
+event.again | E | 3.2.2 | 2.3.5 | once the discrete states need no update, one more changes nothing | change them only where their conditions are fulfilled
+promise.completed-step | E | 3.3.1 | 3.4 | completed steps need not be reported if the flag says so | do in event mode what depends on them, or correct the flag
 partition.thread | E | - | 5.2.1 | a partition can be activated in a thread of its own | keep what a partition needs in the instance, not in memory of a thread
 value.sequence | E | 3.2.1 | 3.2.1 | derivatives and event indicators can be read in any order | compute both from what was set last
 

@@ -26,8 +26,8 @@ run.reset | E | 2.1.6 | 2.3.1 | a reset returns the instance to its first state 
 state.status | E | 2.1.8 | 2.2.7.4 | the state functions work as the flags promise | implement them, or clear the flag
 state.restore | E | 2.1.8 | 2.2.7.4 | a restored state continues as before | save every variable and clock, hidden ones too, by value
 state.serialise | E | 2.1.8 | 2.2.7.4 | a serialised state continues as before, also in a new instance | serialise every variable
-state.portable | E | 2.1.8 | 2.2.7.4 | a serialised state is usable in another process, as one that was stored in a file is | serialise what pointers lead to, not the pointers
-state.time | W | 2.1.8 | 2.2.7.4 | a restored state has its time | save the time too
+state.portable | E | 2.1.8 | 2.2.7.4 | a serialised state can be restored in another process | serialise the data, not pointers to it
+state.time | W | 2.1.8 | 2.2.7.4 | a restored state has the time at which it was saved | save the time too
 state.free | W | 2.1.8 | 2.2.7.4 | freeing a state sets it to null | set the pointer to NULL
 """)  # noqa: E501
 
