@@ -47,7 +47,7 @@ class Library:
     """The shared library of an FMU, in a child process that does the calls; another one can take its place.
 
     Attributes:
-        jail: the present child.
+        jail: the child that does the calls at present.
         left: whether a process outlived one of those before.
         current: the function under way; empty when none is.
         ended: whether the child process is gone.
