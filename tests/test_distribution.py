@@ -40,7 +40,7 @@ def test_the_oldest_versions_are_those_that_are_allowed():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = [
         text
-        for name in ("dask", "hdf5", "mdf", "mpc", "parquet", "workbench")
+        for name in ("dask", "hdf5", "mdf", "parquet", "workbench")
         for text in project["optional-dependencies"][name]
     ]
     allowed = dict(text.split(">=") for text in (*project["dependencies"], *extras))

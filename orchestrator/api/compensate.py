@@ -1,4 +1,4 @@
-"""The same plants under the plain LQR, the LQR shifted by the half-gap, an MPC, and the compensator of the gap."""
+"""The same plants under the plain LQR, the LQR shifted by the half-gap, and the compensator of the gap."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from orchestrator.api.at_rest import five, margins_text, rest_text
 from orchestrator.api.machine import read_fitted_model, require_machine
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, text_table
+from orchestrator.api.shown import Block
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.building.starts import SAMPLE_TIME
-from orchestrator.control.loops import COMPENSATOR, FMUS, LQR, MPC, SHIFTED, ControlTask, make_loop, make_task
+from orchestrator.control.loops import COMPENSATOR, FMUS, LQR, SHIFTED, ControlTask, make_loop, make_task
 from orchestrator.control.machine import thesis_machine
 from orchestrator.control.measures import (
     LoopMeasures,
@@ -25,7 +25,6 @@ from orchestrator.control.measures import (
     measure_loop,
     quickest_landing,
 )
-from orchestrator.control.predictive import PredictiveLaw, make_predictive_loop
 from orchestrator.control.standstill import forecast_rest
 from orchestrator.control.take_away import file_names, write_loop
 from orchestrator.control.weights import choose_weights
@@ -60,6 +59,7 @@ CYCLES = (
     "table says so; `state_weights` takes others."
 )
 HARD, HARD_SHARE = 1.5, 0.05  # of the impact speed that is asked for; of the plants that may land harder
+LAWS = (LQR, SHIFTED, COMPENSATOR)
 MEDIANS = (("impact", "largest_impact"), *((name, name) for name in ("error", "rest", "contacts")))
 _BOUND_SPEEDS = np.geomspace(0.02, 2.0, 30)  # of the curve beside the traversals [rad/s]
 
@@ -100,7 +100,7 @@ class CompensateResult(PlottedResult):
         chosen = f"Weights of the states {weights}, of the request {task.torque_weight:g}: gains "
         chosen += ", ".join(f"{gain:.6g}" for gain in task.gains)
         return [
-            *map(text_table, laws_tables(f"{title}: medians over {self.arguments['plants']} plants", self.laws)),
+            *laws_tables(f"{title}: medians over {self.arguments['plants']} plants", self.laws),
             bound,
             chosen,
             rest_text(self.forecast, "the plain LQR"),
@@ -168,7 +168,6 @@ def compensate(
     sample_time: float = SAMPLE_TIME,
     plants: int | None = None,
     seed: int = 0,
-    mpc: bool = False,
     native: bool = False,
     fmi: int = 2,
     force: bool = False,
@@ -176,9 +175,9 @@ def compensate(
 ) -> CompensateResult:
     """Make a controller that crosses the gap of a machine softly, and say what its loop will do.
 
-    It is judged beside the plain LQR, the LQR shifted by the half-gap and, if asked for, an MPC, on plants drawn from
-    what the record of the machine left open. The loads make a smooth move, then rest. Without a ``model`` the laws run
-    on the thesis's drivetrain, known to 5 %, with dry friction at the load that no law knows.
+    It is judged beside the plain LQR and the LQR shifted by the half-gap, on plants drawn from what the record of the
+    machine left open. The loads make a smooth move, then rest. Without a ``model`` the laws run on the thesis's
+    drivetrain, known to 5 %, with dry friction at the load that no law knows.
 
     Args:
         alpha: half-gap [rad] (default: the model's, else 0.02).
@@ -193,7 +192,6 @@ def compensate(
         sample_time: of the controller [s].
         plants: their number (default: 100 for a model, else 5).
         seed: of plants and noise.
-        mpc: runs a model predictive controller too; needs the extra ``mpc``.
         native: FMUs that are written need no Python; they need a C compiler when they are made.
         fmi: version of FMI of these, 2 or 3; FMUs of FMI 3.0 are native.
         force: go on with a model that cannot be trusted, a half-gap that the record excludes, or unstable plants.
@@ -206,7 +204,7 @@ def compensate(
     Raises:
         ScenarioError: a number is out of its range, no traversal ends with the impact speed, the model cannot be
             trusted, or the loop is unstable on a plant that the record allows.
-        DesignError: the extra ``mpc`` is not installed, or no LQR has the margins that are needed.
+        DesignError: no LQR has the margins that are needed.
         FmuError: an FMU cannot be built.
 
     Examples:
@@ -253,7 +251,7 @@ def compensate(
         most = 0.99 * quickest_landing(task)  # so that the number that is told is possible
         text = f"`impact_speed` must be at most {most:.3g} rad/s, but is {task.impact_speed:g} rad/s"
         raise ScenarioError(f"{text}: no traversal of this gap from rest ends quicker", "impact_speed")
-    laws, measured = _run_laws(task, int(given["plants"]), seed, mpc, progress)
+    laws, measured = _run_laws(task, int(given["plants"]), seed, progress)
     forecast = forecast_rest(task.nominal, task.gains, task.sample_time)
     unstable, more = _judge(task, measured[COMPENSATOR], seed)
     if unstable and said is not None and not force:
@@ -261,36 +259,30 @@ def compensate(
     doubts += (f"Do not run this controller: {unstable}. {CURE}.",) if unstable else ()
     doubts += (*more, *([CYCLES] if forecast.cycles and said is not None else []))
     name = "" if said is None else re.sub(r"\W+", "_", Path(machine.source).stem).strip("_") or "machine"
-    asked = given | {"model": None if said is None else said.source, "mpc": mpc, "native": native, "fmi": fmi}
+    asked = given | {"model": None if said is None else said.source, "native": native, "fmi": fmi}
     return CompensateResult(laws, bound, task, forecast, asked | {"force": force}, doubts, name[:60])
 
 
 def _run_laws(
-    task: ControlTask, plants: int, seed: int, mpc: bool, progress: Callable[[int, int], None]
+    task: ControlTask, plants: int, seed: int, progress: Callable[[int, int], None]
 ) -> tuple[tuple[LawFound, ...], dict[str, list[LoopMeasures]]]:
     """Return what was measured of each law, and the measures of each plant."""
-    predictive = PredictiveLaw(task) if mpc else None
-    names = (LQR, SHIFTED, MPC, COMPENSATOR) if mpc else (LQR, SHIFTED, COMPENSATOR)
     fmus = ensure_fastest(FMUS).paths
     laws, found = [], {}
-    for n, law in enumerate(names):
+    for n, law in enumerate(LAWS):
         measured: list[LoopMeasures] = []
         path = (np.zeros(0), np.zeros(0))
         for plant in range(plants):
-            if law == MPC and predictive is not None:
-                loop = make_predictive_loop(predictive, fmus, (seed, plant))
-            else:
-                loop = make_loop(task, fmus, law, (seed, plant))
-            run = simulate(loop)
+            run = simulate(make_loop(task, fmus, law, (seed, plant)))
             measured.append(measure_loop(run, task))
             path = first_path(run, task) if not path[0].size else path
-            progress(n * plants + plant + 1, len(names) * plants)
-        laws.append(_summarise(law, measured, path))
+            progress(n * plants + plant + 1, len(LAWS) * plants)
+        laws.append(summarise_law(law, measured, path))
         found[law] = measured
     return tuple(laws), found
 
 
-def _summarise(law: str, measured: Sequence[LoopMeasures], path: tuple[Array, Array]) -> LawFound:
+def summarise_law(law: str, measured: Sequence[LoopMeasures], path: tuple[Array, Array]) -> LawFound:
     """Return medians and 95 % quantiles over plants that are stable."""
     stable = [m for m in measured if m.stable]
     every = {

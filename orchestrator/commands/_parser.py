@@ -2,6 +2,7 @@
 
 import argparse
 import difflib
+import inspect
 import math
 import re
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from orchestrator.commands._lines import fold
+from orchestrator.errors import ScenarioError
 from orchestrator.plain_text import plain_text, shorten
 
 LARGEST_WHOLE_NUMBER = 10**18
@@ -75,6 +77,20 @@ def flags_of(parser: argparse.ArgumentParser) -> dict[str, str]:
     """Return what the command line calls each argument, by its name in Python."""
     actions = parser._actions  # argparse has no public list of them
     return {a.dest: a.option_strings[-1] if a.option_strings else str(a.metavar or a.dest) for a in actions}
+
+
+def numbers_of(flag: str, text: str | None) -> tuple[float, ...] | None:
+    """Return the numbers of a list with commas."""
+    try:
+        return None if text is None else tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise ScenarioError(f"`{flag}` must be numbers separated by commas, but is {text!r}") from None
+
+
+def options_for(function: Callable[..., Any], args: argparse.Namespace) -> dict[str, Any]:
+    """Return the options that a function has arguments for, by their names."""
+    known = inspect.signature(function).parameters
+    return {name: value for name, value in vars(args).items() if name in known}
 
 
 def word_unknown(word: str, command: str, flags: Mapping[str, str]) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from orchestrator.api.compensate import compensate
 from orchestrator.building.starts import SAMPLE_TIME
 from orchestrator.commands._console import print_blocks
-from orchestrator.commands._reading import numbers_of
+from orchestrator.commands._parser import numbers_of, options_for
 from orchestrator.commands._stages import Stages
 from orchestrator.shared.output import stage_output
 
@@ -35,7 +35,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--plants", type=int, metavar="N", help="number of plants (default: 100, without a model 5)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all draws (default: %(default)s)")
-    parser.add_argument("--mpc", action="store_true", help="also run a model predictive controller (extra `mpc`)")
     parser.add_argument("--native", action="store_true", help="write native FMUs, which need no Python at run time")
     parser.add_argument(
         "--fmi", type=int, choices=(2, 3), default=2, help="FMI version (default: 2); 3 means native FMUs"
@@ -46,23 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run all laws, print and write."""
     with stage_output(arguments.out) as folder, Stages() as stages:
-        result = compensate(
-            arguments.alpha,
-            model=arguments.model,
-            tau=arguments.tau,
-            impact_speed=arguments.impact_speed,
-            friction=arguments.friction,
-            torque_limit=arguments.torque_limit,
-            state_weights=numbers_of("--state-weights", arguments.state_weights),
-            sample_time=arguments.sample_time,
-            plants=arguments.plants,
-            seed=arguments.seed,
-            mpc=arguments.mpc,
-            native=arguments.native,
-            fmi=arguments.fmi,
-            force=arguments.force,
-            progress=stages.counter("running the laws on the plants"),
-        )
+        given = options_for(compensate, arguments)
+        given["state_weights"] = numbers_of("--state-weights", arguments.state_weights)
+        result = compensate(**given, progress=stages.counter("running the laws on the plants"))
         result.write(folder, arguments.out)
     print_blocks(result.blocks())
     print(

@@ -19,7 +19,7 @@ from orchestrator.scenarios.definition import Scenario
 
 Array = NDArray[np.float64]
 
-LQR, SHIFTED, MPC, COMPENSATOR = "LQR", "shifted LQR", "MPC", "compensator"
+LQR, SHIFTED, COMPENSATOR = "LQR", "shifted LQR", "compensator"
 FMUS = ("Drivetrain", "BacklashEstimator", "BacklashCompensator")
 RECORDED = ("plant.theta_m", "plant.omega_m", "plant.theta_l", "plant.omega_l", "plant.contact", "controller.u")
 REST = 2.0  # the last seconds of a run, in which the load shall be at rest [s]

@@ -1,20 +1,19 @@
 """The MPC beside the other laws."""
 
-import json
-import sys
-
 import control
 import numpy as np
 import pytest
 
-from orchestrator.cli import main
+import orchestrator as oc
 from orchestrator.control.loops import ControlTask
 from orchestrator.control.machine import thesis_machine
 from orchestrator.control.measures import bound_time
-from orchestrator.control.predictive import TOUCH, PredictiveLaw, PredictiveSlave
 from orchestrator.plants.design import DrivetrainValues, six_state_model
 from orchestrator.records.model_file import read_model
 from tests.support.c_fmu import have_compiler
+
+pytest.importorskip("daqp")
+from benchmarks.predictive_control import TOUCH, PredictiveLaw, PredictiveSlave, run_predictive
 
 ALPHA = 0.02
 AFTER = 10_000  # a sample behind the move
@@ -22,20 +21,12 @@ AFTER = 10_000  # a sample behind the move
 
 @pytest.fixture(params=[5e-3, 1.0], ids=["fast", "slow"])
 def law(request):
-    pytest.importorskip("daqp")
     return PredictiveLaw(ControlTask(thesis_machine(read_model(None), ALPHA, request.param, 2.0), 0.1))
 
 
 def at_rest(task, twist, angle=0.0):
     """An estimate at rest, with a twist and the load at an angle [rad]."""
     return np.array([task.nominal.i * (angle + twist), 0.0, angle, 0.0, 0.0, 0.0])
-
-
-def test_without_the_extra_it_is_said_what_to_install(monkeypatch, capsys, tmp_path):
-    monkeypatch.setitem(sys.modules, "daqp", None)
-    assert main(["compensate", "--mpc", "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == "error: `--mpc` needs the extra [mpc]: pip install 'backlash-cosim[mpc]'\n"
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("flank", [1.0, -1.0])
@@ -97,11 +88,9 @@ def test_the_twist_is_zero_in_mid_gap(law):
 
 
 @pytest.mark.skipif(not have_compiler(), reason="Python FMUs take half a minute")
-def test_it_stands_beside_the_other_laws(tmp_path):
-    pytest.importorskip("daqp")
-    assert main(["compensate", "--mpc", "--plants", "1", "--out", str(tmp_path / "out")]) == 0
-    found = json.loads((tmp_path / "out" / "compensate.json").read_text(encoding="utf-8"))["results"]
-    plain, shifted, predictive, _ = found["laws"]
-    assert [law["law"] for law in found["laws"]] == ["LQR", "shifted LQR", "MPC", "compensator"]
-    assert predictive["impact"] < 0.6 * shifted["impact"]
-    assert predictive["error"] < 0.4 * plain["error"]
+def test_it_stands_beside_the_other_laws():
+    found = oc.compensate(plants=1)
+    plain, shifted, _ = found.laws
+    predictive = run_predictive(found.task, 1, 0)
+    assert predictive.impact < 0.6 * shifted.impact
+    assert predictive.error < 0.4 * plain.error

@@ -1,4 +1,6 @@
-"""A model predictive controller that knows the gap: one quadratic programme a sample, solved by DAQP (extra ``mpc``).
+"""A model predictive controller that knows the gap, beside the laws of ``compensate``.
+
+Run as ``python -m benchmarks.predictive_control [--plants 15] [--tau 1] [--seed 0]``. DAQP solves the programmes.
 
 Two linear models of the same six states take turns:
 
@@ -12,26 +14,34 @@ Requests are held over blocks that grow with the horizon, and are in units of th
 Arnström, Bemporad and Axehill, IEEE Trans. Automatic Control 67(8), 2022.
 """
 
+import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import daqp
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.control.loops import MPC, SHIFTED, ControlTask, make_loop
-from orchestrator.control.measures import bound_time
-from orchestrator.errors import DesignError, SlaveError
+import orchestrator as oc
+from orchestrator.api.compensate import summarise_law
+from orchestrator.building.fastest import ensure_fastest
+from orchestrator.control.loops import FMUS, SHIFTED, ControlTask, make_loop
+from orchestrator.control.measures import bound_time, first_path, measure_loop
+from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import ModelInterface, Signals, Transfer, Value, Variable
 from orchestrator.master.system import Connection, Instance, System
 from orchestrator.plants.design import discretise, five_state_model, six_state_model, solve_riccati
 from orchestrator.scenarios.definition import Scenario
+from orchestrator.scenarios.scenario import simulate
+from orchestrator.shared.results.compensate import LawFound
 from pyfmu_sources.controllers.backlash_compensator import Tuning, impact_speed
 from pyfmu_sources.controllers.lqr import Estimate
 
 Array = NDArray[np.float64]
+MPC = "MPC"
 BLOCKS = 14  # held requests of a horizon
 HORIZON = 3.0  # in shortest times of a traversal
 QUICKNESS = 4.0  # bandwidth of the way in the gap times the shortest time of a traversal
@@ -41,20 +51,10 @@ SOFT = 8  # DAQP's sign of a constraint that may be broken at a price
 INPUTS = ("theta_m_hat", "omega_m_hat", "theta_l_hat", "omega_l_hat", "T_l_hat", "T_m_hat", "offset_hat", "alpha_hat")
 
 
-def require_solver() -> Any:
-    """Return the module ``daqp``, or say how to install it."""
-    try:
-        import daqp
-    except ImportError:
-        raise DesignError("`mpc` needs the extra [mpc]: pip install 'backlash-cosim[mpc]'", "mpc") from None
-    return daqp
-
-
 class PredictiveLaw:
     """The two programmes of a task, condensed: requests are their only unknowns."""
 
     def __init__(self, task: ControlTask) -> None:
-        daqp = require_solver()
         v, h = task.nominal, task.sample_time
         self.task = task
         self._reference, self._tuning = (
@@ -245,3 +245,26 @@ def _shared(parts: Sequence[Any]) -> Iterator[Any]:
             yield part
         if instance == "controller":
             yield replace(part, target=f"flanks.{name}")
+
+
+def run_predictive(task: ControlTask, plants: int, seed: int) -> LawFound:
+    """Return what is measured of the MPC on the plants of ``compensate``."""
+    law, fmus = PredictiveLaw(task), ensure_fastest(FMUS).paths
+    runs = [simulate(make_predictive_loop(law, fmus, (seed, plant))) for plant in range(plants)]
+    return summarise_law(MPC, [measure_loop(run, task) for run in runs], first_path(runs[0], task))
+
+
+def main() -> None:
+    """Print the medians of all laws."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--plants", type=int, default=15)
+    parser.add_argument("--tau", type=float, default=5e-3, help="time constant of the drive [s]")
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+    found = oc.compensate(plants=args.plants, tau=args.tau, seed=args.seed)
+    predictive = run_predictive(found.task, args.plants, args.seed)
+    print(replace(found, laws=(*found.laws[:-1], predictive, found.laws[-1])))
+
+
+if __name__ == "__main__":
+    main()
