@@ -1,7 +1,5 @@
 """Two results of one command side by side: what differs beyond the intervals, and the curves on one axis."""
 
-import csv
-import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,9 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from orchestrator.errors import InputError
 from orchestrator.records.units import ANGLES
 from orchestrator.reporting import Facts, Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.plots import Array, as_column
+from orchestrator.reporting.source import ResultDocument, load
 from orchestrator.workbench.session import is_name
 
 MOST_CURVES = 8  # of one file: with more nobody reads them
@@ -20,14 +22,24 @@ APART = 1e-6  # of a curve's own size: what two curves differ by that is no roun
 MOST_BYTES = 50_000_000  # of a result file that is compared
 SAME = 1e-9  # relative difference of numbers without an interval that is rounding
 # What says how a result was made, and nothing of the machine.
-_BESIDE = ("settings", "schema_version", "seconds", "block_values", "candidates", "live", "arcmin")
+_BESIDE = (
+    "settings",
+    "schema_version",
+    "seconds",
+    "block_values",
+    "candidates",
+    "live",
+    "arcmin",
+    "summary",
+    "notes",
+)
 # Numbers that are in the unit beside them: of misfits and of channels.
 _IN_ITS_UNIT = (
     "nominal", "parameters", "final", "noise", "least", "most", "first", "last", "smallest", "largest", "rms",
 )  # fmt: skip
 _NAMES = ("name", "source", "signal")  # of an entry of a list
 
-Columns = dict[str, list[float | None]]
+Columns = dict[str, Array]
 
 
 @dataclass(frozen=True)
@@ -58,10 +70,10 @@ def compare_results(first: Path, second: Path) -> Report:
     """
     names = (first.name, second.name)
     documents = [_document(folder) for folder in (first, second)]
-    commands = [str(document.get("command")) for document in documents]
+    commands = [document["command"] for document in documents]
     if commands[0] != commands[1]:
         raise InputError(f"results to compare must be of one command, but are of {commands[0]} and {commands[1]}")
-    left, right = (dict(quantities(document.get("results"))) for document in documents)
+    left, right = ({n: v for n, v in facts_of(d["results"]) if isinstance(v, ResultNumber)} for d in documents)
     both = [name for name in left if name in right]
     beyond = [name for name in both if left[name].differs_beyond(right[name])]
     sure = [name for name in beyond if left[name].interval is not None and right[name].interval is not None]
@@ -107,7 +119,7 @@ def _badge(differ: bool, compared: bool, apart: list[str]) -> tuple[str, str]:
     return ("good", "no difference beyond the intervals") if compared else ("neutral", "nothing has an interval")
 
 
-def _changed(documents: list[dict[str, Any]]) -> str:
+def _changed(documents: Sequence[Mapping[str, Any]]) -> str:
     """Return which arguments of two commands differ, in words."""
     first, second = (document.get("arguments") or {} for document in documents)
     return ", ".join(
@@ -122,30 +134,30 @@ def _named(names: list[str]) -> str:
     return f": {', '.join(names[:MOST_NAMED])}{more}" if names else ""
 
 
-def quantities(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber]]:
-    """Yield every number of a result with its place, such as ``parameters J_m``; entries of lists go by their name."""
+def facts_of(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber | str]]:
+    """Yield every number and text of a result with its place, as ``parameters J_m``; entries of lists by their name."""
     if isinstance(results, Mapping):
         value = next((results[key] for key in ("value", "alpha") if _is_number(results.get(key))), None)
+        unit = str(results.get("unit") or "")
         if value is not None:
-            interval = _interval(results.get("interval"))
-            unit = str(results.get("unit") or ("rad" if "alpha" in results else ""))
-            yield path.strip() or "the half-gap", ResultNumber(float(value), interval, unit)
+            unit = unit or ("rad" if "alpha" in results else "")
+            yield path.strip() or "the half-gap", ResultNumber(float(value), _interval(results.get("interval")), unit)
         for name, entry in results.items():
             if name in _BESIDE or (value is not None and name in ("value", "alpha", "interval", "standard_error")):
                 continue
             if name in _IN_ITS_UNIT and _is_number(entry):
-                yield f"{path} {name}".strip(), ResultNumber(float(entry), None, str(results.get("unit") or ""))
+                yield f"{path} {name}".strip(), ResultNumber(float(entry), None, unit)
             else:
-                yield from quantities(entry, f"{path} {name}")
+                yield from facts_of(entry, f"{path} {name}")
     elif isinstance(results, list):
-        for place, entry in enumerate(results):
+        for place, entry in enumerate(results, start=1):
             named = next((entry[key] for key in _NAMES if entry.get(key)), None) if isinstance(entry, Mapping) else None
-            if named is not None:
-                yield from quantities(entry, f"{path} {named}")
-            elif isinstance(entry, Mapping):
-                yield from quantities(entry, f"{path} {place + 1}")
+            if not _is_number(entry):  # columns are compared as curves
+                yield from facts_of(entry, f"{path} {named or place}")
     elif _is_number(results):
         yield path.strip(), ResultNumber(float(results))
+    elif isinstance(results, (str, bool)):
+        yield path.strip(), str(results)[:200]
 
 
 def _angle_unit(results: Any) -> str:
@@ -166,19 +178,13 @@ def _interval(value: Any) -> tuple[float, float] | None:
     return None
 
 
-def _document(folder: Path) -> dict[str, Any]:
+def _document(folder: Path) -> Mapping[str, Any]:
     """Return the result file of a directory; its name is the command's."""
     command = folder.name.rpartition("-")[0]
     path = folder / f"{command}.json"
     if not is_name(folder.name) or not path.is_file() or path.stat().st_size > MOST_BYTES:
         raise InputError(f"results to compare must be whole, but {folder.name} has no {command}.json")
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError:
-        document = None
-    if not isinstance(document, dict):
-        raise InputError(f"results to compare must be JSON objects, but that of {folder.name} is not")
-    return document
+    return load(folder, command).document
 
 
 def _table(
@@ -207,28 +213,16 @@ def _ratio(first: ResultNumber | None, second: ResultNumber | None) -> float | N
     return second.value / first.value if first is not None and second is not None and first.value else None
 
 
-def _texts(names: tuple[str, str], documents: list[dict[str, Any]]) -> ReportTable:
+def _texts(names: tuple[str, str], documents: Sequence[Mapping[str, Any]]) -> ReportTable:
     """Return the words that differ: verdicts, grades, arguments."""
-    left, right = (dict(_words({k: d.get(k) for k in ("arguments", "results")})) for d in documents)
+    facts = ([*facts_of(d.get("arguments")), *facts_of(d["results"])] for d in documents)
+    left, right = ({name: text for name, text in found if isinstance(text, str)} for found in facts)
     rows = [
         (_spaced(name), left.get(name, "none"), right.get(name, "none"))
         for name in dict.fromkeys([*left, *right])
         if left.get(name) != right.get(name)
     ]
     return ReportTable("Words that differ", (TableColumn("what"), *(TableColumn(n) for n in names)), tuple(rows))
-
-
-def _words(results: Any, path: str = "") -> Iterator[tuple[str, str]]:
-    if isinstance(results, Mapping):
-        for name, entry in results.items():
-            if name not in (*_BESIDE, "summary", "notes"):
-                yield from _words(entry, f"{path} {name}")
-    elif isinstance(results, list):
-        for place, entry in enumerate(results):
-            named = next((entry[key] for key in _NAMES if entry.get(key)), None) if isinstance(entry, Mapping) else None
-            yield from _words(entry, f"{path} {named or place + 1}")
-    elif isinstance(results, (str, bool)):
-        yield path.removeprefix(" results").removeprefix(" arguments").strip(), str(results)[:200]
 
 
 def _how(document: Mapping[str, Any]) -> str:
@@ -250,11 +244,8 @@ class ComparedCurve:
 def _curves(first: Path, second: Path) -> Iterator[ComparedCurve]:
     """Yield each column that two files of the same name have in common, over their first column."""
     for path in sorted(first.glob("*.csv")):
-        tables = [_columns(folder / path.name) for folder in (first, second)]
-        if not all(tables):
-            continue
-        left, right = tables
-        across = next(iter(left))
+        left, right = (_columns(folder, path.name) for folder in (first, second))
+        across = next(iter(left), "")
         shared = [name for name in left if name in right and name != across]
         for name in shared[:MOST_CURVES] if across in right else ():
             yield _compare_curve(f"{path.stem}: {name}", across, name, (first.name, left), (second.name, right))
@@ -266,40 +257,26 @@ def _compare_curve(
     (_, left), (_, right) = first, second
     series = tuple(Series(folder, table[across], table[name]) for folder, table in (first, second))
     plots = [Plot(title, across, name, series)]
-    if left[across] != right[across]:  # other rows: nothing to subtract
+    if not np.array_equal(left[across], right[across], equal_nan=True):  # other rows: nothing to subtract
         return ComparedCurve(name, tuple(plots), math.nan, True)
-    gone = [None if a is None or b is None else b - a for a, b in zip(left[name], right[name], strict=True)]
+    gone = right[name] - left[name]
     rms, size = _rms(gone), max(_rms(left[name]), _rms(right[name]))
-    holes = any((a is None) != (b is None) for a, b in zip(left[name], right[name], strict=True))
-    apart = holes or rms > APART * size
+    apart = rms > APART * size or bool(np.any(np.isnan(left[name]) != np.isnan(right[name])))
     if apart:
         difference = (Series(f"{second[0]} minus {first[0]}", left[across], gone),)
         plots.append(Plot(f"{title}, difference", across, name, difference, note=f"rms {rms:.4g}"))
     return ComparedCurve(name, tuple(plots), rms, apart)
 
 
-def _rms(values: Sequence[float | None]) -> float:
-    known = [value for value in values if value is not None]
-    return math.sqrt(sum(value * value for value in known) / len(known)) if known else 0.0
+def _rms(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return math.sqrt(float(np.mean(known**2))) if known.size else 0.0
 
 
-def _columns(path: Path) -> Columns:
-    """Return the columns of numbers of a result's table; none where it has others, or is very large."""
+def _columns(folder: Path, name: str) -> Columns:
+    """Return the columns with numbers of a result's table, NaN where one is missing; none of a very large file."""
+    path = folder / name
     if not path.is_file() or path.stat().st_size > MOST_BYTES:
         return {}
-    with path.open(encoding="utf-8", newline="") as stream:
-        names, *rows = list(csv.reader(stream)) or [[]]
-    if not rows or any(len(row) != len(names) for row in rows):
-        return {}
-    columns: Columns = {}
-    for place, name in enumerate(names):
-        try:
-            columns[name] = [_cell(row[place]) for row in rows]
-        except ValueError:
-            continue
-    return columns
-
-
-def _cell(text: str) -> float | None:
-    value = float(text) if text else math.nan
-    return value if math.isfinite(value) else None
+    columns = ResultDocument(folder, "", {}).signals(name)
+    return {n: as_column(values) for n, values in columns.items() if np.isfinite(values).any()}

@@ -124,13 +124,6 @@ class Workbench:
             return _problem(str(error), 422)
         return Response(msgspec.json.encode(found), media_type="application/json")
 
-    async def cost(self, request: Request) -> Response:
-        """Return what an estimate would take, in words."""
-        asked = await self._asked(request)
-        words = command_line(self.session, "estimate", asked.get("inputs"), asked.get("options", {}))
-        code, _, said = await self.jobs.answer([words[0], "--cost", *words[1:]])
-        return _problem(said.removeprefix("error: "), 422) if code else JSONResponse({"cost": said})
-
     async def read_fields(self, request: Request) -> Response:
         """Return a model file as fields; of no file the default model."""
         reference = request.query_params.get("file", "")
@@ -317,7 +310,6 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
         Route("/upload/{name:path}", _answer_in_words(workbench.upload), methods=["PUT"]),
         Route("/columns", _answer_in_words(workbench.columns), methods=["POST"]),
         Route("/curves", _answer_in_words(workbench.curves), methods=["POST"]),
-        Route("/cost", _answer_in_words(workbench.cost), methods=["POST"]),
         Route("/model", _answer_in_words(workbench.read_fields)),
         Route("/models", _answer_in_words(workbench.write_model), methods=["POST"]),
         Route("/jobs", _answer_in_words(workbench.start), methods=["POST"]),

@@ -4,7 +4,6 @@ The FMU is ours, built here (native where there is a C compiler), and it stays i
 run.
 """
 
-import csv
 import json
 import math
 import threading
@@ -26,6 +25,7 @@ from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
 from orchestrator.plants.known import plants
+from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import LiveFound
 
 SPAN = 2.0  # s: what a slider moves at once
@@ -163,14 +163,9 @@ def _live(path: Path) -> LiveFound:
 
 def _columns(path: Path, first: int, count: int) -> dict[str, NDArray[np.float64]]:
     """Return some rows of a result's table, by heading."""
-    try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            names, *rows = list(csv.reader(stream))
-        part = np.array(rows[first : first + count], dtype=float)
-    except (OSError, ValueError):
-        raise InputError(f"{path.parent.name} must have its table {path.name}, but it cannot be read") from None
-    columns = dict(zip(names, part.T, strict=True)) if part.ndim == 2 else {}
-    if not {"time", "u"} <= columns.keys() or part.shape[0] < LEAST_ROWS or not np.isfinite(columns["u"]).all():
+    table = ResultDocument(path.parent, "", {}).signals(path.name)
+    columns = {name: values[first : first + count] for name, values in table.items()}
+    if not {"time", "u"} <= columns.keys() or columns["u"].size < LEAST_ROWS or not np.isfinite(columns["u"]).all():
         raise InputError(f"{path.parent.name} must have times and torques in {path.name}, but has not")
     return columns
 

@@ -161,7 +161,8 @@ def test_the_theme_follows_the_system_until_it_is_chosen(opened):
     browsers.set_screen(opened, 1280, 900, "light")
     assert opened.execute_script(paper) == dark
     keys(opened, "#theme", "\n")
-    assert opened.execute_script("return document.getElementById('theme').textContent") == "Theme: system"
+    assert opened.execute_script(paper) == light
+    assert opened.execute_script("return document.getElementById('theme').textContent") == "Dark"
 
 
 CONTRAST = """

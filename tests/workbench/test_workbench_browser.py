@@ -417,25 +417,23 @@ def test_what_a_line_advises_is_done_by_a_click(inspected: Any, served: Served) 
     wait(inspected, lambda d: find(d, "[data-key=modulo-theta_m]").get_attribute("value") == "65536")
 
 
-def test_a_drawn_curve_and_its_scenario_outlast_a_reload(inspected: Any, served: Served) -> None:
+def test_a_source_and_its_scenario_outlast_a_reload(inspected: Any, served: Served) -> None:
     choose_tab(inspected, "fmus")
     inspected.refresh()
     find(inspected, "[data-port='drivetrain.u']")
     wait_for_text(inspected, "panel-fmus", "drivetrain.theta_m → kalmanestimator.theta_m")
     press(inspected, "Feed an input")
     kind = "//label[normalize-space()='is']/following-sibling::select"
-    inspected.find_element("xpath", kind).send_keys("drawn by hand")
-    lines = find(inspected, "#panel-fmus textarea")
+    inspected.find_element("xpath", kind).send_keys("sine")
+    value = "//label[normalize-space()='frequency [Hz]']/following-sibling::input"
     type_into = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))"
-    inspected.execute_script(type_into, lines, "0, 0\n0.5, 1, 2\n1, 0")
+    inspected.execute_script(type_into, inspected.find_element("xpath", value), "1, 2")
     press(inspected, "Write it as TOML")
-    wait_for_text(inspected, "panel-fmus", "must hold two numbers a line")
-    assert not (served.folder / "files" / "drawn.csv").exists()
-    inspected.execute_script(type_into, lines, "0; 0\n0,5; -1,25\n1 0")
+    wait_for_text(inspected, "panel-fmus", "must hold a number that makes sense there")
+    inspected.execute_script(type_into, inspected.find_element("xpath", value), "0,5")
     press(inspected, "Write it as TOML")
-    drawn = served.folder / "files" / "drawn.csv"
-    wait(inspected, lambda d: drawn.exists() and drawn.read_text().endswith("\n1,0\n"))
-    assert drawn.read_text().splitlines() == ["time,value", "0,0", "0.5,-1.25", "1,0"]
+    written = served.folder / "files"
+    wait(inspected, lambda d: any("frequency = 0.5" in path.read_text() for path in written.glob("scenario*.toml")))
 
 
 def test_an_ssp_file_is_a_tree(inspected: Any, served: Served) -> None:
@@ -521,7 +519,7 @@ def test_results_are_no_logs_and_settings_no_models(inspected: Any, served: Serv
     assert offered["Settings"] == ["the usual ones", "strict.toml"]
     assert "strict.toml" not in offered["Model file"]
     assert "inspect-1: model.toml" in offered["Model file"]
-    assert not [name for name in offered["Log"] if name == "drawn.csv" or ": " in name]
+    assert not [name for name in offered["Log"] if ": " in name]
 
 
 def test_a_past_result_runs_again_and_goes_for_good(inspected: Any, served: Served) -> None:

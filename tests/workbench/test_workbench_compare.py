@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.reporting import Plot, ReportTable, render
-from orchestrator.workbench.compare import ResultNumber, compare_results, quantities
+from orchestrator.workbench.compare import ResultNumber, compare_results, facts_of
 
 
 def result(folder: Path, alpha: float, half: float, rate: float = 500.0, verdict: str = "effects") -> Path:
@@ -127,18 +127,18 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
         compare_results(one, tmp_path / "check-1")
 
 
-def test_quantities_take_intervals_and_leave_flags() -> None:
-    found = dict(
-        quantities({"alpha": 1.0, "interval": [0.5, 2.0], "visible": True, "more": [1.0, {"x": None, "y": 3}]})
-    )
-    assert found == {"the half-gap": ResultNumber(1.0, (0.5, 2.0), "rad"), "more 2 y": ResultNumber(3.0)}
+def test_numbers_take_their_intervals() -> None:
+    found = dict(facts_of({"alpha": 1.0, "interval": [0.5, 2.0], "visible": True, "more": [1.0, {"x": None, "y": 3}]}))
+    assert found == {
+        "the half-gap": ResultNumber(1.0, (0.5, 2.0), "rad"), "visible": "True", "more 2 y": ResultNumber(3.0),
+    }  # fmt: skip
 
 
 def test_misfits_and_ranges_have_the_unit_beside_them_and_other_numbers_none() -> None:
     misfit = {"nominal": 0.2, "final": 0.01, "noise": 0.001, "unit": "rad"}
     channel = {"name": "u", "unit": "N.m", "least": -1.0, "most": 2.0, "missing": 3}
-    found = dict(quantities({"misfit": {"theta_m": misfit}, "channels": [channel], "final": 4.0}))
-    assert {name: (one.value, one.unit) for name, one in found.items()} == {
+    found = dict(facts_of({"misfit": {"theta_m": misfit}, "channels": [channel], "final": 4.0}))
+    assert {name: (one.value, one.unit) for name, one in found.items() if not isinstance(one, str)} == {
         "misfit theta_m nominal": (0.2, "rad"), "misfit theta_m final": (0.01, "rad"),
         "misfit theta_m noise": (0.001, "rad"), "channels u least": (-1.0, "N.m"), "channels u most": (2.0, "N.m"),
         "channels u missing": (3.0, ""), "final": (4.0, ""),

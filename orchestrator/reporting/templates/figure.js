@@ -31,12 +31,15 @@ class PlotFigure {
     });
   }
 
-  // Show other series, with everything in view unless the reader has zoomed.
+  // Show other series, with everything in view unless the reader has zoomed; where the names stay, so does what is hidden.
   show(series) {
+    const names = () => JSON.stringify(this.data.series.map(({ name }) => name)), before = names();
     this.read(series);
     this.cursor = null;
-    this.hidden.clear();
-    this.legend.replaceWith(this.makeLegend());
+    if (names() !== before) {
+      this.hidden.clear();
+      this.legend.replaceWith(this.makeLegend());
+    }
     if (this.range === this.home) this.reset(false);
     else this.draw();
   }

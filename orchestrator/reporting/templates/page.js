@@ -45,42 +45,6 @@ function fitted(table) {
   fit();
 }
 
-// Light, dark, or as the system says; remembered where the browser lets us.
-function themeButton(button) {
-  const root = document.documentElement;
-  const modes = ["system", "light", "dark"];
-  let mode = remembered() ?? "system";
-  const apply = () => {
-    if (mode === "system") delete root.dataset.theme;
-    else root.dataset.theme = mode;
-    button.textContent = `Theme: ${mode}`;
-  };
-  button.hidden = false;
-  button.addEventListener("click", () => {
-    mode = modes[(modes.indexOf(mode) + 1) % modes.length];
-    remember(mode);
-    apply();
-  });
-  apply();
-}
-
-function remembered() {
-  try {
-    const mode = localStorage.getItem("report-theme");
-    return ["light", "dark"].includes(mode) ? mode : null;
-  } catch {
-    return null;
-  }
-}
-
-function remember(mode) {
-  try {
-    localStorage.setItem("report-theme", mode);
-  } catch {
-    // a page opened from a mail has no storage: the choice lasts as long as the page
-  }
-}
-
 themeButton(document.getElementById("theme"));
 document.querySelectorAll("table.sortable").forEach(sortable);
 document.querySelectorAll("table.sortable").forEach(fitted);

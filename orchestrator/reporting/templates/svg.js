@@ -1,3 +1,19 @@
+// A button that turns light into dark colours and back; until it is pressed they are those of the system.
+function themeButton(button) {
+  const root = document.documentElement;
+  const isDark = () => (root.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
+  const tell = () => {
+    button.textContent = isDark() ? "Light" : "Dark";
+    button.setAttribute("aria-label", `Use ${isDark() ? "light" : "dark"} colours`);
+  };
+  button.hidden = false;
+  button.addEventListener("click", () => {
+    root.dataset.theme = isDark() ? "light" : "dark";
+    tell();
+  });
+  tell();
+}
+
 // Making elements.
 function colour(n) {
   return `var(--s${n % 8})`;
@@ -16,9 +32,10 @@ function element(name, attributes = {}, ...children) {
   return made;
 }
 
-function shape(name, attributes = {}) {
+function shape(name, attributes = {}, ...children) {
   const made = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
   return made;
 }
 

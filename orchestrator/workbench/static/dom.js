@@ -39,7 +39,7 @@ export const numberIn = (input) => (input.value.trim() === "" ? null : Number(in
 export function wrongField(place) {
   const input = [...place.querySelectorAll('[aria-invalid="true"]:enabled')].find((one) => one.offsetParent);
   if (!input) return null;
-  return { input, said: `“${input.labels?.[0]?.textContent ?? input.getAttribute("aria-label")}” must hold ${input.tagName === "TEXTAREA" ? "two numbers a line" : "a number that makes sense there"}, but is “${input.value.replaceAll("\n", " / ")}”` };
+  return { input, said: `“${input.labels?.[0]?.textContent ?? input.getAttribute("aria-label")}” must hold a number that makes sense there, but is “${input.value}”` };
 }
 
 export function choice(options, value, onchange) {

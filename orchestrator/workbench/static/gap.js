@@ -1,5 +1,4 @@
 /* global Units */
-import { post } from "./api.js";
 import { plain } from "./advice.js";
 import { check, digits, field, make, numberIn, numberInput, withInterval } from "./dom.js";
 import { action, fileChoice, jobView, kept, message, resultOf } from "./parts.js";
@@ -50,7 +49,7 @@ export function answerOf(found) {
 }
 
 export function build(panel) {
-  const said = message(), cost = make("p", { role: "status" });
+  const said = message();
   const read = reading("gap"), motorOnly = check("leave the load encoder out", false, () => {});
   kept("gap.motor_only", motorOnly.querySelector("input"), false);
   const options = async () => ({ model: await modelOfLog(), motor_only: motorOnly.querySelector("input").checked, ...read.options() });
@@ -69,18 +68,6 @@ export function build(panel) {
     return place;
   });
 
-  async function price() {
-    needLog();
-    cost.textContent = "Working out what it takes …";
-    try {
-      const given = Object.fromEntries(Object.entries(await options()).filter(([, value]) => value !== null && value !== "" && value !== false));
-      cost.textContent = (await post("cost", { inputs: [choices.log], options: given })).cost;
-    } catch (error) {
-      cost.textContent = "";
-      throw error;
-    }
-  }
-
   // An experiment that would show the gap better, by the command's own design.
   const limits = [["size", "Half-gap to be seen [rad]", "the estimate"], ["torque_limit", "Largest torque [N.m]", "250"], ["speed_limit", "Largest motor speed [rad/s]", "50"], ["duration", "Length [s]", "10"]]
     .map(([key, text, usual]) => ({ key, text, input: kept(`design.${key}`, numberInput({ placeholder: usual })) }));
@@ -91,7 +78,6 @@ export function build(panel) {
 
   panel.append(inputs(), make("div", { class: "row" }, motorOnly), read.element, said.element,
     make("div", { class: "row" },
-      action("What will it cost?", said, price),
       action("Estimate the gap", said, async () => { needLog(); view.show(await start("estimate", [choices.log], await options())); }, "main")),
-    cost, proposal, view.element);
+    proposal, view.element);
 }

@@ -1,13 +1,6 @@
+/* global label, shape */
 // A scenario as a graph: a box for each FMU, inputs left, outputs right; an output is dragged to an input.
-const SPACE = "http://www.w3.org/2000/svg";
 const WIDE = 270, LINE = 22, HEAD = 30, MOST = 12, GAP = 60, ROOM = 18;
-
-export function shape(tag, attributes = {}, ...children) {
-  const made = document.createElementNS(SPACE, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  made.append(...children);
-  return made;
-}
 
 // Whether an output may be connected to an input: kinds of numbers that convert, and units of one quantity.
 export function fits(from, to) {
@@ -50,16 +43,16 @@ export class Graph {
   box(name, node) {
     const made = shape("g", { transform: `translate(${node.x} ${node.y})` });
     made.append(shape("rect", { class: "node", width: WIDE, height: this.height(node), rx: 8 }));
-    const title = shape("text", { class: "title", x: WIDE / 2, y: 20, "text-anchor": "middle" });
-    title.textContent = name;
+    const title = label(WIDE / 2, 20, name, "middle");
+    title.setAttribute("class", "title");
     const grip = shape("rect", { class: "grip", width: WIDE, height: HEAD, rx: 8 });
     grip.addEventListener("pointerdown", (event) => this.take(event, { node, dx: node.x - this.at(event).x, dy: node.y - this.at(event).y }));
     made.append(title, grip);
     for (const [side, list] of [["to", inputsOf(node)], ["from", outputsOf(node)]]) {
       list.slice(0, MOST).forEach((one, n) => made.append(this.port(name, node, one, side, n)));
       if (list.length > MOST) {
-        const more = shape("text", { class: "more", x: side === "to" ? 12 : WIDE - 12, y: HEAD + LINE * MOST + 15, "text-anchor": side === "to" ? "start" : "end" });
-        more.textContent = `${list.length - MOST} more`;
+        const more = label(side === "to" ? 12 : WIDE - 12, HEAD + LINE * MOST + 15, `${list.length - MOST} more`, side === "to" ? "start" : "end");
+        more.setAttribute("class", "more");
         made.append(more);
       }
     }

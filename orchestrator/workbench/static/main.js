@@ -1,3 +1,4 @@
+/* global themeButton */
 import { fill, make } from "./dom.js";
 import { isOver, refresh, session, watch } from "./state.js";
 import { jobLine } from "./parts.js";
@@ -69,10 +70,5 @@ watch(() => {
   if (held && document.activeElement === document.body) tabs.querySelector("[aria-selected=true]").focus({ preventScroll: true });  // its Stop went with the job
 });
 
-const theme = document.getElementById("theme");
-const dark = () => (document.documentElement.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
-const label = () => { theme.textContent = dark() ? "Light" : "Dark"; theme.setAttribute("aria-label", `Use ${dark() ? "light" : "dark"} colours`); };
-theme.addEventListener("click", () => { document.documentElement.dataset.theme = dark() ? "light" : "dark"; label(); });
-label();
-
+themeButton(document.getElementById("theme"));
 go(asked(), false);

@@ -1,7 +1,7 @@
-import { fileAddress, post, upload } from "./api.js";
-import { check, choice, digits, field, fill, make, numberInput } from "./dom.js";
+import { fileAddress, post } from "./api.js";
+import { check, choice, field, fill, make, numberInput } from "./dom.js";
 import { interfaceOf } from "./fmus.js";
-import { Graph, fits, inputsOf, outputsOf, place, shape } from "./graph.js";
+import { Graph, fits, inputsOf, outputsOf, place } from "./graph.js";
 import { action, fileChoice, message } from "./parts.js";
 import { choices, choose, refresh, start, watch } from "./state.js";
 
@@ -11,16 +11,15 @@ const KINDS = {
   sine: [["amplitude", "amplitude", 1], ["frequency", "frequency [Hz]", 1], ["offset", "offset", 0]],
   square: [["amplitude", "amplitude", 1], ["period", "period [s]", 1], ["offset", "offset", 0]],
   table: [],
-  drawn: [],
 };
-const WORDS = { constant: "constant", step: "step", sine: "sine", square: "square wave", table: "a table of the session", drawn: "drawn by hand" };
+const WORDS = { constant: "constant", step: "step", sine: "sine", square: "square wave", table: "a table of the session" };
 const MASTERS = [["gauss_seidel", "one after the other"], ["jacobi", "side by side"], ["iterated", "iterated"], ["adaptive", "adaptive steps"]];
 const EMPTY = { nodes: {}, connections: [], sources: [], unwanted: [], run: { stop: 1, step: 0.001, algorithm: "gauss_seidel" } };
 
 // A scenario of several FMUs: drawn, fed, written, run. The session keeps it; `variables` of its FMUs are read anew.
 export class Scenario {
   constructor(panel, options, show) {
-    Object.assign(this, structuredClone(EMPTY), { options, show, last: "", restoring: false, drawings: [] });
+    Object.assign(this, structuredClone(EMPTY), { options, show, last: "", restoring: false });
     [this.said, this.graphSaid] = [message(), message()];
     this.editor = make("div", {});
     this.written = make("p", { class: "note", role: "status" });
@@ -106,7 +105,6 @@ export class Scenario {
     this.keep();
     this.graphSaid.say("");
     this.graph.draw(this.nodes, this.connections);
-    this.drawings = [];
     const [outs, ins] = [this.keys(outputsOf), this.keys(inputsOf)], names = Object.keys(this.nodes);
     const feed = () => { this.sources.push({ to: ins.find((key) => !this.sources.some((one) => one.to === key)) ?? ins[0], kind: "constant", value: 0 }); this.draw(); };
     fill(this.editor,
@@ -158,10 +156,7 @@ export class Scenario {
   }
 
   number(text, table, key) {
-    return field(text, numberInput({ value: table[key] ?? "", required: true }, (value) => {
-      table[key] = value;
-      this.drawings.forEach((show) => show());  // over another time
-    }));
+    return field(text, numberInput({ value: table[key] ?? "", required: true }, (value) => { table[key] = value; }));
   }
 
   sourceRow(source, ins) {
@@ -175,54 +170,15 @@ export class Scenario {
       field("Input", choice(ins.map((key) => [key, key]), source.to, (value) => { source.to = value; })), field("is", kind),
       KINDS[source.kind].map(([key, text]) => this.number(text, source, key)),
       source.kind === "table" ? [fileChoice("Table", "log", () => source.file ?? "", (file) => { source.file = file; this.keep(); }), field("Column", column)] : null,
-      this.remover(`source of ${source.to}`, () => { this.sources = this.sources.filter((one) => one !== source); })),
-      source.kind === "drawn" ? this.drawing(source) : null);
-  }
-
-  // A curve by clicks into the field, or as lines of time and value.
-  drawing(source) {
-    const { run } = this;
-    source.points ??= [[0, 0], [run.stop / 2, 1], [run.stop, 0]];
-    const size = () => Math.max(1e-9, ...source.points.map(([, value]) => Math.abs(value))) * 1.25;
-    const box = shape("svg", { class: "draw", viewBox: "0 0 400 160", role: "img" });
-    let scale = size();
-    const text = make("textarea", { rows: 4, cols: 22, onchange: () => {
-      const points = text.value.split("\n").filter((line) => line.trim() !== "").map(pairOf), wrong = !points.length || points.includes(null);
-      text.setAttribute("aria-invalid", String(wrong));
-      if (wrong) return;
-      source.points = points.sort((a, b) => a[0] - b[0]);
-      show();
-    } });
-    const show = () => {
-      text.value = source.points.map(([t, v]) => `${t}, ${v}`).join("\n");
-      scale = Math.max(scale, size());
-      drawCurve(box, source.points, run.stop, scale);
-    };
-    box.addEventListener("click", (event) => {
-      const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(box.getScreenCTM().inverse());
-      const time = Number(((run.stop * x) / 400).toPrecision(4)), value = Number((((80 - y) * scale) / 75).toPrecision(3));
-      source.points = source.points.filter(([t]) => Math.abs(t - time) > run.stop / 200).concat([[time, value]]).sort((a, b) => a[0] - b[0]);
-      show();
-      this.keep();
-    });
-    this.drawings.push(show);
-    show();
-    return make("div", { class: "row" }, box, field("Time [s], value", text));
+      this.remover(`source of ${source.to}`, () => { this.sources = this.sources.filter((one) => one !== source); })));
   }
 
   async write() {
     if (!Object.keys(this.nodes).length) throw new Error("add an FMU first");
-    const { run } = this, sources = [];
-    for (const { points, ...source } of this.sources) {
-      const made = { to: source.to, kind: source.kind, ...Object.fromEntries(KINDS[source.kind].map(([key]) => [key, source[key]])) };
-      if (source.kind === "table") Object.assign(made, { file: source.file, ...(source.column ? { column: source.column } : {}) });
-      if (source.kind === "drawn") {
-        const { file } = await upload(new File([`time,value\n${points.map((pair) => pair.join(",")).join("\n")}\n`], "drawn.csv"));
-        choose({ drawn: { [file]: true } });  // no log
-        Object.assign(made, { kind: "table", file, column: "value" });
-      }
-      sources.push(made);
-    }
+    const { run } = this, sources = this.sources.map((source) => ({
+      to: source.to, kind: source.kind, ...Object.fromEntries(KINDS[source.kind].map(([key]) => [key, source[key]])),
+      ...(source.kind === "table" ? { file: source.file, ...(source.column ? { column: source.column } : {}) } : {}),
+    }));
     const record = this.keys(outputsOf).filter((key) => !this.unwanted.includes(key));
     const instances = Object.fromEntries(Object.entries(this.nodes).map(([name, node]) => [name, { fmu: node.fmu, parameters: node.parameters }]));
     const master = { algorithm: run.algorithm, ...(run.algorithm === "adaptive" ? {} : { step: run.step }) };
@@ -247,18 +203,4 @@ function parametersOf(name, node) {
     });
     return field(`${one.name}${one.unit && one.unit !== "1" ? ` [${one.unit}]` : ""}`, input);
   })));
-}
-
-// Time and value of a line such as "0.5, 2" or "0,5; 2"; null: it does not hold two numbers.
-function pairOf(line) {
-  const parts = /[;\t]/.test(line) ? line.split(/[;\t]/).map((part) => part.trim().replace(",", ".")) : line.trim().split(/\s*,\s*|\s+/);
-  const numbers = parts.map((part) => (part === "" ? NaN : Number(part)));
-  return numbers.length === 2 && numbers.every(Number.isFinite) ? numbers : null;
-}
-
-function drawCurve(box, points, stop, scale) {
-  const line = shape("polyline", { points: points.map(([t, v]) => `${(400 * t) / stop},${80 - (75 * v) / scale}`).join(" ") });
-  const mark = (x, y, anchor, words) => Object.assign(shape("text", { x, y, "text-anchor": anchor }), { textContent: words });
-  box.setAttribute("aria-label", `Drawn curve of ${points.length} points from ${-scale} to ${scale}; the lines beside it are the same`);
-  box.replaceChildren(shape("line", { x1: 0, y1: 80, x2: 400, y2: 80 }), mark(4, 14, "start", digits(scale, 3)), mark(4, 155, "start", digits(-scale, 3)), mark(396, 76, "end", `${stop} s`), line);
 }

@@ -16,13 +16,19 @@ export async function sliders(job) {
   const plots = Object.entries(model.measured).map(([name, y]) => {
     const figure = make("figure", { class: "plot", "aria-label": TITLES[name] ?? name });
     const title = TITLES[name] ?? name;
-    return { name, figure, title, measured: { name: "measured", x: model.time, y } };
+    return { name, figure, title, said: make("p", { class: "note" }), measured: { name: "measured", x: model.time, y } };
   });
   let busy = false, again = false, begun = 0;
 
+  // The curves, what is between them, and its rms beside that of the result's own values.
   function draw(curves) {
     for (const one of plots) {
-      const series = [one.measured, { name: "simulated", x: model.time, y: curves[one.name] }];
+      const y = curves[one.name], error = y.map((value, n) => (value === null || one.measured.y[n] === null ? null : value - one.measured.y[n]));
+      const known = error.filter((value) => value !== null), rms = Math.sqrt(known.reduce((sum, value) => sum + value * value, 0) / known.length);
+      const series = [one.measured, { name: "simulated", x: model.time, y }, { name: "simulated minus measured", x: model.time, y: error }];
+      const { factor, name } = Units.shown("rad");
+      one.first ??= rms;
+      one.said.textContent = `Rms of simulated minus measured: ${digits(factor * rms)} ${name}; with the result's values: ${digits(factor * one.first)} ${name}`;
       if (one.plot) one.plot.show(series);
       else one.plot = new Plot(one.figure, { title: one.title, xLabel: "time [s]", yLabel: "angle [rad]", series, link: "sliders" });
     }
@@ -45,13 +51,13 @@ export async function sliders(job) {
   }
 
   const controls = model.sliders.map((slider) => control(slider, values, run));
-  const units = choice(["rad", "deg", "arcmin", "turns"].map((unit) => [unit, unit]), Units.chosen, (unit) => Units.choose(unit));
+  const units = choice(["rad", "deg", "arcmin", "turns"].map((unit) => [unit, unit]), Units.chosen, (unit) => { Units.choose(unit); run(); });
   const place = make("div", {});
   fill(place,
     make("div", { class: "row" }, field("Angles in", units),
       make("button", { type: "button", onclick: () => { controls.forEach(({ home }) => home()); run(); } }, "Back to the result"), said),
     make("div", { class: "cards sliders" }, controls.map(({ element }) => element)),
-    plots.map(({ title, figure }) => [make("h3", {}, title), figure]).flat());
+    plots.map(({ title, figure, said: words }) => [make("h3", {}, title), words, figure]).flat());
   await run();
   return place;
 }

@@ -1,7 +1,7 @@
 import { get, post } from "./api.js";
 
 // What the session keeps of the work, for every tab of the browser, after a restart, and at another port.
-const EMPTY = { log: "", model: "", given: "", logs: {}, fields: {}, shown: {}, before: {}, saidIn: {}, edits: {}, drawn: {} };
+const EMPTY = { log: "", model: "", given: "", logs: {}, fields: {}, shown: {}, before: {}, saidIn: {}, edits: {} };
 const NOTHING = { columns: {}, header: null };
 export const choices = structuredClone(EMPTY);
 export const session = { folder: "", files: [], jobs: [], version: 0, gone: false, unkept: "" };
