@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.shown import Block, doubts_of, table
+from orchestrator.api.shown import Block, doubts_of
 from orchestrator.diagnosis.report.corrected import (
     BeforeAfter,
     before_and_after,
@@ -116,7 +116,7 @@ class DiagnosisResult(AnyDiagnosisResult):
 
     def blocks(self) -> Sequence[Block]:
         """Return the summary, and the tables of misfits."""
-        return [*doubts_of((self.record, *self.more)), *self.summary(), *self._misfit_tables(), *_torque_table(self)]
+        return [*doubts_of((self.record, *self.more)), *self.summary(), *self._misfit_tables()]
 
     def results(self, place: Path) -> DiagnoseFound:
         """Return what ``diagnose.json`` says; the corrected FMU is in ``place``."""
@@ -179,15 +179,3 @@ class DiagnosisResult(AnyDiagnosisResult):
         gap = plant.name == "Drivetrain" and plant.value(d.workings.final, "alpha") > 0.0
         known = d.verdict != "unknown" and d.trust.level is not Level.RED
         return gap and known and self.record.theta_l is not None
-
-
-def _torque_table(diagnosis: DiagnosisResult) -> Iterator[Block]:
-    tests = [test for test in (*diagnosis.test, diagnosis.validation) if test is not None]
-    torque = [(test.source, test.torque) for test in tests if test.torque]
-    if torque:
-        rows = [[source, *(f"{100.0 * share:.2f} %" for share in shares)] for source, shares in torque]
-        yield table(
-            "Torque that is left on test data (rms), of all of it",
-            ("record", "as given", "re-fitted", "with effects"),
-            rows,
-        )

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 from orchestrator.api.sampled import SampledResult
-from orchestrator.api.shown import Block, text_table
+from orchestrator.api.shown import Block
 from orchestrator.diagnosis.report.json_results import misfit_found
 from orchestrator.diagnosis.result import DiagnosisOutcome, GradedEffect, TestMisfit
-from orchestrator.shared.results.diagnose import misfit_tables
+from orchestrator.shared.results.diagnose import misfit_tables, torque_tables
 from orchestrator.shared.trust import Trust
 
 
@@ -53,4 +53,5 @@ class AnyDiagnosisResult(SampledResult):
         report = self.diagnosis.settings.report
         tests = [misfit_found(test, report) for test in self.test]
         other = None if self.validation is None else misfit_found(self.validation, report)
-        yield from map(text_table, misfit_tables(tests, other))
+        yield from misfit_tables(tests, other)
+        yield from torque_tables([*tests, *([] if other is None else [other])])

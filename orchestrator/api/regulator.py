@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.api.at_rest import LARGEST_WEIGHT, five, margins_text, rest_text
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, table
+from orchestrator.api.shown import Block
 from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, TORQUE_WEIGHT
 from orchestrator.control.standstill import forecast_rest, loop_response
 from orchestrator.errors import ScenarioError
@@ -19,7 +19,7 @@ from orchestrator.plants.design import GAIN_UNITS, REGULATOR_STATES, DrivetrainV
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns, write_whole
-from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound
+from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound, gains_table
 
 RANGES = {"torque_weight": (1e-12, 1e12), "sample_time": (1e-4, 0.05), "delay": (0, 100)}  # s, samples
 POINTS = 400  # of the response
@@ -48,18 +48,22 @@ class RegulatorResult(PlottedResult):
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def named_gains(self) -> dict[str, float]:
+        """The gains as parameters of the FMUs: ``K[1]`` to ``K[5]``."""
+        return {f"K[{n}]": gain for n, gain in enumerate(self.gains, start=1)}
+
+    @property
     def parameters(self) -> dict[str, float]:
         """Parameters of ``LqrController`` and ``BacklashCompensator`` for this machine."""
-        gains = {f"K[{n}]": gain for n, gain in enumerate(self.gains, start=1)}
-        return gains | {"i": self.values.i, "compliance": 1.0 / self.values.k, "sample_time": self.sample_time}
+        return self.named_gains | {
+            "i": self.values.i,
+            "compliance": 1.0 / self.values.k,
+            "sample_time": self.sample_time,
+        }
 
     def blocks(self) -> Sequence[Block]:
         """Return the gains, and what the loop does."""
-        rows = [
-            (f"K[{n}]", state, f"{gain:.9g}", unit)
-            for n, (state, gain, unit) in enumerate(zip(REGULATOR_STATES, self.gains, GAIN_UNITS, strict=True), start=1)
-        ]
-        found = table("Gains of the regulator", ("gain", "state", "value", "unit"), rows)
+        found = gains_table(self.named_gains, REGULATOR_STATES, GAIN_UNITS)
         return [found, rest_text(self.forecast, "the loop"), margins_text(self.forecast)]
 
     def _response(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -74,7 +78,7 @@ class RegulatorResult(PlottedResult):
         """Return what ``regulator.json`` says."""
         frequencies, size, phases = self._response()
         return RegulatorFound(
-            gains={f"K[{n}]": gain for n, gain in enumerate(self.gains, start=1)},
+            gains=self.named_gains,
             sample_time=self.sample_time,
             delay=self.delay,
             forecast=self.forecast,

@@ -105,24 +105,6 @@ class Findings:
 
 
 @dataclass(frozen=True)
-class Bar:
-    """One bar: its ``length`` as a fraction of the longest possible, and ``text`` that says how much it is."""
-
-    name: str
-    length: float
-    text: str
-
-
-@dataclass(frozen=True)
-class Bars:
-    """Bars below each other, such as one quantity from model to model."""
-
-    title: str
-    items: tuple[Bar, ...]
-    note: str = ""
-
-
-@dataclass(frozen=True)
 class Fold:
     """Sections that are closed at first, under a title that says what they tell; folds hold no folds."""
 
@@ -130,7 +112,7 @@ class Fold:
     sections: "tuple[Section, ...]"
 
 
-Section = Text | Facts | ReportTable | Plot | Findings | Bars | Fold
+Section = Text | Facts | ReportTable | Plot | Findings | Fold
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from orchestrator.reporting.model import Bars, Facts, Findings, Fold, Plot, Report, Section, Text
+from orchestrator.reporting.model import Facts, Findings, Fold, Plot, Report, Section, Text
 from orchestrator.reporting.plots import asset, in_script, plot_data, plot_script, plot_style, rows_of_a_curve
 from orchestrator.reporting.quantities import angle_attributes, mark_prose, mark_unit
 from orchestrator.shared.numbers import cell_text
@@ -22,7 +22,6 @@ _KINDS = {
     ReportTable: "table",
     Plot: "plot",
     Findings: "findings",
-    Bars: "bars",
     Fold: "fold",
 }
 

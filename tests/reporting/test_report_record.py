@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import ScenarioError
-from orchestrator.reporting import Bars, Facts, Fold, Plot, ReportTable, Text, report_from_directory, write_report
+from orchestrator.reporting import Facts, Fold, Plot, ReportTable, Text, report_from_directory, write_report
 from orchestrator.shared.output import write_result
 from tests.support.page_results import INSPECT
 from tests.support.reports import sections
@@ -126,9 +126,6 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     assert next_step(report_from_directory(tmp_path)) == (
         "The corrected model, Corrected.fmu, must not be used as it stands."
     )
-    (bars,) = sections(report, Bars)
-    assert [b.length for b in bars.items] == [1.0, 0.5, pytest.approx(0.01)]
-    assert bars.items[2].text == "1.11 times noise"
     missing, law = plots["Missing torque: Coulomb friction at the motor"].series
     assert (missing.kind, law.kind) == ("points", "line")
     np.testing.assert_allclose(missing.low, [-1.6, np.nan, 1.4])

@@ -6,7 +6,7 @@ from typing import Annotated
 import msgspec
 import pytest
 
-from orchestrator.api.shown import text_table
+from orchestrator.api.shown import plain_block
 from orchestrator.shared.results import TrustFound, as_plain
 from orchestrator.shared.results.fields import Display, TableColumn, displays, fields_facts, fields_table
 
@@ -41,7 +41,7 @@ def test_of_a_mapping_the_names_come_first_and_no_item_leaves_the_head():
 
 
 def test_text_has_the_digits_and_facts_the_headings_of_the_description():
-    shown = text_table(fields_table("Gears", GEARS))
+    shown = plain_block(fields_table("Gears", GEARS))
     assert shown.columns == HEADS
     assert shown.rows == (("a", "3.12", "0.1", "–", "green", "x, y"), ("–",) * 6)
     assert fields_facts(GEARS[0])[2:4] == (("95 % from [rad]", 0.1), ("to [rad]", None))

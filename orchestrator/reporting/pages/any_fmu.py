@@ -15,12 +15,12 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     parameter_table,
 )
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.source import Array, ResultDocument, table_of
+from orchestrator.reporting.source import Array, ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
-from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
+from orchestrator.shared.results.any_fmu import FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import misfit_tables
-from orchestrator.shared.results.fields import Cell
+from orchestrator.shared.results.fields import Cell, fields_table
 
 STAGES = {"nominal": "model as given", "refitted": "with re-fitted parameters", "corrected": "with the effects"}
 KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
@@ -57,7 +57,7 @@ def build(source: ResultDocument) -> Report:
             *trust_section(found.trust),
             *worth_on_test_data(found.test, _test_part(found, table), ("nominal", "corrected")),
             *next_steps(found.summary),
-            *_delivery_sections(found.delivery),
+            *([fields_table("Corrected system", found.delivery)] if found.delivery else []),
             *(Fold(title, tuple(inside)) for title, inside in folds.items() if inside),
         ),
         origin=source.origin(*made),
@@ -99,17 +99,3 @@ def _residual_sections(remaining: FmuRemainingFound) -> list[Section]:
         for one in remaining.follows
     ]
     return [Facts("What is left", tuple(facts))] if facts else []
-
-
-def _delivery_sections(files: tuple[DeliveredFound, ...]) -> list[Section]:
-    """Return the corrected system, or why there is none."""
-    rows = [
-        {
-            "file": one.file,
-            "effects": ", ".join(part.effect for part in one.parts),
-            "differs from the fit by [noise]": one.difference_over_noise,
-            "note": one.note,
-        }
-        for one in files
-    ]
-    return [table_of("Corrected system", rows)] if rows else []

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.effects.words import place_words
-from orchestrator.reporting.model import Bar, Bars, Facts, Fold, Plot, Report, Section, Series, Text
+from orchestrator.reporting.model import Facts, Fold, Plot, Report, Section, Series, Text
 from orchestrator.reporting.pages import any_fmu
 from orchestrator.reporting.pages.diagnosis_answer import (
     SIGNALS,
@@ -21,13 +21,10 @@ from orchestrator.reporting.pages.diagnosis_answer import (
     worth_on_test_data,
 )
 from orchestrator.reporting.pages.diagnosis_tables import (
-    MODELS,
-    TAKES,
     VERDICTS,
     candidate_table,
     evidence_table,
     parameter_table,
-    percent,
 )
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.record import signal_plots
@@ -35,15 +32,14 @@ from orchestrator.reporting.source import ResultDocument, words
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
 from orchestrator.shared.results.diagnose import (
-    AnalysisFound,
     DiagnoseFound,
     EffectFound,
     LearnedFound,
     RemainingFound,
-    TestFound,
     misfit_tables,
+    torque_tables,
 )
-from orchestrator.shared.results.fields import ReportTable, TableColumn
+from orchestrator.shared.results.fields import fields_table
 
 KNOWN = frozenset(DiagnoseFound.__struct_fields__)
 MISSING = "The torque that the model misses without the effect, and how much of that its law accounts for."
@@ -112,12 +108,8 @@ def _on_the_corrected_model(results: DiagnoseFound) -> str:
 
 def _tests(results: DiagnoseFound) -> list[Section]:
     """Return how the models do on test data and on another record."""
-    tables = misfit_tables(results.test, results.validation, SIGNALS)
-    made: list[Section] = []
-    for test, table in zip(results.test, tables, strict=False):  # that of the other record comes last
-        made += [*_misfit_sections(test), table]
-    made += tables[len(results.test) :]
-    return made + _torque_left([*results.test, *([results.validation] if results.validation else [])])
+    tests = [*results.test, *([results.validation] if results.validation else [])]
+    return [*misfit_tables(results.test, results.validation, SIGNALS), *torque_tables(tests)]
 
 
 def _sentence(text: str) -> str:
@@ -128,26 +120,6 @@ def _effect_names(effects: Sequence[EffectFound]) -> str:
     named = [f"{place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
     listed = " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]]))
     return f"The model lacks {listed}." if named else ""
-
-
-def _misfit_sections(test: TestFound) -> list[Section]:
-    """Return bars of the misfit from model to model, as multiples of the noise."""
-    made: list[Section] = []
-    for signal, g in test.misfit.items():
-        stages = [(title, getattr(g, name)) for name, title in MODELS.items() if getattr(g, name) is not None]
-        if not stages or not g.noise:
-            continue
-        largest = max(rms for _, rms in stages) or 1.0
-        items = tuple(Bar(name, rms / largest, f"{rms / g.noise:.3g} times noise") for name, rms in stages)
-        made.append(Bars(f"Misfit of the {SIGNALS.get(signal, signal)} on test data, from model to model", items))
-    return made
-
-
-def _torque_left(tests: Sequence[TestFound]) -> list[Section]:
-    rows = tuple((t.source, *(percent(t.torque_left.get(name)) for name in MODELS)) for t in tests if t.torque_left)
-    columns = tuple(TableColumn(n) for n in ("on", *(f"{title} [%]" for title in MODELS.values())))
-    note = "Rms of the torque that the measured motion needs and the model does not explain, over that of the drive."
-    return [ReportTable("Torque that is left", columns, rows, note)] if rows else []
 
 
 def _missing_plots(effects: Sequence[EffectFound]) -> list[Section]:
@@ -198,43 +170,27 @@ def _residual_sections(remaining: RemainingFound) -> list[Section]:
     )
     made: list[Section] = [Facts("What is left", facts)] if facts else []
     if remaining.follows:
-        columns = ("at", "follows", "share [%]", TAKES, "over its uncertainty", "like")
-        rows = tuple(
-            (d.site, d.argument, percent(d.share), percent(d.gain), d.t, d.formula or None) for d in remaining.follows
-        )
         note = "Curves over one signal, x. They are no effects and no part of the corrected model."
-        made.append(ReportTable("What the rest follows", tuple(TableColumn(c, "", 3) for c in columns), rows, note))
+        made.append(fields_table("What the rest follows", remaining.follows, note))
     return made
 
 
 def _law_sections(law: LearnedFound | None) -> list[Section]:
-    """Return the law that was learned from what no effect explains: sentence, curve and knots."""
+    """Return the law that was learned from what no effect explains: sentence and curve."""
     if law is None:
         return []
-    columns = (
-        TableColumn("argument", law.argument_unit),
-        *(TableColumn(name, law.unit) for name in ("value", "95 % from", "to")),
-    )
-    rows = tuple(zip(law.knots, law.values, *law.band, strict=True))
     curve = Series("torque that is left, with its 95 % band", law.knots, law.values, "line", *law.band)
     x_label = f"{law.argument} at the {law.site} [{law.argument_unit}]"
     return [
         Text("A law learned from what is left", (_sentence(law.words),)),
         Plot("The strongest curve of what is left", x_label, f"torque [{law.unit}]", (curve,)),
-        ReportTable("Knots of the learned law", columns, rows),
     ]
 
 
 def _analysis(results: DiagnoseFound) -> list[Section]:
-    rows = tuple((a.source, a.rate, a.rows, a.rows_of_the_file, _band(a)) for a in results.analysis)
-    columns = tuple(map(TableColumn, ("record", "rate [Hz]", "rows", "rows of the file for each", "band [Hz]")))
-    made: list[Section] = [ReportTable("What was analysed", columns, rows)] if rows else []
+    made: list[Section] = [fields_table("What was analysed", results.analysis)] if results.analysis else []
     built = results.cosimulation
     if built.largest_difference_from_compiled is not None:
         difference = f"{built.largest_difference_from_compiled:.2g} {built.unit}".strip()
         made.append(Facts("The corrected FMU", (("largest difference from the compiled equations", difference),)))
     return made
-
-
-def _band(analysis: AnalysisFound) -> str:
-    return ", ".join(f"{body} {cutoff:.3g}" for body, cutoff in analysis.band.items())

@@ -4,17 +4,15 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.effects.words import place_words
 from orchestrator.reporting.model import Badge
-from orchestrator.shared.results.diagnose import EffectFound, ParameterFound, StepFound
+from orchestrator.shared.results.diagnose import TAKES, EffectFound, ParameterFound, StepFound, percent
 from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn, fields_table
 
-MODELS = {"nominal": "model as given", "parameters": "with re-fitted parameters", "final": "with the effects"}
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "none": ("good", "nothing is missing", "The model explains the record."),
     "parameters": ("good", "some values are off", "The model explains the record once its parameters are re-fitted."),
     "effects": ("neutral", "effects are missing", ""),
     "unknown": ("bad", "unexplained", "Something is missing in the model, and no effect of the library is likely."),
 }
-TAKES = "error on blocks left out that it removes [%]"
 
 
 def evidence_table(effects: Sequence[EffectFound], of: str = "missing torque") -> list[ReportTable]:
@@ -30,7 +28,7 @@ def evidence_table(effects: Sequence[EffectFound], of: str = "missing torque") -
         for e in effects
     )  # fmt: skip
     titles = (
-        "effect", "grade", TAKES, "over its uncertainty", f"explains of the {of} [%]",
+        "effect", "grade", f"{TAKES} [%]", "over its uncertainty", f"explains of the {of} [%]",
         "of the misfit on test data [%]", "in the corrected model", "not told from", "rules that lower the grade",
     )  # fmt: skip
     note = "The corrected model has the effects that are certain or likely, and those that were asked for."
@@ -66,10 +64,5 @@ def candidate_table(steps: Sequence[StepFound]) -> list[ReportTable]:
         ]
     if not rows:
         return []
-    columns = ("step", "on top of", "tried", TAKES, "over its uncertainty", "in the model")
+    columns = ("step", "on top of", "tried", f"{TAKES} [%]", "over its uncertainty", "in the model")
     return [ReportTable("What was tried", tuple(TableColumn(c, "", 3) for c in columns), tuple(rows), limit=200)]
-
-
-def percent(share: float | None) -> float | None:
-    """Return a share in percent; None where it is not known."""
-    return None if share is None else 100.0 * share

@@ -1,7 +1,6 @@
 """The page of ``estimate``: the half-gap by each method, the fit behind it, and a proposed experiment."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -9,7 +8,7 @@ from orchestrator.effects.words import list_words, place_words
 from orchestrator.reporting.model import Badge, Facts, Plot, Report, Section, Series, Text
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.location import build_location
-from orchestrator.reporting.pages.record import record_plots
+from orchestrator.reporting.pages.record import one_step_errors, record_plots
 from orchestrator.reporting.source import ResultDocument, numbers, words
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import TrustFound, read
@@ -22,13 +21,11 @@ from orchestrator.shared.results.estimate import (
 )
 from orchestrator.shared.results.fields import ReportTable, TableColumn, fields_table
 
-Json = Mapping[str, Any]
 Methods = Mapping[str, MethodFound]
 CURVE_POINTS = 121
 FLANK_POINTS = 2000
 CHI_SQUARE_95 = 3.841458820694124  # of one degree of freedom
 UNEXPLAINED = "The model does not explain what was measured"
-ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
 
 
 def build(source: ResultDocument) -> Report:
@@ -47,7 +44,7 @@ def build(source: ResultDocument) -> Report:
         *_profile(source, limit),
         *_online(source),
         *record_plots(source, "estimate.csv"),
-        *_errors(source),
+        *one_step_errors(source.signals("estimate.csv")),
     ]
     parameters = (results.diagnostics or {}).get("parameters")
     if parameters:
@@ -187,16 +184,6 @@ def _flanks(source: ResultDocument) -> list[Section]:
         "The motor's angle over the ratio, less the load's, at the same moment: plus or minus the half-gap at a flank."
     )
     return [Plot("Which flank the teeth touch", "time [s]", "load from mid-gap [rad]", series, note=note)]
-
-
-def _errors(source: ResultDocument) -> list[Section]:
-    table = source.signals("estimate.csv")
-    found = [name for name in ERRORS if name in table]
-    if not found:
-        return []
-    curves = tuple(Series(ERRORS[name], table["time"], table[name]) for name in found)
-    note = "Measured minus predicted one sample ahead: noise when the model is right."
-    return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)]
 
 
 def _design(source: ResultDocument, candidates: Sequence[ExcitationFound]) -> list[Section]:

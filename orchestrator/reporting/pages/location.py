@@ -1,7 +1,7 @@
 """The page of ``estimate`` for a train of two stages: where the gap is, and the motion that says so."""
 
 from orchestrator.reporting.model import Plot, Report, Section, Series
-from orchestrator.reporting.pages.record import record_plots
+from orchestrator.reporting.pages.record import one_step_errors, record_plots
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results.estimate import EstimateFound, LocationFound, location_tables, parameters_table
@@ -16,7 +16,7 @@ def build_location(source: ResultDocument, results: EstimateFound, location: Loc
         *location_tables(location),
         *_twists(source, location),
         *record_plots(source, "stages.csv"),
-        *_errors(source),
+        *one_step_errors(source.signals("stages.csv")),
         parameters_table("Parameters fitted with the gaps", location.parameters),
     ]
     said = f"in {location.answer}" if location.answers else "nowhere seen"
@@ -42,11 +42,3 @@ def _twists(source: ResultDocument, location: LocationFound) -> list[Section]:
         note = "From the fitted motion; between the flanks no teeth touch."
         plots.append(Plot(f"Twist of {stage}", "time [s]", "twist [rad]", tuple(series), note=note))
     return plots
-
-
-def _errors(source: ResultDocument) -> list[Section]:
-    table = source.signals("stages.csv")
-    names = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
-    curves = tuple(Series(label, table["time"], table[name]) for name, label in names.items() if name in table)
-    note = "Measured minus predicted one sample ahead: noise when the model is right."
-    return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)] if curves else []

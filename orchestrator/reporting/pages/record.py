@@ -22,6 +22,7 @@ METRIC = {"rad": "m", "rad/s": "m/s", "N.m": "N", "angle": "position", "torque":
 GIVEN = {"u": "requested"}  # what is not measured
 RUNS = {"before": "model as given", "after": "corrected model"}
 HELD = frozenset({"u"})  # from sample to sample
+ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
 MOST_SPANS = 1000
 Array = NDArray[np.float64]
 Table = Mapping[str, Array]
@@ -65,6 +66,13 @@ def signal_plots(table: Table, restarts: Sequence[int] = (), metric: bool = Fals
             yield Plot(
                 title, "time [s]", f"{signal} [{unit}]", curves, (*spans, *(moments if simulated else ())), note=note
             )
+
+
+def one_step_errors(table: Table) -> list[Section]:
+    """Return what is left of each encoder one sample ahead; nothing where the table does not have it."""
+    curves = tuple(Series(label, table["time"], table[name]) for name, label in ERRORS.items() if name in table)
+    note = "Measured minus predicted one sample ahead: noise when the model is right."
+    return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)] if curves else []
 
 
 def _words(column: str, signal: str) -> str:

@@ -4,8 +4,8 @@ from orchestrator.plants.design import GAIN_UNITS, REGULATOR_STATES
 from orchestrator.reporting.model import Facts, Plot, Report, Series
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
-from orchestrator.shared.results.fields import ReportTable, TableColumn, fields_facts
-from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound
+from orchestrator.shared.results.fields import fields_facts
+from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound, gains_table
 
 
 def build(source: ResultDocument) -> Report:
@@ -17,7 +17,7 @@ def build(source: ResultDocument) -> Report:
         title="Regulator of a drivetrain with a gap",
         summary=f"Without friction, load and limit of the torque the loop {rest}, by its gains alone.",
         sections=(
-            _gains(results),
+            gains_table(results.gains, REGULATOR_STATES, GAIN_UNITS),
             *rest_facts(f, "The loop"),
             Plot(
                 "The loop without a gap, cut at the request",
@@ -38,12 +38,6 @@ def build(source: ResultDocument) -> Report:
         origin=source.origin(),
         downloads=source.downloads(),
     )
-
-
-def _gains(results: RegulatorFound) -> ReportTable:
-    columns = (TableColumn("gain"), TableColumn("state"), TableColumn("value", digits=9), TableColumn("unit"))
-    rows = zip(results.gains, REGULATOR_STATES, results.gains.values(), GAIN_UNITS, strict=True)
-    return ReportTable("Gains", columns, tuple(rows))
 
 
 def rest_facts(f: ForecastFound | None, loop: str) -> tuple[Facts, ...]:

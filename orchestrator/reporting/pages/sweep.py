@@ -82,14 +82,8 @@ def _plots(table: Columns) -> list[Section]:
     noise = numbers(table["noise"])
     case = [f"case {_whole(c)}" for c in table["case"]]
     lower, upper = numbers(table["lower"]), numbers(table["upper"])
-    estimates, errors = [], []
-    for level in sorted({n for n in noise if n is not None}):
-        rows = [i for i, n in enumerate(noise) if n == level and estimate[i] is not None]
-        name = f"noise {level:g} rad" if level else "no noise"
-        x, labels = [alpha[i] for i in rows], [case[i] for i in rows]
-        low, high = [lower[i] for i in rows], [upper[i] for i in rows]
-        estimates.append(Series(name, x, [estimate[i] for i in rows], "points", low, high, labels))
-        errors.append(Series(name, x, [percent[i] for i in rows], "points", labels=labels))
+    estimates = _by_noise(noise, alpha, estimate, case, lower, upper)
+    errors = _by_noise(noise, alpha, percent, case)
     known = [v for v in (*alpha, *estimate) if v is not None and v > 0.0]
     wide = bool(known) and max(known) / min(known) > 10.0
     return [
@@ -97,14 +91,29 @@ def _plots(table: Columns) -> list[Section]:
             "Estimated against actual half-gap",
             "actual [rad]",
             "estimated [rad]",
-            tuple(estimates),
+            estimates,
             diagonal=True,
             log_x=wide,
             log_y=wide,
             note="Bars: the interval given with each estimate. Dashed: estimated equals actual.",
         ),
-        Plot("Error against size", "actual [rad]", "error [%]", tuple(errors), log_x=wide, log_y=True),
+        Plot("Error against size", "actual [rad]", "error [%]", errors, log_x=wide, log_y=True),
     ]
+
+
+def _by_noise(
+    noise: Sequence[float | None], x: Sequence[float | None], y: Sequence[float | None], labels: Sequence[str],
+    low: Sequence[float | None] = (), high: Sequence[float | None] = (),
+) -> tuple[Series, ...]:  # fmt: skip
+    """Return a cloud of points for each noise level."""
+    made = []
+    for level in sorted({n for n in noise if n is not None}):
+        rows = [i for i, n in enumerate(noise) if n == level and y[i] is not None]
+        least, most = ([column[i] for i in rows] if column else None for column in (low, high))
+        name = f"noise {level:g} rad" if level else "no noise"
+        told = [labels[i] for i in rows]
+        made.append(Series(name, [x[i] for i in rows], [y[i] for i in rows], "points", least, most, told))
+    return tuple(made)
 
 
 def _influences(table: Columns, units: Mapping[str, str]) -> list[Section]:
@@ -116,14 +125,10 @@ def _influences(table: Columns, units: Mapping[str, str]) -> list[Section]:
         if name in OWN:
             continue
         x, categories = _axis(table[name])
-        series = []
-        for level in sorted({n for n in noise if n is not None}):
-            rows = [i for i, n in enumerate(noise) if n == level]
-            labels = [f"case {_whole(table['case'][i])}, half-gap {alpha[i]} rad" for i in rows]
-            title = f"noise {level:g} rad" if level else "no noise"
-            series.append(Series(title, [x[i] for i in rows], [error[i] for i in rows], "points", labels=labels))
+        labels = [f"case {_whole(case)}, half-gap {size} rad" for case, size in zip(table["case"], alpha, strict=True)]
+        series = _by_noise(noise, x, error, labels)
         note = "Estimated minus actual half-gap, in percent of the actual one."
-        found.append(Plot(f"Error against {name}", name, "error [%]", tuple(series), categories=categories, note=note))
+        found.append(Plot(f"Error against {name}", name, "error [%]", series, categories=categories, note=note))
     return found[:MOST_PLOTS]
 
 

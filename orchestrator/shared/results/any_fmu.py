@@ -31,14 +31,17 @@ class PartFound(msgspec.Struct, frozen=True):
     effect: str
     values: dict[str, float | int | bool] = {}
 
+    def __str__(self) -> str:
+        return self.effect
+
 
 class DeliveredFound(msgspec.Struct, frozen=True):
     """A corrected system: its file, its parts, how far its run is from the fit, and why it could not be run."""
 
-    file: str
-    parts: tuple[PartFound, ...] = ()
-    difference_over_noise: float | None = None
-    note: str = ""
+    file: Annotated[str, Display("file")]
+    parts: Annotated[tuple[PartFound, ...], Display("effects")] = ()
+    difference_over_noise: Annotated[float | None, Display("differs from the fit by", "noise")] = None
+    note: Annotated[str, Display("note")] = ""
 
 
 class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):

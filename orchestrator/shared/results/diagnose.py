@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import msgspec
 
 from orchestrator.shared.results import Interval, LiveFound, ResultData, Sizes, TrustFound
-from orchestrator.shared.results.fields import Display, ReportTable, TableColumn, fields_table
+from orchestrator.shared.results.fields import Display, ReportTable, TableColumn, displays, fields_table
 
 
 class ValueFound(msgspec.Struct, frozen=True):
@@ -128,15 +128,33 @@ def misfit_tables(
     return [misfit_table(title, test, signals).without_empty_columns() for title, test in titled]
 
 
+def torque_tables(tests: Sequence[TestFound]) -> list[ReportTable]:
+    """Return the share of the torque that each model leaves; nothing where it is not known."""
+    titles = [display.label for display in list(displays(SignalMisfitFound).values())[:3]]
+    columns = (TableColumn("on"), *(TableColumn(title, "%") for title in titles))
+    names = ("nominal", "parameters", "final")
+    rows = tuple((t.source, *(percent(t.torque_left.get(name)) for name in names)) for t in tests if t.torque_left)
+    note = "Rms of the torque that the measured motion needs and the model does not explain, over that of the drive."
+    return [ReportTable("Torque that is left", columns, rows, note)] if rows else []
+
+
+def percent(share: float | None) -> float | None:
+    """Return a share in percent; None where it is not known."""
+    return None if share is None else 100.0 * share
+
+
+TAKES = "error on blocks left out that it removes"
+
+
 class DependenceFound(msgspec.Struct, frozen=True):
     """What is left follows a signal: its share, its gain on blocks left out with the paired error, and a formula."""
 
-    site: str
-    argument: str
-    share: float | None
-    gain: float | None
-    t: float | None
-    formula: str = ""
+    site: Annotated[str, Display("at")]
+    argument: Annotated[str, Display("follows")]
+    share: Annotated[float | None, Display("share", "%", 3, factor=100.0)]
+    gain: Annotated[float | None, Display(TAKES, "%", 3, factor=100.0)]
+    t: Annotated[float | None, Display("over its uncertainty", digits=3)]
+    formula: Annotated[str, Display("like")] = ""
 
 
 class RemainingFound(msgspec.Struct, frozen=True):
@@ -168,11 +186,11 @@ class LearnedFound(msgspec.Struct, frozen=True):
 class AnalysisFound(msgspec.Struct, frozen=True):
     """A record as it was analysed: rate [Hz], rows, rows of the file for each, and the band of each body [Hz]."""
 
-    source: str
-    rate: float
-    rows: int
-    rows_of_the_file: int
-    band: dict[str, float]
+    source: Annotated[str, Display("record")]
+    rate: Annotated[float, Display("rate", "Hz")]
+    rows: Annotated[int, Display("rows")]
+    rows_of_the_file: Annotated[int, Display("rows of the file for each")]
+    band: Annotated[dict[str, float], Display("band", "Hz", 3)]
 
 
 class TriedFound(msgspec.Struct, frozen=True):

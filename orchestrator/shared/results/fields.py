@@ -46,6 +46,8 @@ class Display:
     def _cell(self, value: Any) -> Cell:
         if isinstance(value, float):
             return self.factor * value if math.isfinite(value) else None
+        if isinstance(value, Mapping):
+            value = [f"{name} {one:.{self.digits}g}" for name, one in value.items()]
         if isinstance(value, (tuple, list)):
             value = ", ".join(f"{v:.{self.digits}g}" if isinstance(v, float) else str(v) for v in value)
         return value if isinstance(value, (int, bool)) or value is None else str(value) or None

@@ -1,11 +1,12 @@
 """What ``regulator.json`` holds: gains of an LQR, and what its loop does."""
 
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import msgspec
 
 from orchestrator.shared.results import ResultData
-from orchestrator.shared.results.fields import Display
+from orchestrator.shared.results.fields import Display, ReportTable, TableColumn
 
 
 class ForecastFound(msgspec.Struct, frozen=True):
@@ -40,3 +41,9 @@ class RegulatorFound(ResultData, frozen=True, kw_only=True):
     frequencies: tuple[float, ...] = ()
     response: tuple[float, ...] = ()
     phases: tuple[float, ...] = ()
+
+
+def gains_table(gains: Mapping[str, float], states: Sequence[str], units: Sequence[str]) -> ReportTable:
+    """Return the gains by name, each with its state and unit."""
+    columns = (TableColumn("gain"), TableColumn("state"), TableColumn("value", digits=9), TableColumn("unit"))
+    return ReportTable("Gains of the regulator", columns, tuple(zip(gains, states, gains.values(), units, strict=True)))
