@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.api.shown import Result, TextTable
+from orchestrator.api.shown import Result, table
 from orchestrator.cli import main
 from orchestrator.commands._console import print_blocks, print_table
 from orchestrator.commands._trust import note
@@ -53,11 +53,11 @@ class Named(Result):
     command = "named"
 
     def blocks(self):
-        return [f"Note: {ODD}", TextTable(ODD, ("signal", ODD), ((ODD, ODD),))]
+        return [f"Note: {ODD}", table(ODD, ("signal", ODD), ((ODD, ODD),))]
 
 
 def test_blocks_tables_and_notes_are_plain(capsys) -> None:
-    print_blocks([f"Note: {ODD}", TextTable(ODD, ("signal", ODD), ((ODD, "1"),))])
+    print_blocks([f"Note: {ODD}", table(ODD, ("signal", ODD), ((ODD, "1"),))])
     print_table(plain_text(ODD), ("a",), (("1",),))
     note(ODD)
     said = capsys.readouterr()

@@ -9,7 +9,7 @@ from benchmarks.thesis import published
 from benchmarks.thesis.errata import errata
 from benchmarks.thesis.recompute import gain_comparisons, table_comparison
 from benchmarks.thesis.tables import thesis_tables
-from orchestrator.api.shown import Block, Result, text_table
+from orchestrator.api.shown import Block, Result
 from orchestrator.paired.calibration import estimate_gap, load_or_calibrate
 from orchestrator.paired.compiled_loop import make_loop
 from orchestrator.paired.experiment import thesis_experiment
@@ -35,8 +35,7 @@ class Thesis(Result):
             '(erratum 6). A sweep of the experiment "thesis" runs our own on the same sizes.'
         )
         others = fields_table("Results of others, as the thesis quotes them", published.OTHERS)
-        tables = [text_table(table) for table in (gains, sizes, fields_table("Errata", errata()), others)]
-        return [*tables[:2], note, tests, *tables[2:]]
+        return [gains, sizes, note, tests, fields_table("Errata", errata()), others]
 
 
 def our_estimates() -> tuple[float, ...]:

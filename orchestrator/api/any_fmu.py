@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
-from orchestrator.api.shown import Block, text_table
+from orchestrator.api.shown import Block
 from orchestrator.diagnosis.fmu.corrected_ssp import write_corrected
 from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnose_records
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
@@ -143,7 +143,7 @@ def parameter_results(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
 def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
     parameters = parameter_results(diagnosis.diagnosis)
     if parameters:
-        yield text_table(fields_table("Parameters", parameters, names="parameter"))
+        yield fields_table("Parameters", parameters, names="parameter")
     yield from diagnosis._misfit_tables()
 
 

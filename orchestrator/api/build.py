@@ -104,25 +104,15 @@ def build(
         raise FmuError(f"`names` must be among {', '.join(catalogue())}, but has {unknown[0]!r}", "names")
     if platforms not in PLATFORMS:
         raise FmuError(f"`platforms` must be one of {', '.join(PLATFORMS)}, but is {platforms!r}", "platforms")
-    if native:
-        return _native(list(names) if names else None, folder, force, platforms, fmi, real_outputs, progress)
-    paths = ensure_built(list(names) if names else None, folder, force=force)
-    given = {"names": list(paths), "directory": str(folder), "force": force}
-    return BuildResult(paths, find_toolchain().remark, given)
-
-
-def _native(
-    names: Sequence[str] | None,
-    folder: Path,
-    force: bool,
-    platforms: str,
-    fmi: int,
-    real_outputs: bool,
-    progress: Callable[[str, float], None] | None,
-) -> BuildResult:
+    chosen = list(names) if names else None
+    if not native:
+        paths = ensure_built(chosen, folder, force=force)
+        return BuildResult(
+            paths, find_toolchain().remark, {"names": list(paths), "directory": str(folder), "force": force}
+        )
     here = platforms == "here"
-    paths = ensure_native(names, folder, force=force, here=here, fmi=fmi, real_outputs=real_outputs, progress=progress)
+    paths = ensure_native(chosen, folder, force=force, here=here, fmi=fmi, real_outputs=real_outputs, progress=progress)
     given = {"names": list(paths), "directory": str(folder), "force": force, "native": True, "platforms": platforms}
     given |= {"fmi": fmi} if fmi != 2 else {}
     given |= {"real_outputs": True} if real_outputs else {}
-    return BuildResult(paths, native_remark() if platforms == "all" else None, given)
+    return BuildResult(paths, None if here else native_remark(), given)

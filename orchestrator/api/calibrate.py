@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.api.any_fmu import Progress, parameter_results, read_records
-from orchestrator.api.shown import Block, Result, text_table
+from orchestrator.api.shown import Block, Result
 from orchestrator.diagnosis.fmu.diagnose import FmuCalibration, calibrate_fmu
 from orchestrator.diagnosis.fmu.mapping import read_map
 from orchestrator.diagnosis.fmu.system import read_system
@@ -50,12 +50,12 @@ class CalibrationResult(Result):
         c = self.calibration
         parameters, *misfits = calibration_tables(self.results(Path()))
         lines: list[Block] = [f"Parameters {'explain' if c.explained else 'do not explain'} the record to its noise"]
-        lines.append(text_table(parameters))
+        lines.append(parameters)
         lines += [f"Note: {text}" for text in c.notes]
         trust = self.trust
         lines.append(f"Trust: {trust.level.word}")
         lines += [f"  {reason}" for reason in trust.reasons]
-        lines += map(text_table, misfits)
+        lines += misfits
         return lines
 
     def results(self, place: Path) -> FmuCalibrationFound:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.api.estimable import require_linear
 from orchestrator.api.sampled import SampledResult
-from orchestrator.api.shown import Block, text_table
+from orchestrator.api.shown import Block
 from orchestrator.errors import ScenarioError
 from orchestrator.estimation import design as designing
 from orchestrator.estimation.apply import UNSEEN
@@ -98,7 +98,7 @@ class DesignResult(SampledResult):
         duration = float(self.arguments["duration"])
         title = f"To see a half-gap of {self.size:g} rad in {duration:g} s"
         rows = [_entry(c, " (design.csv)" if c is best else "") for c in self.candidates]
-        shown: list[Block] = [text_table(fields_table(title, rows))]
+        shown: list[Block] = [fields_table(title, rows)]
         if request is not None:
             peak = max(abs(request.number(best.torque)), abs(request.number(-best.torque)))
             shown.append(f"design.csv has the request in `{request.label}` too, at most {peak:.4g}.")

@@ -2,11 +2,11 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import msgspec
 import numpy as np
@@ -17,7 +17,7 @@ from orchestrator.api.live import live_fitted_model
 from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.plotted import PlottedResult
-from orchestrator.api.shown import Block, doubts_of, text_table
+from orchestrator.api.shown import Block, doubts_of
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation.apply import apply_method, default_method, error_bound
 from orchestrator.estimation.effort import Stop, StoppedError, never
@@ -32,42 +32,11 @@ from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
-from orchestrator.shared.results.diagnose import DiagnoseFound
 from orchestrator.shared.results.estimate import EstimateFound, MethodFound, RepeatsFound, methods_table
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Level, Trust
 
 DIAGNOSIS = "diagnosis"  # the row of a corrected model's half-gap, and the folder of its diagnosis
-
-
-class CorrectedModel(Protocol):
-    """What an estimate reads of the diagnosis of a model that does not explain the record.
-
-    ``orchestrator.diagnose`` makes one. It is asked for by its public name: only such a record needs the diagnosis.
-    """
-
-    @property
-    def seconds(self) -> float: ...
-
-    @property
-    def trust(self) -> Trust: ...
-
-    @property
-    def gap(self) -> Estimate | None: ...
-
-    @property
-    def play(self) -> Play | None: ...
-
-    @property
-    def can_compensate(self) -> bool: ...
-
-    def summary(self) -> Iterator[str]: ...
-
-    def results(self, place: Path) -> DiagnoseFound: ...
-
-    def write(
-        self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None, pictures: bool = False
-    ) -> None: ...
 
 
 @dataclass(frozen=True, repr=False)
@@ -94,7 +63,7 @@ class EstimateResult(PlottedResult):
     record: Record
     model: Model
     methods: tuple[MethodResult, ...]
-    diagnosis: "CorrectedModel | None" = None
+    diagnosis: "orchestrator.DiagnosisResult | None" = None
     arguments: Mapping[str, Any] = field(default_factory=dict)
     more: tuple[Record, ...] = ()
     repeats: Repeats | None = None
@@ -183,7 +152,7 @@ class EstimateResult(PlottedResult):
         sizes = [f"{self.best.method}: {self._play()}"] if self.estimates and self.best.visible else []
         floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_compare_diagnosis(self.estimates)}"]
         warnings = doubts_of((r, *self.more))
-        return [*warnings, text_table(methods), *sizes, *floor, *messages, *doubts, *unfit, *missing]
+        return [*warnings, methods, *sizes, *floor, *messages, *doubts, *unfit, *missing]
 
     def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says."""
@@ -358,7 +327,7 @@ def _is_unexplained(methods: Sequence[MethodResult]) -> bool:
 
 def _try_diagnosis(
     records: Sequence[Record], model: Model, report: Callable[[str, float], None], stop: Stop
-) -> tuple[CorrectedModel | None, str]:
+) -> "tuple[orchestrator.DiagnosisResult | None, str]":
     """Return what the model misses; or None, and why these records cannot be diagnosed."""
 
     def progress(done: int, most: int, what: str) -> None:
@@ -371,8 +340,7 @@ def _try_diagnosis(
 
     try:
         ask()
-        found: CorrectedModel = orchestrator.diagnose(records, model, progress=progress)
-        return found, ""
+        return orchestrator.diagnose(records, model, progress=progress), ""
     except (InputError, ConvergenceError) as error:
         return None, str(error)
     except KeyboardInterrupt:

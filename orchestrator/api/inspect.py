@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
-from orchestrator.api.shown import Block, doubts_of, text_table
+from orchestrator.api.shown import Block, doubts_of
 from orchestrator.diagnosis.data.records import check_whole
 from orchestrator.estimation.inspection.channels import (
     channels_of,
@@ -106,7 +106,7 @@ class InspectResult(PlottedResult):
         read.append(f"{r.size} rows, {r.duration:g} s{timing}; {r.n_missing} rows with missing samples")
         assumed = [f"Assumed: {'; '.join(self.assumed)}."] if self.assumed else []
         channels, *others = inspect_tables(self.results())
-        return [*read, text_table(channels), *self._between(), *map(text_table, others), *assumed, *self.verdict()]
+        return [*read, channels, *self._between(), *others, *assumed, *self.verdict()]
 
     def _between(self) -> list[str]:
         torque, speed = self.reversals

@@ -14,7 +14,7 @@ from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.records import as_record
 from orchestrator.api.sampled import SampledResult
-from orchestrator.api.shown import Block, doubts_of, text_table
+from orchestrator.api.shown import Block, doubts_of
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.estimation.effort import Stop, never
 from orchestrator.estimation.protocol import LEVEL
@@ -103,8 +103,8 @@ class LocationResult(SampledResult):
         title = f"{r.source}: {r.duration:g} s at {1.0 / r.step:g} Hz, two encoders"
         sizes, ways = location_tables(self._describe())
         doubts = [f"The answer is {self.trust.level.word}: {reason}" for reason in self.trust.reasons]
-        shown = text_table(replace(sizes, title=title))
-        return [*doubts_of([r]), shown, text_table(ways), self.message, *doubts]
+        shown = replace(sizes, title=title)
+        return [*doubts_of([r]), shown, ways, self.message, *doubts]
 
     def _describe(self) -> LocationFound:
         found = self.location

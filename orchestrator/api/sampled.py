@@ -1,4 +1,4 @@
-"""Results whose rows are samples: from one table of signals a CSV file, a frame of pandas and a dataset of xarray."""
+"""Results whose rows are samples: from one table of signals a CSV file and a frame of pandas."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.errors import ScenarioError
@@ -15,7 +15,6 @@ from orchestrator.shared.output import write_columns
 if TYPE_CHECKING:
     import numpy as np
     import pandas
-    import xarray
     from numpy.typing import NDArray
 
 
@@ -70,35 +69,14 @@ class SampledResult(PlottedResult):
         Raises:
             ScenarioError: pandas is not installed.
         """
-        time, columns = self._columns()
-        frame: pandas.DataFrame = _import("pandas", "to_dataframe").DataFrame(columns, index=time)
+        columns = dict(self.signals())
+        try:
+            pandas = import_module("pandas")
+        except ModuleNotFoundError:
+            raise ScenarioError(
+                "`to_dataframe` needs the extra [frames]: pip install 'backlash-cosim[frames]'"
+            ) from None
+        frame = pandas.DataFrame(columns, index=columns.pop("time"))
         frame.index.name = "time"
         frame.attrs["units"] = dict(self.units)
         return frame
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the samples as a dataset of xarray.
-
-        Returns:
-            An ``xarray.Dataset``: a variable each over ``time`` [s], with its unit in ``attrs["units"]``.
-
-        Raises:
-            ScenarioError: xarray is not installed.
-        """
-        time, columns = self._columns()
-        units = {name: {"units": unit} for name, unit in self.units.items() if unit}
-        variables = {name: ("time", values, units.get(name, {})) for name, values in columns.items()}
-        make: type[xarray.Dataset] = _import("xarray", "to_xarray").Dataset
-        return make(variables, {"time": ("time", time, {"units": "s"})})
-
-    def _columns(self) -> tuple[Any, dict[str, Any]]:
-        """Return time, and the other signals by name."""
-        columns = dict(self.signals())
-        return columns.pop("time"), columns
-
-
-def _import(name: str, method: str) -> Any:
-    try:
-        return import_module(name)
-    except ModuleNotFoundError:
-        raise ScenarioError(f"`{method}` needs the extra [frames]: pip install 'backlash-cosim[frames]'") from None

@@ -4,22 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 from orchestrator.plain_text import plain_text
 from orchestrator.shared.numbers import cell_text
 from orchestrator.shared.output import stage_output, write_result
-from orchestrator.shared.results.fields import ReportTable
-
-
-class Doubtful(Protocol):
-    """A record: where it is from, and what its rows say of how they were taken."""
-
-    @property
-    def source(self) -> str: ...
-
-    @property
-    def doubts(self) -> tuple[str, ...]: ...
+from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn
 
 
 @dataclass(frozen=True)
@@ -31,10 +21,10 @@ class TextTable:
     rows: tuple[tuple[str, ...], ...]
 
 
-Block = TextTable | str
+Block = ReportTable | str
 
 
-def doubts_of(records: Sequence[Doubtful]) -> list[str]:
+def doubts_of(records: Sequence[Any]) -> list[str]:
     """Return what the rows of logs say of how they were taken, a line each, for the head of a result."""
     return [f"{record.source}: {text}." for record in records for text in record.doubts]
 
@@ -151,26 +141,21 @@ def write_page(folder: Path, command: str, pictures: bool = False) -> None:
         draw_plots(folder / f"{command}.png", plots)
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:
-    """Make a table from any sequences of texts."""
-    return TextTable(title, tuple(columns), tuple(tuple(row) for row in rows))
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> ReportTable:
+    """Make a table from any sequences."""
+    return ReportTable(title, tuple(map(TableColumn, columns)), tuple(map(tuple, rows)))
 
 
-def text_table(shown: ReportTable) -> TextTable:
-    """Return a table of a page as text, its note apart."""
-    rows = [[cell_text(v, c.digits) for v, c in zip(row, shown.columns, strict=True)] for row in shown.rows]
-    return table(shown.title, [column.heading for column in shown.columns], rows)
-
-
-def plain_block(block: Block) -> Block:
-    """Return a line or a table in which names and messages steer nothing; see ``plain_text``."""
+def plain_block(block: Block) -> TextTable | str:
+    """Return a line or a table as text, in which names and messages steer nothing; see ``plain_text``."""
     if isinstance(block, str):
         return plain_text(block)
-    rows = tuple(tuple(map(plain_text, row)) for row in block.rows)
-    return TextTable(plain_text(block.title), tuple(map(plain_text, block.columns)), rows)
+    rows = [[plain_text(cell_text(v, c.digits)) for v, c in zip(row, block.columns, strict=True)] for row in block.rows]
+    headings = tuple(plain_text(column.heading) for column in block.columns)
+    return TextTable(plain_text(block.title), headings, tuple(map(tuple, rows)))
 
 
-def _text(block: Block) -> str:
+def _text(block: TextTable | str) -> str:
     if isinstance(block, str):
         return block
     lines = [block.columns, *block.rows]
@@ -180,7 +165,7 @@ def _text(block: Block) -> str:
     return "\n".join([block.title, body[0], rule, *body[1:]])
 
 
-def _html(block: Block) -> str:
+def _html(block: TextTable | str) -> str:
     if isinstance(block, str):
         return f"<p>{escape(block)}</p>"
     head = "".join(f"<th>{escape(name)}</th>" for name in block.columns)

@@ -42,9 +42,14 @@ class ExportedSsp:
             "step": self.scenario.algorithm.step,
         }
 
-    def __str__(self) -> str:
+    @property
+    def counts(self) -> str:
+        """How many FMUs and connections are in it, in words."""
         system = self.scenario.system
-        return f"{self.path}: {len(system.instances)} FMUs, {len(system.connections)} connections"
+        return f"{len(system.instances)} FMUs, {len(system.connections)} connections"
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.counts}"
 
 
 def export_ssp(

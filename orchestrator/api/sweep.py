@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.api.arguments import choose_experiment
 from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
-from orchestrator.api.shown import Block, table, text_table
+from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
 from orchestrator.engine import DesignCases, Row, Status, Sweep
 from orchestrator.engine.work import file_hash
@@ -88,7 +88,7 @@ class SweepResult(AnySweepResult):
         found = ("S [rad]", "estimate [rad]", "interval [rad]", "error [rad]", "error [%]")
         total = len(self.cases)
         errors = f"Errors by noise level ({total - self.failed} of {total} cases done, {self.failed} failed)"
-        shown_errors = text_table(fields_table(errors, self._errors(), of=ErrorsFound))
+        shown_errors = fields_table(errors, self._errors(), of=ErrorsFound)
         tables = [table(title, ("actual [rad]", "noise [rad]", *extra, *found), shown), shown_errors]
         plays = self._plays()
         if len(set(plays.values())) == 1:

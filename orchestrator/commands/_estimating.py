@@ -17,6 +17,7 @@ from orchestrator.api.locate_gap import TRAIN, complete_record, locate_gap, requ
 from orchestrator.api.shown import Block, write_page
 from orchestrator.commands._budget import Budget
 from orchestrator.commands._console import next_step, print_blocks
+from orchestrator.commands._parser import options_for
 from orchestrator.commands._reading import what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.errors import ScenarioError
@@ -59,17 +60,8 @@ def estimate_or_design(
             budget, seconds = Budget(), _tell_cost(records, model, args, settings)
             blocks += what_was_read(records)
             with budget.catching(), _show_stages(records, seconds, budget) as progress:
-                found = estimate(
-                    records,
-                    model,
-                    method=args.method,
-                    motor_only=args.motor_only,
-                    time_limit=math.inf if args.time_limit is None else args.time_limit,
-                    diagnose=not args.no_diagnose,
-                    settings=settings,
-                    progress=progress,
-                    stop=budget.why,
-                )
+                asked = options_for(estimate, args) | {"model": model, "settings": settings, "time_limit": _limit(args)}
+                found = estimate(records, **asked, diagnose=not args.no_diagnose, progress=progress, stop=budget.why)
             interrupted = budget.interrupted
             blocks += found.blocks()
             found.write_files(folder)
@@ -105,16 +97,12 @@ def locate(args: argparse.Namespace, model: Model, settings: EstimationSettings,
         raise ScenarioError(f"`DATA` must be one record with a {TRAIN}, but is {len(args.records)}")
     require_train(model)
     record = complete_record(args.records[0], model, **reading)
-    limit = math.inf if args.time_limit is None else args.time_limit
     with Stages() as stages:
         stages.begin("trying sizes", 0.0)
         found = locate_gap(
-            record,
-            model,
-            time_limit=limit,
-            settings=settings,
+            record, model, time_limit=_limit(args), settings=settings,
             progress=lambda work, stage, share: stages.at(stage, share),
-        )
+        )  # fmt: skip
     given = {name: _plain(value) for name, value in vars(args).items() if name not in ("run", "command", "pictures")}
     with stage_output(args.out, found.replaces) as folder:
         found.write(folder, args.out, {"record": str(args.records[0])} | given, args.pictures)
@@ -137,6 +125,11 @@ def _tell_cost(records: list[Record], model: Model, args: argparse.Namespace, se
         said += f"; a diagnosis, where the model does not explain the record, {diagnosis_seconds(rows):.0f} s more"
     sys.stderr.write(said + "\n")
     return seconds
+
+
+def _limit(args: argparse.Namespace) -> float:
+    """Return the time limit [s], infinity without one."""
+    return math.inf if args.time_limit is None else float(args.time_limit)
 
 
 def _plain(value: Any) -> Any:

@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import ScenarioError
@@ -33,6 +34,13 @@ def add_reading_arguments(parser: argparse.ArgumentParser, rate_too: str = "") -
     group.add_argument("--rate", type=float, metavar="HZ", help=f"{text}{rate_too}")
 
 
+def add_settings_argument(parser: argparse.ArgumentParser) -> None:
+    """Add ``--settings``."""
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.toml", help="changed thresholds, in the groups of the result"
+    )
+
+
 def reading_of(args: argparse.Namespace) -> dict[str, Any]:
     """Return the options by the names that ``read_record`` has for them."""
     if args.rate is not None and not RATES[0] <= args.rate <= RATES[1]:
@@ -58,11 +66,3 @@ def _part(text: str | None) -> tuple[float, float] | None:
     if not colon or not 0.0 <= start < end:
         raise ScenarioError(f"`part` must be START:END in seconds, such as 2:30, but is {text!r}", "part")
     return start, end
-
-
-def numbers_of(flag: str, text: str | None) -> tuple[float, ...] | None:
-    """Return the numbers of a list with commas."""
-    try:
-        return None if text is None else tuple(float(word) for word in text.split(","))
-    except ValueError:
-        raise ScenarioError(f"`{flag}` must be numbers separated by commas, but is {text!r}") from None

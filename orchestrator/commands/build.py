@@ -7,6 +7,7 @@ from orchestrator.api.build import PLATFORMS, VERSIONS, build, short_path
 from orchestrator.building.build import default_directory
 from orchestrator.building.native_build import native_directory
 from orchestrator.commands._console import print_blocks
+from orchestrator.commands._parser import options_for
 from orchestrator.commands._stages import Stages
 from orchestrator.shared.output import stage_output
 
@@ -47,16 +48,7 @@ def run(args: argparse.Namespace) -> int:
     """Build what is missing or stale and say what this machine cannot give."""
     with Stages() as stages:
         stages.begin("building", 0.0)
-        result = build(
-            args.names,
-            directory=args.out,
-            force=args.force,
-            native=args.native,
-            platforms=args.platforms,
-            fmi=args.fmi,
-            real_outputs=args.real_outputs,
-            progress=stages.at,
-        )
+        result = build(**options_for(build, args), directory=args.out, progress=stages.at)
     place = args.out or RESULTS
     with stage_output(place) as folder:
         result.write(folder, place)

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.commands._console import print_blocks, say
+from orchestrator.commands._reading import add_settings_argument
 from orchestrator.commands._trust import note_missing_walls
 from orchestrator.shared.output import stage_output
 
@@ -13,9 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("record", type=Path, metavar="DATA.csv", help="measured record")
     parser.add_argument("--fmu", type=Path, required=True, metavar="ANY.fmu", help="any FMU for co-simulation")
     parser.add_argument("--map", type=Path, required=True, metavar="MAP.toml", help="columns and uncertain parameters")
-    parser.add_argument(
-        "--settings", type=Path, metavar="FILE.toml", help="changed thresholds, in the groups of the result"
-    )
+    add_settings_argument(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,6 +6,7 @@ from pathlib import Path
 import orchestrator
 from orchestrator.api.check import check, find_fmus
 from orchestrator.commands._check import add_check_arguments, mend_fmus, read_arguments, verdicts_shown, write_reports
+from orchestrator.commands._parser import options_for
 from orchestrator.commands._trust import note_missing_walls
 from orchestrator.shared.output import stage_output
 
@@ -27,18 +28,8 @@ def run(args: argparse.Namespace) -> int:
         note_missing_walls()
     with stage_output(args.out) as folder:
         with verdicts_shown(len(paths)) as progress:
-            result = check(
-                paths,
-                static=args.static,
-                trust=args.trust,
-                policy=policy,
-                time_limit=args.time_limit,
-                total_limit=args.total_limit,
-                memory_limit=args.memory_limit,
-                size_limit=args.size_limit,
-                progress=progress,
-                tell=progress.tell,
-            )
+            given = options_for(check, args) | {"fmus": paths, "policy": policy}
+            result = check(**given, progress=progress, tell=progress.tell)
         result.write(folder, args.out)
         write_reports(args, result.verdicts)
     return 0 if result.ok else 1

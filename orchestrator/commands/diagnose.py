@@ -7,7 +7,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from orchestrator.commands._console import next_step, print_blocks, say
-from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
+from orchestrator.commands._parser import options_for
+from orchestrator.commands._reading import (
+    FORMATS,
+    add_reading_arguments,
+    add_settings_argument,
+    reading_of,
+    what_was_read,
+)
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.commands._trust import note_missing_walls
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -23,9 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "records", type=Path, nargs="+", metavar="DATA", help=f"measured records of one machine ({FORMATS})"
     )
     parser.add_argument("--model", type=Path, metavar="FILE.toml", help="nominal model")
-    parser.add_argument(
-        "--settings", type=Path, metavar="FILE.toml", help="changed thresholds, in the groups of the result"
-    )
+    add_settings_argument(parser)
     parser.add_argument(
         "--fmu",
         type=Path,
@@ -87,10 +92,8 @@ def run(args: argparse.Namespace) -> int:
     given = {name: path and str(path) for name, path in files.items()}
     with stage_output(args.out, DiagnosisResult.replaces) as folder:
         with _show_stages(sum(record.size for record in records)) as progress:
-            found = diagnose(
-                records, model, validate=other, test=tested, settings=settings, search=not args.no_search,
-                effects=args.effects, time_limit=args.time_limit, progress=progress,
-            )  # fmt: skip
+            asked = options_for(diagnose, args) | {"model": model, "validate": other, "test": tested}
+            found = diagnose(records, **asked | {"settings": settings}, search=not args.no_search, progress=progress)
         found.write(folder, args.out, given, args.pictures)
         fmu = args.out / found.fmu_name
     print_blocks([*what_was_read(records if other is None else [*records, other]), *found.blocks()])
@@ -130,11 +133,8 @@ def _any_fmu(args: argparse.Namespace) -> int:
     if args.map is None:
         raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
     with stage_output(args.out, FmuDiagnosisResult.replaces) as folder:
-        found = diagnose(
-            args.records, fmu, args.map, validate=args.validate, test=args.test, settings=args.settings,
-            search=not args.no_search, effects=args.effects, time_limit=args.time_limit,
-            progress=lambda done, expected, what: say(what),
-        )  # fmt: skip
+        given = options_for(diagnose, args) | {"model": fmu, "search": not args.no_search}
+        found = diagnose(args.records, **given, progress=lambda done, expected, what: say(what))
         try:
             found.write(folder, args.out, pictures=args.pictures)
         finally:

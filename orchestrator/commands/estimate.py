@@ -1,37 +1,21 @@
 """``estimate``: the gap, with interval, from a measured record; or the excitation that would show it."""
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of
+from orchestrator.commands._reading import FORMATS, add_reading_arguments, add_settings_argument, reading_of
 from orchestrator.errors import ScenarioError
 from orchestrator.estimation.protocol import DEFAULT_SIZE, FITTED, METHODS, WITHOUT_TORQUE
 from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.shared.settings import choose_settings
 
-
-@dataclass(frozen=True)
-class DesignOption:
-    """A number that ``--design`` takes: its name in Python, unit, default and what it means."""
-
-    name: str
-    unit: str
-    default: float
-    meaning: str
-
-    @property
-    def flag(self) -> str:
-        """Return the option of the command line."""
-        return "--" + self.name.replace("_", "-")
-
-
-DESIGN_OPTIONS = (
-    DesignOption("torque_limit", "N.m", 250.0, "largest torque to ask for"),
-    DesignOption("speed_limit", "RAD/S", 50.0, "largest speed of the motor"),
-    DesignOption("duration", "S", 10.0, "length of the proposed record"),
-    DesignOption("rate", "HZ", 200.0, "its samples per second"),
-)
+DESIGN_OPTIONS = {  # of `--design`: unit, default and meaning
+    "torque_limit": ("N.m", 250.0, "largest torque to ask for"),
+    "speed_limit": ("RAD/S", 50.0, "largest speed of the motor"),
+    "duration": ("S", 10.0, "length of the proposed record"),
+    "rate": ("HZ", 200.0, "its samples per second"),
+}
+OWN = ("torque_limit", "speed_limit", "duration")  # `--rate` is of reading, too
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,9 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--time-limit", type=float, metavar="S", help="stop without a result after this time (default: never)"
     )
-    parser.add_argument(
-        "--settings", type=Path, metavar="FILE.toml", help="changed thresholds, in the groups of the result"
-    )
+    add_settings_argument(parser)
     add_reading_arguments(parser, "; with --design also those of the proposed record (default: 200)")
     parser.add_argument(
         "--no-diagnose", action="store_true", help="run no diagnosis if the model does not explain the record"
@@ -72,9 +54,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--size", type=float, metavar="RAD", help=f"half-gap to detect (default: the estimate, or {DEFAULT_SIZE:g})"
     )
-    for option in DESIGN_OPTIONS[:-1]:
-        text = f"{option.meaning} (default: {option.default:g})"
-        group.add_argument(option.flag, type=float, metavar=option.unit, help=text)
+    for name in OWN:
+        unit, default, text = DESIGN_OPTIONS[name]
+        flag = f"--{name.replace('_', '-')}"
+        group.add_argument(flag, type=float, metavar=unit, help=f"{text} (default: {default:g})")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -101,10 +84,8 @@ def _design_options(args: argparse.Namespace) -> dict[str, float]:
         if args.method is not None:
             raise ScenarioError("`--method` must come with a record, but none is given")
     if not args.design:
-        for name in ("size", *(option.name for option in DESIGN_OPTIONS[:-1])):
+        for name in ("size", *OWN):
             if getattr(args, name) is not None:
                 raise ScenarioError(f"`{name}` must come with `design`, but that is not given", name, "design")
-    given = {option.name: getattr(args, option.name) for option in DESIGN_OPTIONS}
-    return {
-        option.name: option.default if given[option.name] is None else given[option.name] for option in DESIGN_OPTIONS
-    }
+    given = {name: (getattr(args, name), default) for name, (_, default, _) in DESIGN_OPTIONS.items()}
+    return {name: default if value is None else value for name, (value, default) in given.items()}

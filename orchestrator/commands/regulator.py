@@ -2,12 +2,13 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from orchestrator.api.records import read_model
 from orchestrator.api.regulator import design_regulator
 from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, TORQUE_WEIGHT
 from orchestrator.commands._console import print_blocks
-from orchestrator.commands._reading import numbers_of
+from orchestrator.commands._parser import numbers_of, options_for
 from orchestrator.shared.output import stage_output
 
 
@@ -35,14 +36,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Design, print and write."""
     with stage_output(arguments.out) as folder:
-        result = design_regulator(
-            read_model(arguments.model),
-            state_weights=numbers_of("--state-weights", arguments.state_weights),
-            torque_weight=arguments.torque_weight,
-            gains=numbers_of("--gains", arguments.gains),
-            sample_time=arguments.sample_time,
-            delay=arguments.delay,
-        )
+        lists = {name: getattr(arguments, name) for name in ("state_weights", "gains")}
+        given: dict[str, Any] = {name: numbers_of(f"--{name.replace('_', '-')}", text) for name, text in lists.items()}
+        given["model"] = read_model(arguments.model)
+        result = design_regulator(**options_for(design_regulator, arguments) | given)
         result.write(folder, arguments.out)
     print_blocks(result.blocks())
     print(f"Written to {arguments.out}: report.html, regulator.json, parameters.toml, loop.csv")

@@ -7,6 +7,7 @@ from orchestrator.api.pair import PairResult, run_pair
 from orchestrator.api.shown import Result
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
+from orchestrator.commands._parser import options_for
 from orchestrator.commands._safety import add_safety_arguments, safety_of
 from orchestrator.commands._trust import note
 from orchestrator.shared.output import stage_output
@@ -40,11 +41,4 @@ def _run(arguments: argparse.Namespace) -> Result:
         from orchestrator.api.simulate import simulate  # what reads scenarios, which a pair does without
 
         return simulate(arguments.scenario, safety=safety_of(arguments), tell=note)
-    return run_pair(
-        arguments.alpha,
-        noise=arguments.noise,
-        seed=arguments.seed,
-        experiment=arguments.experiment,
-        backlash_model=arguments.backlash_model,
-        time_limit=arguments.time_limit,
-    )
+    return run_pair(**options_for(run_pair, arguments))

@@ -7,6 +7,7 @@ from pathlib import Path
 from orchestrator.api.simulate import run_ssp
 from orchestrator.api.ssp import VERSIONS, export_ssp
 from orchestrator.commands._console import print_blocks
+from orchestrator.commands._parser import options_for
 from orchestrator.commands._safety import add_safety_arguments, safety_of
 from orchestrator.commands._trust import note
 from orchestrator.errors import ScenarioError
@@ -58,18 +59,10 @@ def _export(arguments: argparse.Namespace) -> int:
         _refuse(arguments, "`ssp export --scenario`", PAIR)
     name = "paired.ssp" if arguments.scenario is None else f"{arguments.scenario.stem}.ssp"
     with stage_output(arguments.out) as folder:
-        written = export_ssp(
-            folder / name,
-            arguments.scenario,
-            alpha=arguments.alpha,
-            reference=arguments.reference,
-            version=arguments.version,
-        )
+        written = export_ssp(folder / name, **options_for(export_ssp, arguments))
         write_result(folder, "ssp", _words(arguments), None, written.results())
         write_report(folder, "ssp")
-    system = written.scenario.system
-    counts = f"{len(system.instances)} FMUs, {len(system.connections)} connections"
-    print_blocks([f"Written to {arguments.out / name}: {counts}"])
+    print_blocks([f"Written to {arguments.out / name}: {written.counts}"])
     return 0
 
 
@@ -80,16 +73,8 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.file is None:
         raise ScenarioError("`ssp run` must be given an SSP file, but is given none")
     with stage_output(arguments.out) as folder:
-        result = run_ssp(
-            arguments.file,
-            stop=arguments.stop,
-            step=arguments.step,
-            inputs=_inputs(arguments.input),
-            jacobi=arguments.jacobi,
-            events=arguments.events,
-            safety=safety_of(arguments),
-            tell=note,
-        )
+        given = options_for(run_ssp, arguments) | {"inputs": _inputs(arguments.input)}
+        result = run_ssp(arguments.file, **given, safety=safety_of(arguments), tell=note)
         result.write(folder, arguments.out, _words(arguments))
     print_blocks(result.blocks())
     print_blocks([f"Written to {arguments.out}: ssp.csv, ssp.json"])

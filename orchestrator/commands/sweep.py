@@ -8,10 +8,10 @@ from orchestrator.api.scenario_sweep import ScenarioSweepResult, sweep_scenario
 from orchestrator.api.sweep import SweepResult, sweep
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
+from orchestrator.commands._parser import numbers_of, options_for
 from orchestrator.commands._progress import CaseProgress, add_engine_arguments
 from orchestrator.commands._trust import add_trust, note_missing_walls
 from orchestrator.engine import choose_tls
-from orchestrator.errors import ScenarioError
 from orchestrator.shared.output import stage_output
 
 # Where and how a sweep ran does not change what it found.
@@ -63,14 +63,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the sweep, print the table, write the results; 1 when a case failed."""
     if arguments.scenario is not None:
         refuse_with_scenario(arguments, PAIR_DEFAULTS)
-    levels = _levels(arguments.noise)
     unused = NOT_PART_OF_THE_RESULT | (PAIR_ONLY if arguments.scenario is not None else frozenset())
     given = {name: value for name, value in vars(arguments).items() if name not in unused}
     if arguments.settings is not None:
         given["settings"] = str(arguments.settings)
     with stage_output(arguments.out) as folder:
         with CaseProgress("sweep") as progress:
-            result = _sweep(arguments, levels, progress)
+            result = _sweep(arguments, progress)
         with result:
             result.write(folder, arguments.out, given)
             blocks, failed = result.blocks(), result.failed
@@ -81,47 +80,17 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
-def _sweep(
-    arguments: argparse.Namespace, levels: tuple[float, ...], progress: CaseProgress
-) -> SweepResult | ScenarioSweepResult:
+def _sweep(arguments: argparse.Namespace, progress: CaseProgress) -> SweepResult | ScenarioSweepResult:
     options = RunOptions(
-        arguments.workers,
-        arguments.scheduler,
-        arguments.time_limit,
-        arguments.memory_limit,
-        arguments.out / "sweep.journal",
-        arguments.resume,
-        progress.update,
-        arguments.parquet,
-        choose_tls(arguments.tls_ca, arguments.tls_cert, arguments.tls_key),
-        arguments.trust,
+        **options_for(RunOptions, arguments),
+        journal=arguments.out / "sweep.journal",
+        progress=progress.update,
+        tls=choose_tls(arguments.tls_ca, arguments.tls_cert, arguments.tls_key),
     )
     if arguments.scenario is not None:
         if not arguments.trust:
             note_missing_walls()
-        return sweep_scenario(
-            arguments.scenario, arguments.vary, samples=arguments.samples, seed=arguments.seed, options=options
-        )
+        return sweep_scenario(**options_for(sweep_scenario, arguments), options=options)
     return sweep(
-        arguments.sizes,
-        levels,
-        seeds=arguments.seeds,
-        seed=arguments.seed,
-        vary=arguments.vary,
-        samples=arguments.samples,
-        experiment=arguments.experiment,
-        backlash_model=arguments.backlash_model,
-        settings=arguments.settings,
-        options=options,
-        tell=say,
+        **options_for(sweep, arguments) | {"noise": numbers_of("--noise", arguments.noise)}, options=options, tell=say
     )
-
-
-def _levels(text: str) -> tuple[float, ...]:
-    try:
-        levels = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        raise ScenarioError(f"`--noise` must be numbers separated by commas, but is {text!r}") from None
-    if len(set(levels)) != len(levels):
-        raise ScenarioError(f"`--noise` must name each level once, but is {text!r}")
-    return levels
