@@ -424,8 +424,8 @@ def test_a_source_and_its_scenario_outlast_a_reload(inspected: Any, served: Serv
     wait_for_text(inspected, "panel-fmus", "drivetrain.theta_m → kalmanestimator.theta_m")
     press(inspected, "Feed an input")
     kind = "//label[normalize-space()='is']/following-sibling::select"
-    inspected.find_element("xpath", kind).send_keys("sine")
-    value = "//label[normalize-space()='frequency [Hz]']/following-sibling::input"
+    inspected.find_element("xpath", kind).send_keys("step")
+    value = "//label[normalize-space()='at [s]']/following-sibling::input"
     type_into = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))"
     inspected.execute_script(type_into, inspected.find_element("xpath", value), "1, 2")
     press(inspected, "Write it as TOML")
@@ -433,7 +433,7 @@ def test_a_source_and_its_scenario_outlast_a_reload(inspected: Any, served: Serv
     inspected.execute_script(type_into, inspected.find_element("xpath", value), "0,5")
     press(inspected, "Write it as TOML")
     written = served.folder / "files"
-    wait(inspected, lambda d: any("frequency = 0.5" in path.read_text() for path in written.glob("scenario*.toml")))
+    wait(inspected, lambda d: any("time = 0.5" in path.read_text() for path in written.glob("scenario*.toml")))
 
 
 def test_an_ssp_file_is_a_tree(inspected: Any, served: Served) -> None:
