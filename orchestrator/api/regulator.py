@@ -48,14 +48,14 @@ class RegulatorResult(PlottedResult):
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def named_gains(self) -> dict[str, float]:
+    def gains_by_name(self) -> dict[str, float]:
         """The gains as parameters of the FMUs: ``K[1]`` to ``K[5]``."""
         return {f"K[{n}]": gain for n, gain in enumerate(self.gains, start=1)}
 
     @property
     def parameters(self) -> dict[str, float]:
         """Parameters of ``LqrController`` and ``BacklashCompensator`` for this machine."""
-        return self.named_gains | {
+        return self.gains_by_name | {
             "i": self.values.i,
             "compliance": 1.0 / self.values.k,
             "sample_time": self.sample_time,
@@ -63,7 +63,7 @@ class RegulatorResult(PlottedResult):
 
     def blocks(self) -> Sequence[Block]:
         """Return the gains, and what the loop does."""
-        found = gains_table(self.named_gains, REGULATOR_STATES, GAIN_UNITS)
+        found = gains_table(self.gains_by_name, REGULATOR_STATES, GAIN_UNITS)
         return [found, rest_text(self.forecast, "the loop"), margins_text(self.forecast)]
 
     def _response(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -78,7 +78,7 @@ class RegulatorResult(PlottedResult):
         """Return what ``regulator.json`` says."""
         frequencies, size, phases = self._response()
         return RegulatorFound(
-            gains=self.named_gains,
+            gains=self.gains_by_name,
             sample_time=self.sample_time,
             delay=self.delay,
             forecast=self.forecast,

@@ -90,12 +90,12 @@ def compare_results(first: Path, second: Path) -> Report:
     plots = tuple(plot for curve in curves for plot in curve.plots)
     apart = [curve for curve in curves if curve.apart]
     compared = [n for n in both if left[n].interval and right[n].interval]
-    others = [_spaced(name) for name in beyond if name not in sure]
-    changed = _changed(documents)
+    others = [_with_spaces(name) for name in beyond if name not in sure]
+    changed = _changes(documents)
     summary = (
         f"{len(sure)} of {len(compared)} numbers with an interval differ by more than their intervals; of the others "
-        f"{len(others)} differ{_named(others)}. {len(apart)} of {len(curves)} curves differ"
-        f"{_named([f'{c.name} by {c.rms:.3g} (rms)' for c in apart])}."
+        f"{len(others)} differ{_list_names(others)}. {len(apart)} of {len(curves)} curves differ"
+        f"{_list_names([f'{c.name} by {c.rms:.3g} (rms)' for c in apart])}."
     )
     summary = f"Changed: {changed}. {summary}" if changed else summary
     badge = _badge(bool(sure), bool(compared), [curve.name for curve in apart])
@@ -119,7 +119,7 @@ def _badge(differ: bool, compared: bool, apart: list[str]) -> tuple[str, str]:
     return ("good", "no difference beyond the intervals") if compared else ("neutral", "nothing has an interval")
 
 
-def _changed(documents: Sequence[Mapping[str, Any]]) -> str:
+def _changes(documents: Sequence[Mapping[str, Any]]) -> str:
     """Return which arguments of two commands differ, in words."""
     first, second = (document.get("arguments") or {} for document in documents)
     return ", ".join(
@@ -129,7 +129,7 @@ def _changed(documents: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _named(names: list[str]) -> str:
+def _list_names(names: list[str]) -> str:
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
     return f": {', '.join(names[:MOST_NAMED])}{more}" if names else ""
 
@@ -199,12 +199,12 @@ def _table(
 
     columns = (TableColumn("quantity"), *(TableColumn(name) for name in names), TableColumn("second over first"))
     return ReportTable(title, columns, tuple(
-        (_spaced(name), cell(left, name), cell(right, name), _ratio(left.get(name), right.get(name)))
+        (_with_spaces(name), cell(left, name), cell(right, name), _ratio(left.get(name), right.get(name)))
         for name in rows
     ))  # fmt: skip
 
 
-def _spaced(name: str) -> str:
+def _with_spaces(name: str) -> str:
     """Return a name with spaces between its words; symbols such as J_m are one word."""
     return re.sub(r"(?<=[a-z]{2})_(?=[a-z]{2})", " ", name)
 
@@ -218,7 +218,7 @@ def _texts(names: tuple[str, str], documents: Sequence[Mapping[str, Any]]) -> Re
     facts = ([*facts_of(d.get("arguments")), *facts_of(d["results"])] for d in documents)
     left, right = ({name: text for name, text in found if isinstance(text, str)} for found in facts)
     rows = [
-        (_spaced(name), left.get(name, "none"), right.get(name, "none"))
+        (_with_spaces(name), left.get(name, "none"), right.get(name, "none"))
         for name in dict.fromkeys([*left, *right])
         if left.get(name) != right.get(name)
     ]
