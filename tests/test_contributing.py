@@ -35,9 +35,11 @@ print(np.abs(twist[free]).max() <= 0.02 + 1e-9, np.abs(pair.machine["T_shaft"][f
 import orchestrator as oc
 
 gap = oc.estimate("docs/examples/machine.csv", method="twist_range")
-print(gap.methods[0].method, 0.005 < gap.alpha < 0.05)
+found = gap.methods[0].estimate
+low, high = found.interval
+print(found.method, 0.005 < found.alpha < 0.05, 0.0 < low < found.alpha < high < 0.1)
 """,
-        ["twist_range", "True"],
+        ["twist_range", "True", "True"],
     ),
     "A command": (
         """
