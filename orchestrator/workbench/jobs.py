@@ -200,6 +200,7 @@ class Jobs:
         job.exit_code = code if code >= 0 else 128 - code
         stopped = job.exit_code in STOPPED or (job.stops > 0 and code != 0)
         job.state = "stopped" if stopped else "done" if _is_complete(job) else "failed"
+        job.share = 1.0 if job.state == "done" else job.share
 
     def _hear(self, job: Job, line: bytes) -> None:
         """Take a line of standard error: progress, or words."""

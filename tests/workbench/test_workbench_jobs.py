@@ -62,7 +62,7 @@ def test_the_numbers_are_those_of_the_command_line(served, log: Path, tmp_path: 
     assert (status, seen["problem"]) == (200, "")
     model = served.ask("POST", "models", {"name": "drive-columns.toml", "columns": CLICKS})[1]["file"]
     job = served.wait(served.start("inspect", [reference], model=model))
-    assert job["state"] == "done"
+    assert (job["state"], job["share"]) == ("done", 1.0)
     assert {"inspect.json", "report.html", "model.toml", "output.txt"} <= set(job["files"])
     columns = tmp_path / "columns.toml"
     columns.write_text('[columns.u]\ntorque_constant = 0.5\n[columns.theta_l]\nname = "Achse B [deg]"\n')
