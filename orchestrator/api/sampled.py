@@ -1,4 +1,4 @@
-"""Results whose rows are samples: from one table of signals a CSV file and a frame of pandas."""
+"""Results whose rows are samples: from one table of signals a CSV file, a frame of pandas and a dataset of xarray."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.errors import ScenarioError
@@ -15,6 +15,7 @@ from orchestrator.shared.output import write_columns
 if TYPE_CHECKING:
     import numpy as np
     import pandas
+    import xarray
     from numpy.typing import NDArray
 
 
@@ -70,13 +71,30 @@ class SampledResult(PlottedResult):
             ScenarioError: pandas is not installed.
         """
         columns = dict(self.signals())
-        try:
-            pandas = import_module("pandas")
-        except ModuleNotFoundError:
-            raise ScenarioError(
-                "`to_dataframe` needs the extra [frames]: pip install 'backlash-cosim[frames]'"
-            ) from None
-        frame = pandas.DataFrame(columns, index=columns.pop("time"))
+        frame: pandas.DataFrame = _import("pandas", "to_dataframe").DataFrame(columns, index=columns.pop("time"))
         frame.index.name = "time"
         frame.attrs["units"] = dict(self.units)
         return frame
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the samples as a dataset of xarray.
+
+        Returns:
+            An ``xarray.Dataset``: a variable each over ``time`` [s], with its unit in ``attrs["units"]``.
+
+        Raises:
+            ScenarioError: pandas or xarray is not installed.
+        """
+        _import("xarray", "to_xarray")
+        data = self.to_dataframe().to_xarray()
+        for name, unit in {"time": "s", **self.units}.items():
+            if unit and name in data:
+                data[name].attrs["units"] = unit
+        return data
+
+
+def _import(name: str, method: str) -> Any:
+    try:
+        return import_module(name)
+    except ModuleNotFoundError:
+        raise ScenarioError(f"`{method}` needs the extra [frames]: pip install 'backlash-cosim[frames]'") from None

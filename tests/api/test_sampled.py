@@ -34,10 +34,20 @@ def test_a_frame_has_the_samples_over_time_with_their_units():
     assert frame.attrs["units"]["plant.angle"] == "rad"
 
 
-def test_a_library_that_is_missing_is_named_with_the_cure(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(oc.InputError, match=r"`to_dataframe` needs the extra \[frames\]: pip install"):
-        _Run().to_dataframe()
+def test_a_dataset_has_the_samples_over_time_with_their_units():
+    pytest.importorskip("xarray")
+    data = _Run().to_xarray()
+    assert data["plant.angle"].attrs == {"units": "rad"}
+    assert data["note"].attrs == {}
+    assert float(data["note"].sel(time=0.5)) == 1.0
+    assert data["time"].attrs == {"units": "s"}
+
+
+@pytest.mark.parametrize(("method", "library"), [("to_dataframe", "pandas"), ("to_xarray", "xarray")])
+def test_a_library_that_is_missing_is_named_with_the_cure(monkeypatch, method, library):
+    monkeypatch.setitem(sys.modules, library, None)
+    with pytest.raises(oc.InputError, match=rf"`{method}` needs the extra \[frames\]: pip install"):
+        getattr(_Run(), method)()
 
 
 def test_the_csv_file_has_the_same_samples_and_no_word_for_none(tmp_path):
