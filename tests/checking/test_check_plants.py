@@ -24,6 +24,7 @@ MORE = (
     "early_only", "derived_early", "clipped_far", "text_plain", "tunable_late", "text_shared", "reset_initialising",
     "restored_local", "state_in_place", "bytes_pointer", "bytes_overrun", "feeds_unswitched", "asked_alone",
     "output_cached", "rates_by_steps", "quiet_count", "count_in_steps", "step_after_end",
+    "category_refused",
     "last_before", "ends_early",
 )  # fmt: skip
 CHOSEN = {(plant.cause, plant.version): plant for plant in reversed(PLANTS)}
