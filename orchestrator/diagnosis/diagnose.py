@@ -5,6 +5,7 @@ verdict.
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -16,12 +17,13 @@ from orchestrator.diagnosis.model.law_arguments import law_arguments
 from orchestrator.diagnosis.model.plant_effects import effect_parameters, effects_of, in_metres, keep_effects, unit_in
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.estimates import (
-    add_test_evidence,
+    Named,
+    Tested,
     find_drive_gain,
     interval_width,
-    open_to,
+    leave_out_refuted,
     parameter_estimates,
-    report_effect,
+    report_effects,
     share_values,
 )
 from orchestrator.diagnosis.report.hidden_gap import HiddenGap, find_hidden_gap, gap_effects, gap_parameters
@@ -33,14 +35,8 @@ from orchestrator.diagnosis.report.misfit_on_test_data import (
     with_drift,
 )
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
-from orchestrator.diagnosis.selection.evidence import (
-    effect_evidence,
-    leave_out_possible,
-    possible_effects,
-    record_evidence,
-    torque_shares,
-)
-from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence, Grade, RecordEvidence, SearchResult
+from orchestrator.diagnosis.selection.evidence import record_evidence, torque_shares
+from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
 from orchestrator.diagnosis.selection.search import fit_effects, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -131,22 +127,17 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
     searched = workings.search
     record = record_evidence(searched, _dependences(workings, model, settings))
-    evidence = effect_evidence(searched)
-    workings, evidence, test = _test(workings, evidence, record, model, settings)
-    while any(one.label in workings.search.final.labels for one in possible_effects(evidence, record, settings)):
-        workings, evidence, test = _test(workings, evidence, record, model, settings)  # without what the test refutes
+
+    def tests(found: SearchResult) -> Tested:
+        own = _with_search(workings, found)
+        misfits = misfit_on_test_data(own, model, settings)
+        return misfits, misses_of(own, model, settings), torque_comparison(own, misfits, model, settings)
+
+    result, evidence, test = leave_out_refuted(searched, record, settings, tests)
+    workings = _with_search(workings, result)
     test = with_drift(test, workings, model, settings.report)
-    result = workings.search
-    labels = result.final.labels
-    graded = tuple(
-        _grade(result if one.label in labels else searched, one, record, model, settings, one.label in labels)
-        for one in evidence
-    )
-    if len(searched.final.labels) > len(labels):
-        with_possible = (_grade(searched, one, record, model, settings, True) for one in evidence)
-        pairs = zip(graded, with_possible, strict=True)
-        graded = tuple(open_to(one, other) if one.in_model else one for one, other in pairs)
-    graded = share_values(graded, labels, model.plant)
+    graded = report_effects(searched, result, evidence, partial(_words, model, result), record, settings)
+    graded = share_values(graded, result.final.labels, model.plant)
     effects = tuple(sorted((effect for effect in graded if not effect.of_log), key=lambda effect: -effect.grade))
     parameters = parameter_estimates(result.problem, result.final, settings.report.level)
     parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}
@@ -172,37 +163,21 @@ def _dependences(workings: Workings, model: Model, settings: DiagnosisSettings) 
     return find_dependences(result, arguments, settings.selection)
 
 
-def _test(
-    workings: Workings, evidence: Sequence[EffectEvidence], record: RecordEvidence, model: Model,
-    settings: DiagnosisSettings,
-) -> tuple[Workings, list[EffectEvidence], tuple[TestMisfit, ...]]:  # fmt: skip
-    """Return the workings without effects that are not even likely, what test data say of the others, and the misfits
-    on them.
-    """
-    result, evidence = leave_out_possible(workings.search, evidence, record, settings)
-    final = workings.balances[0].physical_values(result.problem.record_points(result.final.point)[0])
-    workings = replace(workings, search=result, final=final)
-    test = misfit_on_test_data(workings, model, settings)
-    compared = torque_comparison(workings, test, model, settings)
-    return workings, add_test_evidence(evidence, result, test, misses_of(workings, model, settings), compared), test
+def _with_search(workings: Workings, search: SearchResult) -> Workings:
+    final = workings.balances[0].physical_values(search.problem.record_points(search.final.point)[0])
+    return replace(workings, search=search, final=final)
 
 
-def _grade(
-    result: SearchResult, evidence: EffectEvidence, record: RecordEvidence, model: Model, settings: DiagnosisSettings,
-    in_model: bool,
-) -> GradedEffect:  # fmt: skip
-    plant = model.plant
-    effect = result.problem.effects[evidence.label]
-    row = next(row for row in plant.bank if row.label == evidence.label)
+def _words(model: Model, search: SearchResult, label: str) -> tuple[Named, Mapping[str, str]]:
+    """Return what makes parameters of an effect's values, and their units, both by short name."""
+    plant, effect = model.plant, search.problem.effects[label]
+    row = plant.effect(label)
 
     def values_by_name(values: Values) -> Mapping[str, float]:
         full = effect_parameters(plant, effect, values)
         return {short: full[name] for short, name in row.parameters.items()}
 
-    units = {short: unit_in(plant.entry(place).unit, model, short) for short, place in row.places(plant).items()}
-    return replace(
-        report_effect(result, evidence, values_by_name, units, record, settings, in_model), of_log=row.measurement
-    )
+    return values_by_name, {n: unit_in(plant.entry(place).unit, model, n) for n, place in row.places(plant).items()}
 
 
 def _nuisances(

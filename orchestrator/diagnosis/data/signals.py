@@ -5,6 +5,9 @@ A second difference of samples is the average of the acceleration over two inter
 All terms of a balance are brought under the same average: a torque that is held over a sample gives ``(u[k-1] +
 u[k])/2``, what is smooth gives ``(x[k-1] + 10 x[k] + x[k+1])/12`` (Numerov's weights). No term then depends on the
 sample time.
+
+In all functions: ``values``, ``angle`` [rad], ``torque`` [N.m]: (n,); ``frequencies``: (f,) [Hz]; ``step``: sample
+time [s].
 """
 
 from dataclasses import dataclass, field
@@ -104,10 +107,6 @@ def motion_band(angle: Array, step: float, settings: BandSettings) -> float:
 
     The noise of an angle is white; its level is read where the spectrum of the second difference is highest in
     frequency.
-
-    Args:
-        angle: (n,) [rad].
-        step: sample time [s].
     """
     count = angle.size
     frequencies, power = _spectrum(np.diff(angle, 2) / step**2, step, 2048)
@@ -131,14 +130,7 @@ def motion_band(angle: Array, step: float, settings: BandSettings) -> float:
 
 
 def coherent_band(torque: Array, angle: Array, step: float, inertia: float, settings: BandSettings) -> float:
-    """Return the frequency [Hz] up to which the nominal inertia needs no more torque than there is.
-
-    Args:
-        torque: (n,) [N.m].
-        angle: (n,) [rad].
-        step: sample time [s].
-        inertia: nominal inertia [kg.m2].
-    """
+    """Return the frequency [Hz] up to which the nominal ``inertia`` [kg.m2] needs no more torque than there is."""
     frequencies, acceleration = _spectrum(np.diff(angle, 2) / step**2, step, 1024, "constant")
     _, asked = _spectrum(torque[1:-1], step, 1024, "constant")
     mean = np.ones(5) / 5.0
@@ -151,45 +143,26 @@ def coherent_band(torque: Array, angle: Array, step: float, inertia: float, sett
 
 
 def second_difference_gain(frequencies: Array, step: float) -> Array:
-    """Return the gain (n,) [1/s2] from an angle to its second difference over ``step`` squared, sign left out.
-
-    Args:
-        frequencies: (n,) [Hz].
-        step: sample time [s].
-    """
+    """Return the gain (f,) [1/s2] from an angle to its second difference over ``step`` squared, sign left out."""
     return np.asarray((2.0 - 2.0 * np.cos(2.0 * np.pi * frequencies * step)) / step**2)
 
 
 def first_derivative(values: Array, step: float) -> Array:
-    """Return the derivative (n,) by central differences of fourth order; zero within two rows of either end.
-
-    Args:
-        values: (n,).
-        step: sample time [s].
-    """
+    """Return the derivative (n,) by central differences of fourth order; zero within two rows of either end."""
     found = np.zeros_like(values)
     found[2:-2] = (8.0 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) / (12.0 * step)
     return found
 
 
 def second_derivative(values: Array, step: float) -> Array:
-    """Return second differences over ``step`` squared (n,); zero at either end.
-
-    Args:
-        values: (n,).
-        step: sample time [s].
-    """
+    """Return second differences over ``step`` squared (n,); zero at either end."""
     found = np.zeros_like(values)
     found[1:-1] = (values[2:] - 2.0 * values[1:-1] + values[:-2]) / step**2
     return found
 
 
 def triangle_average(values: Array) -> Array:
-    """Return the average (n,) of a smooth signal under the triangle of a second difference (Numerov's weights).
-
-    Args:
-        values: (n,).
-    """
+    """Return the average (n,) of a smooth signal under the triangle of a second difference (Numerov's weights)."""
     found = values.copy()
     found[1:-1] = (values[2:] + 10.0 * values[1:-1] + values[:-2]) / 12.0
     return found
@@ -198,10 +171,7 @@ def triangle_average(values: Array) -> Array:
 def smooth(values: Array, step: float, frequency: float) -> Array:
     """Return values (n,) below a ``frequency`` [Hz], without a shift in time.
 
-    Args:
-        values: (n,).
-        step: sample time [s].
-        frequency: of the sixth-order low-pass, passed forwards and backwards: a third of it passes to 1e-5.
+    The low-pass of order six is passed forwards and backwards: a third of its frequency passes to 1e-5.
     """
     if frequency * step > 0.4:
         return values

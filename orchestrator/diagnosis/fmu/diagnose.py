@@ -21,19 +21,10 @@ from orchestrator.diagnosis.inference.fitting import fit_model, value_covariance
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParameter
-from orchestrator.diagnosis.report.estimates import (
-    add_test_evidence,
-    parameter_estimates,
-    report_effect,
-)
+from orchestrator.diagnosis.report.estimates import Tested, leave_out_refuted, parameter_estimates, report_effects
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
-from orchestrator.diagnosis.selection.evidence import (
-    effect_evidence,
-    leave_out_possible,
-    possible_effects,
-    record_evidence,
-    torque_shares,
-)
+from orchestrator.diagnosis.selection.evidence import record_evidence, torque_shares
+from orchestrator.diagnosis.selection.outcome import SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
 from orchestrator.diagnosis.selection.search import fit_effects, search_effects
 from orchestrator.diagnosis.selection.settling import fit_base
@@ -133,20 +124,17 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     searched, problem = workings.search, workings.problem
     arguments = port_arguments(workings.residuals)
     record = record_evidence(searched, find_dependences(searched, arguments, settings.selection))
-    evidence = effect_evidence(searched)
-    found = searched
-    while True:  # until test data refute none of what is left
-        found, evidence = leave_out_possible(found, evidence, record, settings)
-        workings = replace(workings, search=found)
-        test = misfit_on_test_data(workings)
-        evidence = add_test_evidence(evidence, found, test, misses_of(workings))
-        if not any(one.label in found.final.labels for one in possible_effects(evidence, record, settings)):
-            break
-    graded = []
-    for one in evidence:
-        effect, in_model = workings.residuals[0].placed[one.label], one.label in found.final.labels
-        source, units = found if in_model else searched, effect_units(problem, effect)
-        graded.append(report_effect(source, one, effect.values_by_name, units, record, settings, in_model))
+
+    def tests(one: SearchResult) -> Tested:
+        own = replace(workings, search=one)
+        return misfit_on_test_data(own), misses_of(own), lambda point: None
+
+    found, evidence, test = leave_out_refuted(searched, record, settings, tests)
+    placed = workings.residuals[0].placed
+    graded = report_effects(
+        searched, found, evidence, lambda label: (placed[label].values_by_name, effect_units(problem, placed[label])),
+        record, settings,
+    )  # fmt: skip
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, arguments, settings.selection)
     left = torque_shares(found.problem, found.final.point)
@@ -160,7 +148,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     return FmuDiagnosis(
         verdict, tuple(sorted(graded, key=lambda effect: -effect.grade)), parameters,
         dict(zip(problem.outputs, map(float, left), strict=True)), remaining, test, record, trust, tuple(notes),
-        settings, searched.searched, problem.map, workings,
+        settings, searched.searched, problem.map, replace(workings, search=found),
     )  # fmt: skip
 
 

@@ -4,8 +4,9 @@ A signal that is fed back, or handed from FMU to FMU, is extrapolated to the mid
 of order two in the step, where the plain value is of order one and looks like physics (a sampled spring is a negative
 damper).
 
-In all functions: ``k``: number of the step, from 0; ``step``: its length [s]; ``n``: place of a member. Tables that
-:func:`run_loop` explains mean the same everywhere.
+In all functions: ``k``: number of the step, from 0; ``step``: its length [s]; ``n``: place of a member; ``fine``:
+(n,) means over communication steps; ``before``: value of a signal until the first step; ``constant``: of a lag [s],
+positive; ``out``: filled. Tables that :func:`run_loop` explains mean the same everywhere.
 """
 
 from math import exp, isfinite
@@ -40,14 +41,7 @@ Outcome = Annotated[Any, ArrayKind(WHOLE, (4,))]
 
 
 def lag_input(fine: Reals, step: float, constant: float, before: float, out: Reals) -> None:
-    """Fill ``out`` (n,) with a signal behind a lag of first order.
-
-    Args:
-        fine: (n,) means over communication steps.
-        constant: of the lag [s], positive.
-        before: value of the signal until the first step.
-        out: (n,) what comes of it, filled.
-    """
+    """Fill ``out`` (n,) with a signal behind a lag of first order."""
     decay = exp(-step / constant)
     mean = constant / step * (1.0 - decay)
     x = before
@@ -58,13 +52,7 @@ def lag_input(fine: Reals, step: float, constant: float, before: float, out: Rea
 
 
 def limit_rate(fine: Reals, step: float, rate: float, before: float, out: Reals) -> None:
-    """Fill ``out`` (n,) with a signal that cannot change by more than ``rate`` a second.
-
-    Args:
-        fine: (n,) means over communication steps.
-        before: value of the signal until the first step.
-        out: (n,) what comes of it, filled.
-    """
+    """Fill ``out`` (n,) with a signal that cannot change by more than ``rate`` a second."""
     x = before
     for k in range(len(fine)):
         gap = fine[k] - x
@@ -79,13 +67,7 @@ def limit_rate(fine: Reals, step: float, rate: float, before: float, out: Reals)
 
 
 def lag_output(rows: Reals, step: float, constant: float, out: Reals) -> None:
-    """Fill ``out`` (n,) with samples of an output behind a lag of first order, straight lines between its samples.
-
-    Args:
-        rows: (n,) samples.
-        constant: of the lag [s], positive.
-        out: (n,) what comes of it, filled.
-    """
+    """Fill ``out`` (n,) with samples ``rows`` (n,) behind a lag of first order, straight lines between them."""
     decay = exp(-step / constant)
     out[0] = rows[0]
     for k in range(1, len(rows)):
@@ -95,15 +77,11 @@ def lag_output(rows: Reals, step: float, constant: float, out: Reals) -> None:
 
 
 def efforts_along(law: int, x: Reals, v: Reals, a: Reals, q: Reals, step: float, out: Reals) -> None:
-    """Fill ``out`` (n,) with the effort against a motion that a law has in each sample.
+    """Fill ``out`` (n,) with the effort against a motion that a law of ``laws.body`` has in each sample.
 
     Args:
-        law: number of the law in ``laws.body``.
-        x: (n,) position.
-        v: (n,) speed.
-        a: (n,) acceleration.
-        q: (4,) its parameters.
-        out: (n,) what comes of it, filled.
+        x, v, a: (n,) position, speed, acceleration.
+        q: (4,) parameters of the law.
     """
     built = 0.0
     for k in range(len(x)):

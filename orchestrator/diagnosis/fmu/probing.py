@@ -96,11 +96,7 @@ def _step_notes(problem: FmuProblem) -> list[str]:
 
 
 def _probe_ports(problem: FmuProblem, base: Array) -> list[str]:
-    """Leave ports out whose input moves nothing, find out in which direction the others act, and say so.
-
-    Args:
-        base: (n, reads) the nominal run.
-    """
+    """Leave ports out whose input moves nothing, find out in which direction the others act, and say so."""
     for n, name in enumerate(problem.outputs):
         if np.ptp(base[:, n]) == 0.0 < np.ptp(problem.data.outputs[:, n]):
             raise FmuError(
@@ -202,7 +198,7 @@ def output_noise(given: Map, data: FmuRecord, traces: Sequence[Array]) -> tuple[
         traces: (n, outputs) each: what was measured, and what a model leaves of it; the smoothest counts.
 
     Returns:
-        Shape (outputs,), in the units of the outputs; and a sentence for each output whose record shows another.
+        Noise (outputs,), and a sentence for each output whose record shows another.
     """
     shown = np.min([third_differences(trace) for trace in traces], axis=0)
     least = 1.0 + LOUDER * SCATTER / np.sqrt(len(data.outputs))

@@ -118,10 +118,9 @@ class FmuProblem:
         return Run(self.starts(model), self.table(model), tuple(ports), tuple(laws))
 
     def plain_table(self, rows: int | None = None) -> Array:
-        """Return the recorded inputs over every communication step up to ``rows`` samples (default: all).
+        """Return the recorded inputs (steps, inputs) up to ``rows`` samples (default: all), the same array each time.
 
-        Returns:
-            Shape (steps, inputs), the same array each time; inputs without a column are 0.
+        Inputs without a column are 0.
         """
         rows = self.n if rows is None else rows
         if (rows, self.m) not in self._tables:

@@ -102,11 +102,7 @@ def _misfit(workings: FmuWorkings, problem: FmuProblem, first: int, number: int)
 
 
 def misses_of(workings: FmuWorkings) -> Callable[[ModelPoint], float]:
-    """Return what says how much runs of a model miss of the test data.
-
-    Returns:
-        A model's values -> the sum of squares over the outputs, in units of their noise.
-    """
+    """Return a model's values -> squares that its runs miss of the test data, in units of the outputs' noise."""
     problems = _test_problems(workings)
 
     def total(point: ModelPoint) -> float:

@@ -6,7 +6,6 @@ measured pulse responses. With them the analysis whitens residuals as it does th
 
 from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -98,14 +97,7 @@ class FmuResiduals(ResidualModel):
         return runs
 
     def start_change(self, point: ModelPoint, rows: int) -> Array:
-        """Return what the state at the start changes of the outputs.
-
-        Args:
-            rows: of the result, a quarter more than those of the record at most.
-
-        Returns:
-            Shape (outputs, rows).
-        """
+        """Return (outputs, rows) what the state at the start changes; a quarter more rows than the record's at most."""
         return np.asarray(np.tensordot(point.parameters[len(self._order) :], self._start[:, :, :rows], 1))
 
     def is_possible(self, label: str, point: ModelPoint) -> bool:
@@ -118,10 +110,6 @@ class FmuResiduals(ResidualModel):
         del point
         return np.ascontiguousarray(self.problem.data.outputs.T)
 
-    def inertia_shares(self) -> Mapping[str, float]:
-        """Return nothing: no parameter of an FMU must show in every record; see :class:`ResidualModel`."""
-        return {}
-
     def without_start(self) -> "FmuResiduals":
         """Return the model with the start as the FMU has it."""
         other = copy(self)
@@ -129,12 +117,6 @@ class FmuResiduals(ResidualModel):
         other.parameters = self.parameters[: len(self._order)]
         other._nominal = ModelPoint.nominal(other.parameters)
         other._responses = {(other._nominal.parameters, ()): self._responses_at(self._nominal)}
-        return other
-
-    def without_priors(self, spread: float) -> "FmuResiduals":
-        """Return the model with every parameter unknown; see :class:`ResidualModel`."""
-        other = copy(self)
-        other.parameters = tuple(entry if entry.local else replace(entry, spread=spread) for entry in self.parameters)
         return other
 
     # --- noise ---------------------------------------------------------------------------------------------
@@ -210,14 +192,7 @@ class FmuResiduals(ResidualModel):
         return change
 
     def respond_to_effort(self, port: str, effort: Array) -> Array:
-        """Return what an effort against the motion at a port changes of the residuals, by the nominal responses.
-
-        Args:
-            effort: (n,) in its unit.
-
-        Returns:
-            Shape (outputs, n).
-        """
+        """Return (outputs, n) what an effort (n,) against the motion at a port changes, by the nominal responses."""
         problem = self.problem
         _, responses = self._responses_at(self._nominal)
         push = np.zeros((1, self.size))

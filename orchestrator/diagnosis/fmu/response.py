@@ -45,14 +45,7 @@ class PulseResponses:
         return True
 
     def change_outputs(self, pushes: Array, place: int) -> Array:
-        """Return what efforts at an input change of the outputs.
-
-        Args:
-            pushes: (trials, n) efforts, each held over a sample.
-
-        Returns:
-            Shape (trials, outputs, n).
-        """
+        """Return (trials, outputs, n) what efforts (trials, n) at an input, held over samples, change."""
         length = next_fast_len(2 * self.size)
         total = np.zeros((len(pushes), self.found[place][0].shape[1], length // 2 + 1), dtype=complex)
         for spectrum, row, end in self._spectra(place, length):
@@ -74,11 +67,8 @@ class PulseResponses:
     def frequency_response(self, frequencies: Array, step: float, memory: float) -> Complex:
         """Return the transfer (f, outputs, inputs) from efforts to outputs.
 
-        Responses fade over a share of the record: an integrator would have no spectrum.
-
-        Args:
-            frequencies: (f,) [Hz], evenly spaced from zero on.
-            step: sample time [s].
+        Responses fade over a share of the record: an integrator would have no spectrum. ``frequencies`` (f,) [Hz] are
+        evenly spaced from zero on.
         """
         from scipy.signal import czt
 
@@ -98,11 +88,7 @@ class PulseResponses:
 
 
 def measure_responses(problem: FmuProblem, model: FmuModel, places: Sequence[int]) -> tuple[Array, PulseResponses]:
-    """Return the run of a model, and its responses to pulses at some inputs.
-
-    Returns:
-        All that is read (n, reads), and the responses.
-    """
+    """Return all that is read (n, reads) in a run of a model, and its responses to pulses at some inputs."""
     count = problem.settings.pulses
     rows = tuple(int(row) for row in np.unique(np.arange(count) * problem.n // count))
     reads, runs = problem.pulse_runs(model, rows, places)

@@ -69,11 +69,7 @@ class FittedModel:
 
 
 def value_covariance(fitted: FittedModel) -> Array:
-    """Return the covariance (coordinates, coordinates) of fitted values.
-
-    Returns:
-        That of white residuals, with each standard error at least what blocks differ by.
-    """
+    """Return the covariance (coordinates, coordinates) of white residuals, no error below what blocks differ by."""
     white, blocks = fitted.covariance, fitted.jackknife
     wider = np.sqrt(np.maximum(np.diag(blocks) / np.maximum(np.diag(white), 1e-300), 1.0))
     return np.asarray(white * np.outer(wider, wider))
@@ -159,12 +155,9 @@ def _variance_at_ends(
     problem: FitProblem, point: ModelPoint, coordinates: Sequence[Coordinate], residual: Array, jacobian: Array,
     idle: NDArray[np.int64],
 ) -> Array:  # fmt: skip
-    """Return the variances of values that change no residual when they grow.
+    """Return the variances (idle,) of values that change no residual when they grow.
 
     One that stands at the upper end of its range is as sure as the way back says; of another one nothing is known.
-
-    Args:
-        idle: (values,) places of the coordinates.
     """
     moved = [problem.move_point(point, [coordinates[n]], np.array([-1.0])) for n in idle]
     both = jacobian.copy()
@@ -180,11 +173,9 @@ def _variance_at_ends(
 def leave_blocks_out(
     residual: Array, jacobian: Array, normal: Array, gradient: Array, blocks: NDArray[np.int64]
 ) -> tuple[Array, Array]:
-    """Return the residuals (rows,) of each block at the values that the others ask for, and how these move.
+    """Return the residuals (rows,) of each block at the values that the others ask for, and these shifts.
 
     Args:
-        residual: (rows,) at the fit.
-        jacobian: (rows, values) there.
         normal: (values, values) ``J'J`` and the prior's share.
         gradient: (values,) ``J'r`` and the prior's share.
         blocks: (rows,) block of each residual.

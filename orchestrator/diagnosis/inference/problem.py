@@ -129,14 +129,7 @@ class FitProblem:
         return [np.concatenate(of_records) for of_records in zip(*parts, strict=True)]
 
     def changes(self, point: ModelPoint, residual: Array, trials: Sequence[tuple[str, Values]]) -> list[Array]:
-        """Return what effects change of the whitened residuals, approximately where a model can tell.
-
-        Args:
-            residual: (rows,) whitened residuals there.
-
-        Returns:
-            The change (rows,) for each.
-        """
+        """Return what each effect changes (rows,) of the whitened residuals, approximately where a model can tell."""
         found = [np.empty(residual.size) for _ in trials]
         first = 0
         for model, whitening, seen in zip(self.models, self.whitenings, self.record_points(point), strict=True):
@@ -168,11 +161,7 @@ class FitProblem:
         return [*range(len(self.parameters)), *((label, n) for label in point.effects for n in effects[label].fitted)]
 
     def move_point(self, point: ModelPoint, coordinates: Sequence[Coordinate], steps: Array) -> ModelPoint:
-        """Return a point moved by steps: shares of parameters, scales of effects' values; bounds are kept.
-
-        Args:
-            steps: (coordinates,) how far.
-        """
+        """Return a point moved by steps (coordinates,): shares of parameters, scales of values; bounds are kept."""
         parameters = list(point.parameters)
         effects = {label: list(values) for label, values in point.effects.items()}
         for coordinate, step in zip(coordinates, steps, strict=True):
@@ -191,9 +180,6 @@ class FitProblem:
 
     def jacobian(self, point: ModelPoint, coordinates: Sequence[Coordinate], residual: Array) -> Array:
         """Return the derivatives (rows, coordinates) of the whitened residuals by differences.
-
-        Args:
-            residual: (rows,) at the point.
 
         Raises:
             LinAlgError: there are none, since the machine runs away.

@@ -71,11 +71,7 @@ class Whitening:
         return np.asarray(np.exp(2j * np.pi * np.arange(len(self.weights)) * first / self.length))
 
     def back_filter(self, whitened: Array, channel: int) -> Array:
-        """Return (n,) the gradient of half the squared whitened residuals by the residuals of a channel.
-
-        Args:
-            whitened: (channels * m,) as :meth:`apply` gives them.
-        """
+        """Return (n,) the gradient of half the squared ``whitened`` residuals by the residuals of a channel."""
         count = len(self.active)
         spread = np.zeros((count, self.length))
         spread[:, self.rows] = whitened.reshape(count, -1) * self.active
@@ -134,13 +130,7 @@ def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSett
 
 
 def spectral_matrix(model: ResidualModel, frequencies: Array, measurement: Array, process: Array) -> Complex:
-    """Return the spectral matrix (f, channels, channels) of noise at some levels.
-
-    Args:
-        frequencies: (f,) [Hz].
-        measurement: (m,) levels of the encoders' noise.
-        process: (k,) levels of unknown torques.
-    """
+    """Return the spectral matrix (f, channels, channels) of encoders' noise and unknown torques at some levels."""
     sources = model.noise_sources(frequencies)
     return _matrix(sources.measurement, measurement) + _matrix(sources.process, process, RIDGE)
 

@@ -1,4 +1,8 @@
-"""What a drive makes of its request, under the triangle average of the torque balances."""
+"""What a drive makes of its request, under the triangle average of the torque balances.
+
+In all functions: ``requests``: (n,) requested torque [N.m]; ``values``: (n,); ``lag``: time constant [s]; ``step``:
+sample time [s].
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +28,7 @@ def logged_torque(plant: Plant, p: Array, held: Array, smoothing: Array) -> Arra
 
 
 def delivered_torque(plant: Plant, p: Array, requests: Array, step: float, held: bool) -> Array:
-    """Return the drive's torque (n,) [N.m] under the triangle average: behind limit, rate, lags and dead time.
-
-    Args:
-        requests: (n,) requested torque [N.m].
-        step: sample time [s].
-    """
+    """Return the drive's torque (n,) [N.m] under the triangle average: behind limit, rate, lags and dead time."""
     drive = plant.drive
     limit = plant.value(p, drive.limit)
     requests = np.clip(requests, -limit, limit)
@@ -51,22 +50,12 @@ def delivered_torque(plant: Plant, p: Array, requests: Array, step: float, held:
 
 
 def average_of_held(requests: Array) -> Array:
-    """Return the triangle average (n,) of requests that are held over each sample: exactly half the sum of two.
-
-    Args:
-        requests: (n,).
-    """
+    """Return the triangle average (n,) of requests that are held over each sample: exactly half the sum of two."""
     return np.concatenate([requests[:1], 0.5 * (requests[1:] + requests[:-1])])
 
 
 def hold_behind_lag(requests: Array, lag: float, step: float) -> Array:
-    """Return the triangle average (n,), exactly, of a first-order lag behind held requests; it is at rest at first.
-
-    Args:
-        requests: (n,).
-        lag: time constant [s].
-        step: sample time [s].
-    """
+    """Return the triangle average (n,), exactly, of a first-order lag behind held requests; it is at rest at first."""
     ratio = step / lag
     decay = np.exp(-ratio)
     state = lfilter([0.0, 1.0 - decay], [1.0, -decay], requests)
@@ -77,13 +66,7 @@ def hold_behind_lag(requests: Array, lag: float, step: float) -> Array:
 
 
 def apply_lag(values: Array, lag: float, step: float) -> Array:
-    """Return a first-order lag (n,) of a signal that goes straight between its samples, settled at first.
-
-    Args:
-        values: (n,).
-        lag: time constant [s].
-        step: sample time [s].
-    """
+    """Return a first-order lag (n,) of a signal that goes straight between its samples, settled at first."""
     ratio = step / lag
     decay = np.exp(-ratio)
     now, before = 1.0 - (1.0 - decay) / ratio, (1.0 - decay) / ratio - decay

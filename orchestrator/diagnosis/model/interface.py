@@ -3,8 +3,9 @@ noise.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from copy import copy
+from dataclasses import dataclass, field, replace
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -320,6 +321,8 @@ class ResidualModel(Protocol):
         Returns:
             The change (channels, n) for each; None: the residuals must be worked out.
         """
+        del point
+        return [None] * len(trials)
 
     def is_possible(self, label: str, point: ModelPoint) -> bool:
         """Tell whether a machine can have an effect as a point has it, and the record can show it.
@@ -348,8 +351,9 @@ class ResidualModel(Protocol):
         Returns:
             Name of each -> its share of the whole; empty: there are none.
         """
+        return {}
 
-    def without_priors(self, spread: float) -> "ResidualModel":
+    def without_priors(self, spread: float) -> Self:
         """Return the model as a plain regression of torque on motion, each parameter unknown within a factor.
 
         Args:
@@ -358,3 +362,6 @@ class ResidualModel(Protocol):
         Returns:
             A new model beside the same record.
         """
+        other = copy(self)
+        other.parameters = tuple(entry if entry.local else replace(entry, spread=spread) for entry in self.parameters)
+        return other

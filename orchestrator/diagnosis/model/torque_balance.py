@@ -16,9 +16,8 @@ acceleration. An effect that takes torque away from the drive is charged for it:
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from copy import copy
-from dataclasses import replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +38,6 @@ from orchestrator.diagnosis.model.interface import (
     NoiseSources,
     ResidualModel,
     UncertainParameter,
-    Values,
     as_uncertain,
 )
 from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters, in_metres
@@ -169,10 +167,6 @@ class TorqueBalance(ResidualModel):
         p[unreported] = self.nominal[unreported]
         return p
 
-    def drive_torque(self, p: Array) -> Array:
-        """Return the drive's torque (n,) [N.m] under the triangle average."""
-        return self._torque(p)
-
     def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
         """Return the residuals (channels, n) [N.m] at each of some points; see :class:`ResidualModel`."""
         if len(points) < 4:
@@ -192,7 +186,7 @@ class TorqueBalance(ResidualModel):
         scale = np.array([self.nominal[place] / p[place] for place in self.inertias])
         scale[0] = np.sqrt(scale[0])
         if any(self.effects[label].takes_drive for label in point.effects):
-            scale *= rms(self._torque(self.nominal)) / rms(self._torque(p))
+            scale *= rms(self.drive_torque(self.nominal)) / rms(self.drive_torque(p))
         return scale
 
     def _local(self, name: str, point: ModelPoint) -> float:
@@ -216,7 +210,7 @@ class TorqueBalance(ResidualModel):
         missing = np.array(
             [p[place] * (triangle_average(found[:, n]) - accelerations[n]) for n, place in enumerate(self.inertias)]
         )
-        missing[0] += self._torque(p)
+        missing[0] += self.drive_torque(p)
         if initial:
             missing[0] += initial * np.exp(-step * np.arange(self.size) / plant.value(p, plant.drive.lag))
         return missing
@@ -258,8 +252,8 @@ class TorqueBalance(ResidualModel):
             signs[:, n] = self._bristles[key]
         return signs
 
-    def _torque(self, p: Array) -> Array:
-        """Return the drive's torque (n,), kept for the parameters of the drive that were asked for lately."""
+    def drive_torque(self, p: Array) -> Array:
+        """Return the drive's torque (n,) [N.m] under the triangle average, kept for what was asked for lately."""
         key = tuple(float(p[place]) for place in self._drive)
         if key not in self._torques:
             if len(self._torques) > MOST_KEPT:
@@ -276,7 +270,7 @@ class TorqueBalance(ResidualModel):
         """Return the drive's torque, and the torque that the load's acceleration needs; see :class:`ResidualModel`."""
         p = self.values_at(point)
         further = [p[n] * a for n, a in list(zip(self.inertias, self._accelerations, strict=True))[1:]]
-        return np.array([self._torque(p), *further])
+        return np.array([self.drive_torque(p), *further])
 
     def inertia_shares(self) -> Mapping[str, float]:
         """Return each inertia's share as the motor feels it; see :class:`ResidualModel`."""
@@ -286,17 +280,11 @@ class TorqueBalance(ResidualModel):
         ]
         return {body.inertia: float(value / sum(felt)) for body, value in zip(self.plant.bodies, felt, strict=True)}
 
-    def without_priors(self, spread: float) -> "TorqueBalance":
+    def without_priors(self, spread: float) -> Self:
         """Return plain balances with every parameter unknown; see :class:`ResidualModel`."""
-        other = copy(self)
+        other = super().without_priors(spread)
         other.scaled = False
-        other.parameters = tuple(entry if entry.local else replace(entry, spread=spread) for entry in self.parameters)
         return other
-
-    def approximate_changes(self, point: ModelPoint, trials: Sequence[tuple[str, Values]]) -> list[Array | None]:
-        """Return no change: residuals of a balance cost little; see :class:`ResidualModel`."""
-        del point
-        return [None] * len(trials)
 
     # --- noise ---------------------------------------------------------------------------------------------
 
@@ -318,7 +306,7 @@ class TorqueBalance(ResidualModel):
             through = measured[:, 0, 1] * measured[:, 1, 0] / np.where(measured[:, 1, 1] == 0.0, 1.0, measured[:, 1, 1])
             measured = (measured[:, 0, 0] - through)[:, None, None]
         process = np.broadcast_to(np.eye(count, dtype=complex), (frequencies.size, count, count))
-        least = self.settings.torque_floor * rms(self._torque(self.nominal)) ** 2
+        least = self.settings.torque_floor * rms(self.drive_torque(self.nominal)) ** 2
         floors = [
             least / cutoff * (self.plant.ratio(self.nominal) ** 2 if n else 1.0)
             for n, cutoff in enumerate(self.cutoffs)
@@ -340,7 +328,7 @@ class TorqueBalance(ResidualModel):
 
     def is_possible(self, label: str, point: ModelPoint) -> bool:
         """Tell whether a machine can have an effect as a point has it; see :class:`ResidualModel`."""
-        row = next(row for row in self.plant.bank if row.label == label)
+        row = self.plant.effect(label)
         named = effect_parameters(self.plant, self.effects[label], point.effects[label])
         short = {name: named[full] for name, full in row.parameters.items()}
         viscous = next((body.viscous for body in self.plant.bodies if body.name == row.site), "")

@@ -85,9 +85,7 @@ def check_corrected(path: Path) -> Path:
 def start_values(plant: Plant, p: Array, built: Array | None = None) -> dict[str, float]:
     """Return the start values that make an FMU the model ``p``: all that differ from those that it has.
 
-    Args:
-        p: (parameters,) of the analysis.
-        built: those of the model that the FMU is (default: the plant's own FMU, with its defaults).
+    ``built``: parameters of the model that the FMU is (default: the plant's own FMU, with its defaults).
     """
     own = plant.fmu_values(p)
     before = [entry.default for entry in plant.table] if built is None else plant.fmu_values(built)
@@ -102,9 +100,6 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     """Run the corrected FMU, with the nominal values and with its own, in one system over the test part.
 
     Each segment starts from the initial state that :func:`free_run` finds for each model.
-
-    Returns:
-        Times, measured angles and those of both models.
     """
     w, plant, settings = diagnosis.workings, diagnosis.model.plant, diagnosis.settings.report
     _, signals, first = signals_of_test_data(w.test_data, w.balances[0])[0]

@@ -17,6 +17,7 @@ from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreCompariso
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import ModelPoint, Values
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, TestMisfit, ValueEstimate
+from orchestrator.diagnosis.selection.evidence import effect_evidence, leave_out_possible, possible_effects
 from orchestrator.diagnosis.selection.grading import grade_effect
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, RecordEvidence, SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -24,6 +25,10 @@ from orchestrator.plants.description import Plant
 from orchestrator.records.model_file import Model
 
 Array = NDArray[np.float64]
+Named = Callable[[Values], Mapping[str, float]]
+"""Values of an effect -> its parameters by name."""
+Tested = tuple[tuple[TestMisfit, ...], Callable[[ModelPoint], float], Callable[[ModelPoint], ScoreComparison | None]]
+"""Misfits on test data, and by the values of a model: what it misses, how much less the final one leaves."""
 CARRIERS = ("N.m", "kg.m2")  # begin the units of values that scale with the torque
 LEAST_CARRIERS = 4  # values that must agree
 LIKELY_GAIN = 0.1  # standard deviation of a gain before a record is seen
@@ -44,65 +49,53 @@ def parameter_estimates(problem: FitProblem, fitted: FittedModel, level: float) 
 
 
 def effect_estimates(
-    problem: FitProblem, fitted: FittedModel, label: str, names: Callable[[tuple[float, ...]], Mapping[str, float]],
+    problem: FitProblem, fitted: FittedModel, label: str, names: Named,
     units: Mapping[str, str], level: float,
 ) -> dict[str, ValueEstimate]:  # fmt: skip
     """Return the estimates of an effect's parameters; ``names`` makes parameters by short name of its values."""
-    values, effect = fitted.point.effects[label], problem.effects[label]
     covariance, width = value_covariance(fitted), interval_width(problem, level)
-    centre = names(values)
-    slopes = np.zeros((len(centre), len(fitted.coordinates)))
-    for n, coordinate in enumerate(fitted.coordinates):
-        if isinstance(coordinate, int) or coordinate[0] != label:
-            continue
-        place = coordinate[1]
-        step = 1e-4 * effect.scales[place]
-        moved = names((*values[:place], values[place] + step, *values[place + 1 :]))
-        slopes[:, n] = [(_wrap_phase(name, moved[name] - centre[name])) / 1e-4 for name in centre]
-    result = {}
-    variances = np.einsum("pc,cd,pd->p", slopes, covariance, slopes)
-    for error, (name, value) in zip(np.sqrt(np.maximum(variances, 0.0)).tolist(), centre.items(), strict=True):
+    slopes, result = _slopes(problem, fitted, label, names), {}
+    for name, value in names(fitted.point.effects[label]).items():
+        error = math.sqrt(max(float(slopes[name] @ covariance @ slopes[name]), 0.0))
         result[name] = ValueEstimate(value, error, (value - width * error, value + width * error), units[name])
     return result
 
 
+def _slopes(problem: FitProblem, fitted: FittedModel, label: str, names: Named) -> dict[str, Array]:
+    """Return by name how each parameter of an effect answers (coordinates,) to a small change of each coordinate."""
+    values, scales = fitted.point.effects[label], problem.effects[label].scales
+    before = names(values)
+    slopes = {name: np.zeros(len(fitted.coordinates)) for name in before}
+    for n, coordinate in enumerate(fitted.coordinates):
+        if isinstance(coordinate, int) or coordinate[0] != label:
+            continue
+        place = coordinate[1]
+        after = names((*values[:place], values[place] + 1e-4 * scales[place], *values[place + 1 :]))
+        for name in before:
+            slopes[name][n] = _wrap_phase(name, after[name] - before[name]) / 1e-4
+    return slopes
+
+
 def joint_covariance(
-    problem: FitProblem, fitted: FittedModel, named: Mapping[str, Callable[[Values], Mapping[str, float]]], level: float
+    problem: FitProblem, fitted: FittedModel, named: Mapping[str, Named], level: float
 ) -> tuple[tuple[str, ...], Array]:
     """Return names (n,) and covariance (n, n) of all fitted parameters; its normal intervals are those of Student.
 
     Args:
         named: by label of each effect, its parameters by full name of its values.
     """
-    slopes: dict[str, Array] = {}
     size = len(fitted.coordinates)
-    for n, entry in enumerate(problem.shared):
-        slopes[entry.name] = abs(entry.nominal) * np.eye(size)[n]
-    for n, coordinate in enumerate(fitted.coordinates):
-        if isinstance(coordinate, int):
-            continue
-        label, place = coordinate
-        values = fitted.point.effects[label]
-        step = 1e-4 * problem.effects[label].scales[place]
-        before, after = (named[label]((*values[:place], values[place] + s, *values[place + 1 :])) for s in (0.0, step))
-        for name in before:
-            slopes.setdefault(name, np.zeros(size))[n] = _wrap_phase(name, after[name] - before[name]) / 1e-4
+    slopes = {entry.name: abs(entry.nominal) * np.eye(size)[n] for n, entry in enumerate(problem.shared)}
+    for label in fitted.labels:
+        for name, slope in _slopes(problem, fitted, label, named[label]).items():
+            slopes[name] = slopes.get(name, 0.0) + slope
     rows = np.array(list(slopes.values())).reshape(len(slopes), size)
     width = interval_width(problem, level) / float(norm.ppf(0.5 + 0.5 * level))
     return tuple(slopes), width**2 * rows @ value_covariance(fitted) @ rows.T
 
 
-def block_values(
-    problem: FitProblem, fitted: FittedModel, label: str, names: Callable[[tuple[float, ...]], Mapping[str, float]]
-) -> dict[str, tuple[float, ...]]:
-    """Return the value of each parameter of an effect as each block by itself would move it (jackknife pseudo-values).
-
-    Args:
-        names: values of the effect -> parameters by short name.
-
-    Returns:
-        Short name -> (blocks,).
-    """
+def block_values(problem: FitProblem, fitted: FittedModel, label: str, names: Named) -> dict[str, tuple[float, ...]]:
+    """Return by name (blocks,) each parameter of an effect as each block alone moves it (jackknife pseudo-values)."""
     effect, count = problem.effects[label], len(fitted.block_shifts)
     places = [(n, one[1]) for n, one in enumerate(fitted.coordinates) if not isinstance(one, int) and one[0] == label]
     rows = []
@@ -123,17 +116,45 @@ def _wrap_phase(name: str, difference: float) -> float:
     return float((difference + np.pi) % (2.0 * np.pi) - np.pi) if name.endswith("phase") else difference
 
 
-def report_effect(
-    result: SearchResult, evidence: EffectEvidence, names: Callable[[Values], Mapping[str, float]],
-    units: Mapping[str, str], record: RecordEvidence, settings: DiagnosisSettings, in_model: bool,
-) -> GradedEffect:  # fmt: skip
-    """Return an effect as it is reported; ``names`` makes parameters by short name of its values."""
-    label = evidence.label
-    name, _, site = label.partition("@")
-    grade, lowered = grade_effect(evidence, record, settings)
-    estimates = effect_estimates(result.problem, result.final, label, names, units, settings.report.level)
-    blocks = block_values(result.problem, result.final, label, names)
-    return GradedEffect(name, site, grade, lowered, estimates, evidence, blocks, in_model=in_model)
+def leave_out_refuted(
+    searched: SearchResult, record: RecordEvidence, settings: DiagnosisSettings, tests: Callable[[SearchResult], Tested]
+) -> tuple[SearchResult, list[EffectEvidence], tuple[TestMisfit, ...]]:
+    """Return the search without effects that are not even likely, or that test data refute; all evidence, misfits."""
+    result, evidence = searched, effect_evidence(searched)
+    while True:
+        result, evidence = leave_out_possible(result, evidence, record, settings)
+        test, missed, compared = tests(result)
+        evidence = add_test_evidence(evidence, result, test, missed, compared)
+        if not any(one.label in result.final.labels for one in possible_effects(evidence, record, settings)):
+            return result, evidence, test
+
+
+def report_effects(
+    searched: SearchResult, result: SearchResult, evidence: Sequence[EffectEvidence],
+    words: Callable[[str], tuple[Named, Mapping[str, str]]], record: RecordEvidence, settings: DiagnosisSettings,
+) -> tuple[GradedEffect, ...]:  # fmt: skip
+    """Return the effects of a search as they are reported.
+
+    Args:
+        result: the search without effects that are only possible.
+        words: label of an effect -> what makes its parameters, and their units, by short name.
+    """
+    labels = result.final.labels
+
+    def report(source: SearchResult, one: EffectEvidence, in_model: bool) -> GradedEffect:
+        problem, final, (names, units) = source.problem, source.final, words(one.label)
+        name, _, site = one.label.partition("@")
+        return GradedEffect(
+            name, site, *grade_effect(one, record, settings),
+            effect_estimates(problem, final, one.label, names, units, settings.report.level), one,
+            block_values(problem, final, one.label, names), problem.effects[one.label].of_log, in_model,
+        )  # fmt: skip
+
+    graded = [report(result if one.label in labels else searched, one, one.label in labels) for one in evidence]
+    if len(searched.final.labels) > len(labels):
+        pairs = zip(graded, evidence, strict=True)
+        graded = [open_to(one, report(searched, own, True)) if one.in_model else one for one, own in pairs]
+    return tuple(graded)
 
 
 def open_to(effect: GradedEffect, other: GradedEffect) -> GradedEffect:
@@ -177,8 +198,7 @@ def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: 
 
 def add_test_evidence(
     evidence: Sequence[EffectEvidence], result: SearchResult, test: Sequence[TestMisfit],
-    missed: Callable[[ModelPoint], float],
-    compared: Callable[[ModelPoint], ScoreComparison | None] = lambda point: None,
+    missed: Callable[[ModelPoint], float], compared: Callable[[ModelPoint], ScoreComparison | None],
 ) -> list[EffectEvidence]:  # fmt: skip
     """Return the evidence with what test data say of each effect of the final model: how the rest, re-fitted, does.
 

@@ -53,14 +53,7 @@ class FreeRun:
     straight: bool = False
 
 
-def free_run(
-    plant: Plant,
-    p: Array,
-    guess: Array,
-    signals: RunSignals,
-    part: slice,
-    history: bool = True,
-) -> FreeRun:
+def free_run(plant: Plant, p: Array, guess: Array, signals: RunSignals, part: slice, history: bool = True) -> FreeRun:
     """Return the free run whose initial state lies closest to the measurement.
 
     Where impacts make the end of a run depend on its start in no simple way, a run that has not come close is sought
@@ -227,11 +220,7 @@ def _errors(model: Simulation, part: slice, start: Array) -> Array:
 
 
 def start_guesses(plant: Plant, p: Array, signals: RunSignals, row: int) -> list[Array]:
-    """Return first guesses of the state at a row: one, or three where a load that is not measured lies in a gap.
-
-    Returns:
-        States (8,): in mid-gap, and at either flank.
-    """
+    """Return guesses of the state (8,) at a row; of a load in a gap that is not measured, at either flank too."""
     guess = signals.guess_state(plant, p, row)
     gap = plant.value(p, plant.shaft.gap) if plant.shaft and plant.shaft.gap else 0.0
     if gap <= 0.0 or signals.channels == len(plant.bodies):

@@ -28,12 +28,9 @@ LEAST_TEST_ROWS = 16  # whitened, about independent: four in each of four blocks
 
 
 def torque_left(part: Record, workings: Workings, model: Model, settings: DiagnosisSettings) -> tuple[float, ...]:
-    """Return the share of the torque that each model leaves at the driven body: rms of the balance over that of the
-    torque.
+    """Return the share (rms) of the torque that (nominal, parameters, final) leave at the driven body.
 
-    Returns:
-        (nominal, parameters, final); empty of two bodies, where the noise of encoders
-        is most of it, and where the part is too short.
+    Empty of two bodies, where the noise of encoders is most of it, and where the part is too short.
     """
     if part.size < LEAST_TORQUE_ROWS or len(model.plant.bodies) > 1:
         return ()
@@ -116,11 +113,7 @@ def misfit_on_record(diagnosis: Diagnosis, record: Record) -> TestMisfit:
 
 
 def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> Callable[[ModelPoint], float]:
-    """Return what says how much free runs of a model miss of the test data.
-
-    Returns:
-        A model's values -> the sum of squares over the encoders, in units of their noise.
-    """
+    """Return a model's values -> squares that its free runs miss of the test data, in units of encoders' noise."""
     parts = signals_of_test_data(workings.test_data, workings.balances[0])
 
     def misses_at(point: ModelPoint) -> float:
@@ -138,10 +131,7 @@ def torque_comparison(
 ) -> Callable[[ModelPoint], ScoreComparison | None]:
     """Return what compares models with the final one by the whitened torque that they leave of test data.
 
-    It counts what drifts as unknown torques: unlike free runs it forgets what lies long ago.
-
-    Returns:
-        A model's values -> how much less the final one leaves, block by block; None: there are too few rows to tell.
+    It counts what drifts as unknown torques: unlike free runs it forgets what lies long ago. None: too few rows.
     """
     records = [
         (number, balance_of(record, model, settings), first / record.size)

@@ -122,14 +122,7 @@ class RunSignals:
 
 
 def run_signals(record: Record, channels: int, cutoff: float) -> RunSignals:
-    """Return the signals of a record.
-
-    Args:
-        cutoff: frequency up to which the machine moves [Hz].
-
-    Returns:
-        The signals; straight lines stand for missing samples.
-    """
+    """Return the signals of a record up to a ``cutoff`` [Hz]; straight lines stand for missing samples."""
     whole = record.fill_missing()
     angles = [whole.theta_m, whole.theta_l][:channels]
     noise = [residual_noise(angle, quantisation_step(angle), NOISE_WINDOW) for angle in angles if angle is not None]
@@ -163,14 +156,7 @@ class Simulation:
     history: bool = True
 
     def run(self, start: Array, part: slice) -> Array:
-        """Return the simulated encoder angles (n, 2) of a part of the record.
-
-        Args:
-            start: (8,) state at the part's first sample.
-
-        Returns:
-            The angles [rad].
-        """
+        """Return the simulated encoder angles (n, 2) [rad] of a part that begins in a state (8,)."""
         begin, end, _ = part.indices(self.signals.size)
         acting, followed = self._requests
         whole, _ = self._dead_time

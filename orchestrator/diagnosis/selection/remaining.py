@@ -41,26 +41,14 @@ def find_dependences(
 
 
 def knots_of(values: Array) -> Array | None:
-    """Return the knots of a curve: half-way between even steps and even shares of the values.
-
-    Args:
-        values: (n,) that the signal takes.
-
-    Returns:
-        Rising knots (k,); None: the values have no range.
-    """
+    """Return rising knots (k,) half-way between even steps and even shares of values (n,); None: all are one."""
     shares = np.quantile(values, np.linspace(EDGE, 1.0 - EDGE, KNOTS))
     knots = 0.5 * (shares + np.linspace(shares[0], shares[-1], KNOTS))
     return knots if np.all(np.diff(knots) > 1e-9 * max(float(np.ptp(knots)), 1e-300)) else None
 
 
 def hats(knots: Array, values: Array) -> Array:
-    """Return (n, k) the share of each knot in a curve at some values; the last straight lines go on.
-
-    Args:
-        knots: (k,) rising.
-        values: (n,) of the signal.
-    """
+    """Return (n, k) the share of each knot (k,) in a curve at some values (n,); the last straight lines go on."""
     place = np.clip(np.searchsorted(knots, values), 1, knots.size - 1)
     share = (values - knots[place - 1]) / (knots[place] - knots[place - 1])
     result = np.zeros((values.size, knots.size))
@@ -121,13 +109,7 @@ def simple_terms(x: Array) -> dict[str, Array]:
 
 
 def formula_of(knots: Array, values: Array, errors: Array, most: float = 1.5) -> str:
-    """Return the shortest sum of at most two simple terms that runs within the errors of a curve.
-
-    Args:
-        knots: (k,) arguments.
-        values: (k,) of the curve.
-        errors: (k,) standard errors of the values.
-    """
+    """Return the shortest sum of at most two simple terms that runs within the errors (k,) of a curve."""
     terms = simple_terms(knots)
     weight = 1.0 / np.maximum(errors, 1e-3 * float(np.max(np.abs(values))))
     for count in (1, 2):

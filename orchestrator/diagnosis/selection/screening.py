@@ -139,13 +139,8 @@ class Screening:
 def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[np.complex128]:
     """Return the inner products (k,) of values with ``exp(i c phase)``, of all cycles c at once.
 
-    Values are gathered in bins of the phase, a sixty-fourth of the shortest wave wide; a Fourier transform does the
-    rest.
-
-    Args:
-        values: (n,).
-        phase: (n,) over which waves repeat.
-        cycles: (k,) evenly spaced multiples of a spacing, from any first one on.
+    Values (n,) are gathered in bins of the phase (n,), a sixty-fourth of the shortest wave wide; a Fourier transform
+    does the rest: ``cycles`` (k,) are evenly spaced.
     """
     if cycles.size < 2:
         return np.exp(1j * np.outer(cycles, phase)) @ values

@@ -281,10 +281,6 @@ class _Round:
 
 
 def farthest_parameter(problem: FitProblem, model: FittedModel) -> float:
-    """Return how far the parameter lies that is farthest from the model file, in its standard deviations.
-
-    Returns:
-        The distance; 0.0 where every parameter is known.
-    """
+    """Return how far the farthest parameter lies from the model file, in its standard deviations; of none 0.0."""
     pairs = zip(problem.shared, model.point.parameters, strict=False)
     return max((abs(prior_of(entry, value)[0]) for entry, value in pairs), default=0.0)
