@@ -24,7 +24,7 @@ from orchestrator.diagnosis.report.json_results import (
     misfit_found,
     steps_found,
 )
-from orchestrator.diagnosis.report.summary import summarise_fmu
+from orchestrator.diagnosis.report.summary import summarise
 from orchestrator.diagnosis.result import TestMisfit
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.tables import column_names
@@ -62,7 +62,7 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         Yields:
             Verdict, effects, what is left, notes and trust.
         """
-        yield from summarise_fmu(self.diagnosis)
+        yield from summarise(self.diagnosis)
         yield from self._closing_lines()
 
     def blocks(self) -> Sequence[Block]:
@@ -95,7 +95,7 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
             walls=support().in_words,
             runs=d.workings.problem.runner.runs,
             test_start=self._test_start(),
-            summary=tuple(summarise_fmu(d)),
+            summary=tuple(summarise(d)),
             seconds=self.seconds,
         )
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-import msgspec
 import numpy as np
 
 from orchestrator.diagnosis.data.records import check_model, check_record, check_resolved, check_whole, split_records
@@ -75,6 +74,7 @@ def diagnose(
     if effects is not None:
         left_out = [label for label in effects_of(model) if label not in effects]
         model, search = keep_effects(model, effects), False
+        effects = [label for label in effects if label not in effects_of(model)]
     check_model(model)
     for record in whole:
         check_record(record)
@@ -85,15 +85,11 @@ def diagnose(
     until = np.inf if time_limit is None else time.monotonic() + time_limit
     hidden = search and len(fitted) == 1 and models[0].hides_load
     gap = find_hidden_gap(fitted[0], model) if hidden else None
-    chosen = (
-        settings.selection if search and gap is None else msgspec.structs.replace(settings.selection, most_effects=0)
-    )
     problem = fit_problem(models, settings.fit)
-    if effects is None:
-        result = search_effects(problem, chosen, progress, lambda: bool(time.monotonic() > until))
+    if search and gap is None:
+        result = search_effects(problem, settings.selection, progress, lambda: bool(time.monotonic() > until))
     else:
-        own = effects_of(model)
-        result = fit_effects(problem, settings.selection, [label for label in effects if label not in own], progress)
+        result = fit_effects(problem, settings.selection, effects or (), progress)
     points = (result.problem.start, result.base.point, result.final.point)
     nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
     workings = Workings(fitted, test_data, result, tuple(models), nominal, base, final)
@@ -164,8 +160,7 @@ def _dependences(workings: Workings, model: Model, settings: DiagnosisSettings) 
 
 
 def _with_search(workings: Workings, search: SearchResult) -> Workings:
-    final = workings.balances[0].physical_values(search.problem.record_points(search.final.point)[0])
-    return replace(workings, search=search, final=final)
+    return replace(workings, search=search, final=workings.values_at(search.final.point))
 
 
 def _words(model: Model, search: SearchResult, label: str) -> tuple[Named, Mapping[str, str]]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.records import TestData
+from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
 from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -171,6 +172,10 @@ class Workings:
     nominal: Array = field(repr=False)
     base: Array = field(repr=False)
     final: Array = field(repr=False)
+
+    def values_at(self, point: ModelPoint) -> Array:
+        """Return the parameters of the plant (n,) of a model of the search."""
+        return self.balances[0].physical_values(self.search.problem.record_points(point)[0])
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import msgspec
 import numpy as np
 
 from orchestrator.diagnosis.data.records import split_records
@@ -76,11 +75,10 @@ def diagnose_fmu(
     try:
         with np.errstate(all="ignore"):
             problem = _fit_problem(problems, settings)
-            chosen = settings.selection if search else msgspec.structs.replace(settings.selection, most_effects=0)
-            if effects is None:
-                found = search_effects(problem, chosen, progress, lambda: time.monotonic() > until)
+            if search and effects is None:
+                found = search_effects(problem, settings.selection, progress, lambda: time.monotonic() > until)
             else:
-                found = fit_effects(problem, settings.selection, effects, progress)
+                found = fit_effects(problem, settings.selection, effects or (), progress)
             residuals = tuple(model for model in problem.models if isinstance(model, FmuResiduals))
             return _report(FmuWorkings(test_data, found, residuals), notes, settings)
     except BaseException:

@@ -40,6 +40,10 @@ class FmuWorkings:
         """FMU and first record."""
         return self.residuals[0].problem
 
+    def problem_with(self, data: FmuRecord) -> FmuProblem:
+        """Return the FMU beside another record."""
+        return replace(self.problem, data=delay_outputs(data, self.problem.late))
+
     @property
     def points(self) -> tuple[ModelPoint, ...]:
         """Values of the nominal, the re-fitted and the final model."""
@@ -75,11 +79,7 @@ class FmuDiagnosis(DiagnosisOutcome):
 
 def _test_problems(workings: FmuWorkings) -> list[tuple[FmuProblem, int]]:
     """Return the FMU beside each record that holds test data, and the first row of the test part."""
-    return [(_problem_with(workings, data), first) for data, first in open_test_data(workings.test_data)]
-
-
-def _problem_with(workings: FmuWorkings, data: FmuRecord) -> FmuProblem:
-    return replace(workings.problem, data=delay_outputs(data, workings.problem.late))
+    return [(workings.problem_with(data), first) for data, first in open_test_data(workings.test_data)]
 
 
 def misfit_on_test_data(workings: FmuWorkings) -> tuple[TestMisfit, ...]:
@@ -89,7 +89,7 @@ def misfit_on_test_data(workings: FmuWorkings) -> tuple[TestMisfit, ...]:
 
 def misfit_on_record(workings: FmuWorkings, data: FmuRecord) -> TestMisfit:
     """Return the misfit of the three models on another record, to which nothing was fitted."""
-    return _misfit(workings, _problem_with(workings, data), 0, 0)
+    return _misfit(workings, workings.problem_with(data), 0, 0)
 
 
 def _misfit(workings: FmuWorkings, problem: FmuProblem, first: int, number: int) -> TestMisfit:

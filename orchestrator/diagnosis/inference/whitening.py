@@ -121,18 +121,13 @@ def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSett
     if quiet:
         measurement, process = model.noise_sources(frequencies).levels, QUIET * process
     fine = rfftfreq(plain.length, model.step)[: len(plain.weights)]
-    matrix = spectral_matrix(model, fine, measurement, process)
+    sources = model.noise_sources(fine)
+    matrix = _matrix(sources.measurement, measurement) + _matrix(sources.process, process, RIDGE)
     within = np.array([fine < cutoff for cutoff in model.cutoffs])
     both = within[:, None, :] & within[None, :, :] | np.eye(len(within), dtype=bool)[:, :, None]
     factor = np.linalg.inv(np.linalg.cholesky(matrix * both.transpose(2, 0, 1)))
     scale = within / np.sqrt(np.array(model.cutoffs))[:, None]
     return Whitening(factor * scale.T[:, :, None], plain.rows, plain.taper, plain.active, plain.length)
-
-
-def spectral_matrix(model: ResidualModel, frequencies: Array, measurement: Array, process: Array) -> Complex:
-    """Return the spectral matrix (f, channels, channels) of encoders' noise and unknown torques at some levels."""
-    sources = model.noise_sources(frequencies)
-    return _matrix(sources.measurement, measurement) + _matrix(sources.process, process, RIDGE)
 
 
 def _matrix(transfer: Any, levels: Array, ridge: float = 0.0) -> Any:

@@ -9,7 +9,8 @@ from scipy.stats import norm
 
 from orchestrator.diagnosis.model.plant_effects import unit_in
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, SignalMisfit, ValueEstimate
-from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade
+from orchestrator.diagnosis.selection.grading import highest_grade
+from orchestrator.diagnosis.selection.outcome import EffectEvidence
 from orchestrator.diagnosis.settings import GradeSettings
 from orchestrator.errors import OrchestratorError
 from orchestrator.estimation.methods.maximum_likelihood import estimate
@@ -80,15 +81,11 @@ def gap_effects(gap: HiddenGap, test: SignalMisfit, grades: GradeSettings) -> tu
     if not gap.alpha:
         return ()
     size = gap.alpha / gap.standard_error
-    lowered: tuple[str, ...]
-    if size >= grades.certain_size_t:
-        grade, lowered = Grade.CERTAIN, ()
-    elif size >= grades.likely_t:
-        grade, lowered = Grade.LIKELY, ("sure size",)
-    else:
-        grade, lowered = Grade.POSSIBLE, ("size",)
+    limits = {"sure size": grades.certain_size_t, "size": grades.likely_t}
+    lowered = tuple(rule for rule, least in limits.items() if size < least)
     before = test.parameters
     share = 1.0 - (test.final / before) ** 2 if before > 0.0 and np.isfinite(before) else np.nan
     evidence = EffectEvidence("backlash@shaft", "gap", size, np.nan, np.nan, size, (), False, True, share)
     estimate = ValueEstimate(gap.alpha, gap.standard_error, gap.interval, "rad")
+    grade = highest_grade(lowered)
     return (GradedEffect("backlash", "shaft", grade, lowered, {"alpha": estimate}, evidence, {"alpha": ()}),)

@@ -77,22 +77,16 @@ def with_drift(
     """Return misfits with how far the uncertainty of the final model's values lets free runs drift, where they miss."""
     moved = _move_values(workings)
 
-    def drifts(signals: RunSignals, first: int) -> list[float]:
+    def drifting(misfit: TestMisfit, signals: RunSignals, first: int) -> TestMisfit:
+        if not any(signal.is_missed for signal in misfit.signals):
+            return misfit
         parts = run_parts(first, signals.size, settings)
         variance = drift_variance(model.plant, workings.final, moved, signals, parts)
-        return [float(one) for one in np.sqrt(variance)]
+        pairs = zip(misfit.signals, np.sqrt(variance).tolist(), strict=True)
+        return replace(misfit, signals=tuple(replace(one, drift=drift) for one, drift in pairs))
 
     records = signals_of_test_data(workings.test_data, workings.balances[0])
-    return tuple(
-        replace(one, signals=tuple(map(_with_drift, one.signals, drifts(signals, first))))
-        if any(signal.is_missed for signal in one.signals)
-        else one
-        for (_, signals, first), one in zip(records, test, strict=True)
-    )
-
-
-def _with_drift(signal: SignalMisfit, drift: float) -> SignalMisfit:
-    return replace(signal, drift=drift)
+    return tuple(drifting(one, signals, first) for one, (_, signals, first) in zip(test, records, strict=True))
 
 
 def _move_values(workings: Workings) -> list[Array]:
@@ -102,14 +96,13 @@ def _move_values(workings: Workings) -> list[Array]:
     moved = []
     for size, axis in zip(sizes, axes.T, strict=True):
         point = problem.move_point(fitted.point, fitted.coordinates, np.sqrt(max(size, 0.0)) * axis)
-        moved.append(workings.balances[0].physical_values(problem.record_points(point)[0]))
+        moved.append(workings.values_at(point))
     return moved
 
 
 def misfit_on_record(diagnosis: Diagnosis, record: Record) -> TestMisfit:
     """Return the misfit of a diagnosis's models on another record of the machine, and the torque that each leaves."""
-    w, model, settings = diagnosis.workings, diagnosis.model, diagnosis.settings
-    return _misfit(w, model, record, 0, settings)
+    return _misfit(diagnosis.workings, diagnosis.model, record, 0, diagnosis.settings)
 
 
 def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> Callable[[ModelPoint], float]:
@@ -117,7 +110,7 @@ def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> 
     parts = signals_of_test_data(workings.test_data, workings.balances[0])
 
     def misses_at(point: ModelPoint) -> float:
-        p = workings.balances[0].physical_values(workings.search.problem.record_points(point)[0])
+        p = workings.values_at(point)
         misfits = (
             run_misfit(model.plant, p, signals, first, settings.report) / signals.noise for _, signals, first in parts
         )

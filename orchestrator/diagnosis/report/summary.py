@@ -30,41 +30,18 @@ NOTABLE_CHANGE = 0.005  # of a value that is worth a word
 REPEAT = "the same torque twice: what comes again is the machine, what does not is a disturbance"
 
 
-def summarise(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield the answer of a diagnosis, a sentence or two a line."""
-    yield headline(diagnosis)
+def summarise(diagnosis: DiagnosisOutcome) -> Iterator[str]:
+    """Yield the answer of a diagnosis of a plant of ours or of any FMU, a sentence or two a line."""
+    ours = diagnosis if isinstance(diagnosis, Diagnosis) else None
+    yield headline(diagnosis, "FMU" if ours is None else "model")
     for effect in diagnosis.effects:
-        yield from _effect(effect, diagnosis)
-    for nuisance in diagnosis.nuisances:
-        yield f"  In the log: {nuisance_words(nuisance)}"
-    yield from _values(diagnosis)
-    yield _remainder_text(diagnosis)
+        yield from _effect(effect, ours)
+    if ours is not None:
+        for nuisance in ours.nuisances:
+            yield f"  In the log: {nuisance_words(nuisance)}"
+        yield from _values(ours)
+    yield _remainder_text(diagnosis, "{}" if ours is None else "what the torque at {} varies by")
     yield from _motion(diagnosis)
-    yield from next_steps(diagnosis)
-
-
-def summarise_fmu(diagnosis: DiagnosisOutcome) -> Iterator[str]:
-    """Yield the answer of a diagnosis of any FMU, a sentence or two a line.
-
-    Yields:
-        The verdict; for each effect its size and how sure it is; what is left; the misfit on test data.
-    """
-    yield headline(diagnosis, "FMU")
-    for effect in diagnosis.effects:
-        yield sizes_line(effect)
-        yield f"    {sureness(effect)}"
-        yield f"    It explains {percent(effect.evidence.share)} of the outputs' misfit{words_on_test_data(effect)}."
-    left = " and ".join(f"{remainder_percent(share)} of {name}" for name, share in diagnosis.left.items())
-    strongest = [f"at {one.site} {one.words}" for one in diagnosis.remaining[:2]]
-    follows = "; ".join(strongest) if strongest else "it follows no signal"
-    yield f"What is left (rms, where the model was fitted): {left}; {follows}."
-    for test in diagnosis.test:
-        parts = [
-            f"{one.signal} {number_words(one.nominal / one.noise)} -> {number_words(one.miss)} times its noise"
-            for one in test.signals
-        ]
-        rows = f"{test.rows} rows that nothing was fitted to"
-        yield f"Test data of {test.source} ({rows}), rms of runs: {'; '.join(parts)}."
     yield from next_steps(diagnosis)
 
 
@@ -115,15 +92,16 @@ def play_of(diagnosis: Diagnosis) -> Play | None:
     return None if gap is None else Play(gap.value, plant.ratio(diagnosis.workings.final))
 
 
-def _effect(effect: GradedEffect, diagnosis: Diagnosis) -> Iterator[str]:
+def _effect(effect: GradedEffect, ours: Diagnosis | None) -> Iterator[str]:
     yield sizes_line(effect)
-    play = play_of(diagnosis)
+    play = None if ours is None else play_of(ours)
     if effect.name == "backlash" and play is not None:
         yield f"    {play}"
     yield f"    {sureness(effect)}"
     if math.isfinite(effect.evidence.share):
-        yield f"    It explains {percent(effect.evidence.share)} of the missing torque{words_on_test_data(effect)}."
-    if motion := diagnosis.model.plant.effect(effect.label).motion:
+        explained = "outputs' misfit" if ours is None else "missing torque"
+        yield f"    It explains {percent(effect.evidence.share)} of the {explained}{words_on_test_data(effect)}."
+    if ours is not None and (motion := ours.model.plant.effect(effect.label).motion):
         yield f"    In the motion: {motion}"
 
 
@@ -221,13 +199,12 @@ def _values(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"Values of the model that were re-fitted: {', '.join(changed)}."
 
 
-def _remainder_text(diagnosis: Diagnosis) -> str:
+def _remainder_text(diagnosis: DiagnosisOutcome, of: str) -> str:
+    """Return what is left in words; ``of`` what it is a share, with the name of the body or output in it."""
     if not diagnosis.left:
         return "What is left is noise."
-    parts = [
-        f"{remainder_percent(share)} of what the torque at {BODIES.get(name, name)} varies by"
-        for name, share in diagnosis.left.items()
-    ]
+    named = [(of.format(BODIES.get(name, name)), share) for name, share in diagnosis.left.items()]
+    parts = [f"{remainder_percent(share)} of {name}" for name, share in named]
     text = f"What is left (rms, where the model was fitted): {' and '.join(parts)}"
     strongest = [f"{SITES.get(one.site, f'at {one.site}')} {one.words}" for one in diagnosis.remaining[:2]]
     return f"{text}; {'; '.join(strongest)}." if strongest else f"{text}; it follows no signal."
@@ -238,11 +215,11 @@ def remainder_percent(power: float) -> str:
     return f"{number_words(100.0 * math.sqrt(power), 2)} %"
 
 
-def _motion(diagnosis: Diagnosis) -> Iterator[str]:
+def _motion(diagnosis: DiagnosisOutcome) -> Iterator[str]:
     for test in diagnosis.test:
         parts = [
-            f"{SIGNALS.get(one.signal, one.signal)} {one.nominal:.3g} -> {one.final:.3g} {one.unit} "
-            f"(noise {one.noise:.2g})"
+            f"{SIGNALS.get(one.signal, one.signal)} {one.nominal:.3g} -> {one.final:.3g} {one.unit}".rstrip()
+            + f" (noise {one.noise:.2g})"
             for one in test.signals
         ]
         rows = f"{test.rows} rows that nothing was fitted to"
@@ -250,11 +227,7 @@ def _motion(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def next_steps(diagnosis: DiagnosisOutcome) -> Iterator[str]:
-    """Yield which record would settle what is open.
-
-    Yields:
-        A sentence each; one at least.
-    """
+    """Yield which record would settle what is open, a sentence each; one at least."""
     open_questions: dict[str, list[str]] = {}
     for effect in diagnosis.graded(Grade.LIKELY) or diagnosis.effects:  # hints alone only where nothing is named
         if effect.grade is not Grade.CERTAIN or effect.evidence.family:

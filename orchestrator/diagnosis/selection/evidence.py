@@ -75,8 +75,8 @@ def _effect_evidence(result: SearchResult, label: str, base: float, remains: flo
 def acts_one_way(problem: FitProblem, point: ModelPoint, label: str) -> bool:
     """Tell whether an effect is a constant torque to the records: dry friction of a body that turns one way alone."""
     square = variance = 0.0
-    for _, own, actives in _torques_within_band(problem, point, label):
-        for torque, active in zip(own, actives, strict=True):
+    for left, without, actives in _left_within_band(problem, point, point.without_effects([label])):
+        for torque, active in zip(left - without, actives, strict=True):
             moving = torque[active > ACTIVE * active.max()]
             square += float(moving @ moving)
             variance += float(moving.size * np.var(moving)) if moving.size else 0.0
@@ -92,7 +92,8 @@ def where_it_acts(problem: FitProblem, point: ModelPoint, label: str) -> tuple[f
         What is left over the effect's own torque there (rms), 0.0 where it is no more than elsewhere; one stretch.
     """
     here, elsewhere, own_here, stretches = (np.zeros(0),) * 4
-    for left, own, _ in _torques_within_band(problem, point, label):
+    for left, without, _ in _left_within_band(problem, point, point.without_effects([label])):
+        own = left - without
         body = int(np.argmax(np.sum(own**2, axis=1)))
         acts = np.abs(own[body]) > ACTS * np.abs(own[body]).max()
         here, elsewhere = np.append(here, left[body][acts]), np.append(elsewhere, left[body][~acts])
@@ -106,24 +107,19 @@ def where_it_acts(problem: FitProblem, point: ModelPoint, label: str) -> tuple[f
     return share, bool(stretches.max() > ONE_STRETCH * stretches.sum())
 
 
-def _torques_within_band(problem: FitProblem, point: ModelPoint, label: str) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield of each record what a model leaves, an effect's own torque, and weights, each (channels, rows)."""
-    points = (problem.record_points(one) for one in (point, point.without_effects([label])))
-    for model, *seen in zip(problem.models, *points, strict=True):
+def _left_within_band(problem: FitProblem, *points: ModelPoint) -> Iterator[list[Array]]:
+    """Yield of each record what each of some models leaves within the band, and weights, each (channels, rows)."""
+    for model, *seen in zip(problem.models, *map(problem.record_points, points), strict=True):
         plain = band_only(model, problem.settings)
-        left, without = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen))
-        yield left, left - without, plain.active
+        yield [*(plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen)), plain.active]
 
 
 def missing_torque(problem: FitProblem, point: ModelPoint) -> float:
     """Return the power of what a model leaves within the band, white, in shares of the nominal one's, summed."""
-    total = 0.0
-    points = (problem.record_points(one) for one in (point, problem.start))
-    for model, *seen in zip(problem.models, *points, strict=True):
-        plain = band_only(model, problem.settings)
-        left, nominal = (plain.apply(one).reshape(len(plain.active), -1) for one in model.residuals(seen))
-        total += float(np.sum(np.mean(left**2, axis=1) / (np.mean(nominal**2, axis=1) + 1e-300)))
-    return total
+    return sum(
+        float(np.sum(np.mean(left**2, axis=1) / (np.mean(nominal**2, axis=1) + 1e-300)))
+        for left, nominal, _ in _left_within_band(problem, point, problem.start)
+    )
 
 
 def torque_shares(problem: FitProblem, point: ModelPoint) -> Array:

@@ -111,8 +111,9 @@ def fit_effects(
             raise ScenarioError(f"`effects` must leave out {min(missing)}: no size of it fits this record")
         again, final = settle_anew(problem, max(fits, key=lambda fit: compare(model, fit).gain))
         result = replace(result, problem=again, final=final)
-    around = _Round(result.problem, result.final, base, settings, progress, lambda: False, {})
-    return around.review(result)
+    if not labels:
+        return result
+    return _Round(result.problem, result.final, base, settings, progress, lambda: False, {}).review(result)
 
 
 def _check_asked(problem: FitProblem, labels: Collection[str]) -> None:
