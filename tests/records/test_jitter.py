@@ -129,8 +129,8 @@ def test_records_of_fmus_have_the_same_rule(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     given = Map(inputs={"u": InputEntry("u")}, outputs={"y": OutputEntry("y")})
 
-    def write(time: np.ndarray, motion: np.ndarray) -> None:
-        rows = np.column_stack([time, np.sign(np.sin(2.0 * ROWS)), np.sin(9.0 * motion)])
+    def write(time: np.ndarray, motion: np.ndarray, kept: np.ndarray | slice = slice(None)) -> None:
+        rows = np.column_stack([time, np.sign(np.sin(2.0 * ROWS))[kept], np.sin(9.0 * motion)[kept]])
         np.savetxt(path, rows, delimiter=",", header="time,u,y", comments="", fmt="%.9g")
 
     write(_white(0.4), ROWS)
@@ -138,6 +138,11 @@ def test_records_of_fmus_have_the_same_rule(tmp_path: Path) -> None:
     assert any(note.startswith("rows are taken as uniform at") for note in record.notes)
     np.testing.assert_allclose(record.time, ROWS, atol=0.05 * STEP)
     np.testing.assert_allclose(record.outputs[:, 0], np.sin(9.0 * ROWS), atol=1e-8)
+    kept = np.delete(np.arange(SIZE), [300, 301, 700])
+    write(_white(0.35)[kept], ROWS, kept)
+    lossy = read_fmu_record(path, given)
+    np.testing.assert_allclose(lossy.time, ROWS, atol=0.05 * STEP)
+    np.testing.assert_allclose(lossy.outputs[:, 0], np.sin(9.0 * ROWS), atol=1e-5)
     for time, motion in ((_white(0.4), _white(0.4)), (_drift() + 40.0 * ROWS**2 * STEP, ROWS)):
         write(time, motion)
         with pytest.raises(RecordError, match="must grow by"):

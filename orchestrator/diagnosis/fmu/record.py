@@ -14,7 +14,7 @@ from orchestrator.errors import RecordError
 from orchestrator.master.protocol import Unit
 from orchestrator.master.units import contradiction, conversion, resolve
 from orchestrator.records.arrays import interpolate_missing, runs_of
-from orchestrator.records.jitter import describe_jitter, fit_clock
+from orchestrator.records.jitter import describe_jitter, fit_clock, places_on_clock
 from orchestrator.records.rows import check_clock, describe_failed, drop_failed_readings, find_repeats
 from orchestrator.records.tables import NamedColumns, Wanted, read_columns, read_unit
 from orchestrator.records.timing import has_unpadded_fractions, interpolate
@@ -189,23 +189,18 @@ def _even(time: Array, motion: Array, path: Path, uneven: float) -> tuple[Array,
     """
     if len(time) < LEAST_ROWS:
         raise RecordError(f"{path}: must have at least {LEAST_ROWS} rows, but has {len(time)}")
-    grown = np.diff(time)
-    usual = float(np.median(grown))
-    steps = grown / usual if usual > 0.0 else np.zeros(grown.size)
-    counts = np.rint(steps)
-    lost = int(np.sum(counts - 1.0)) if np.all(counts >= 1.0) else -1
-    few = 0 <= lost <= MOST_MISSING * time.size and counts.max() <= LONGEST_GAP + 1
-    place = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64) if few else np.arange(time.size)
-    step = (time[-1] - time[0]) / float(place[-1])
-    off = np.abs(time - time[0] - step * place)
-    if not step > 0.0 or float(off.max()) > uneven * step * np.sqrt(len(time)):
-        note = describe_jitter(time, motion)
-        if not note:
+    if not np.all(np.diff(time) > 0.0):
+        raise RecordError(f"{path}: {_unevenness(time)}")
+    place = places_on_clock(time)
+    if place[-1] + 1 > (1.0 + MOST_MISSING) * time.size or np.diff(place).max() > LONGEST_GAP + 1:
+        place = np.arange(time.size)
+    start, step, notes = float(time[0]), float(time[-1] - time[0]) / float(place[-1]), []
+    if np.abs(time - start - step * place).max() > uneven * step * np.sqrt(len(time)):
+        notes = [describe_jitter(time, motion, place)]
+        if not notes[0]:
             raise RecordError(f"{path}: {_unevenness(time)}")
-        start, step, _ = fit_clock(time)
-        place = np.arange(time.size, dtype=np.int64)
-        return np.asarray(start + step * place, dtype=np.float64), place, [note]
-    return time[0] + step * np.arange(place[-1] + 1), place, []
+        start, step, _ = fit_clock(time, place)
+    return start + step * np.arange(place[-1] + 1), place, notes
 
 
 def _fill(values: Array, time: Array, entry: ColumnEntry, path: Path) -> tuple[Array, list[str]]:
