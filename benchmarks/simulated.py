@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks.judging import Truth
 from orchestrator.records.model_file import Model, default_model
+from orchestrator.records.record import Record, record_from_columns
 from tests.support.hidden_effects import (
     MACHINES,
     SINGLE,
@@ -53,12 +54,14 @@ class SimulatedTask:
         kinds: what is hidden.
         seed: of the record.
         ways: machine and nuisances.
+        logger: "zeros", "stamps" or "": see ``logged``; no part of the key, so that rows are compared with ideal ones.
     """
 
     group: str
     kinds: tuple[str, ...]
     seed: int
     ways: Ways
+    logger: str = ""
 
     @property
     def key(self) -> str:
@@ -68,6 +71,10 @@ class SimulatedTask:
 
     def make(self) -> Case:
         """Return the record with its truth."""
+        case = self._ideal()
+        return replace(case, record=logged(case.record, self.logger, self.seed)) if self.logger else case
+
+    def _ideal(self) -> Case:
         match self.group:
             case "none":
                 return none_case(self.seed, ways=self.ways)
@@ -79,6 +86,31 @@ class SimulatedTask:
                 return unknown_case(self.kinds[0], self.seed, ways=self.ways)
             case _:
                 return one_encoder_case(self.seed, torque_noise=self.ways.torque_noise)
+
+
+def logged(record: Record, logger: str, seed: int) -> Record:
+    """Return a record as another logger has it.
+
+    Args:
+        record: with two encoders.
+        logger: "zeros": the motor's encoder counts from anywhere within 20 rad; "stamps": those of a PC, late by up to
+            5 to 40 % of a sample, half of them on a grid of 1 ms, with three rows lost.
+        seed: of what is drawn.
+
+    Returns:
+        The record.
+    """
+    rng = np.random.default_rng([seed, 91])
+    assert record.theta_l is not None
+    columns = {"time": record.time, "u": record.u, "theta_m": record.theta_m, "theta_l": record.theta_l}
+    if logger == "zeros":
+        columns["theta_m"] = record.theta_m + rng.uniform(-20.0, 20.0)
+    else:
+        late = record.time + rng.uniform(0.05, 0.4) * record.step * rng.random(record.size)
+        columns["time"] = np.round(late, 3) if rng.random() < 0.5 else late
+        kept = np.delete(np.arange(record.size), rng.integers(1, record.size - 1, 3))
+        columns = {name: values[kept] for name, values in columns.items()}
+    return record_from_columns(columns, record.source)
 
 
 @dataclass(frozen=True)
@@ -93,7 +125,7 @@ class Counts:
 
 
 def simulated_tasks(
-    counts: Counts, seed: int, ways: Ways, machines: Sequence[str] = tuple(MACHINES)
+    counts: Counts, seed: int, ways: Ways, machines: Sequence[str] = tuple(MACHINES), logger: str = ""
 ) -> list[SimulatedTask]:
     """Return records in a random order; kinds and machines take turns.
 
@@ -102,6 +134,7 @@ def simulated_tasks(
         seed: first one.
         ways: nuisances.
         machines: names of ``MACHINES``.
+        logger: see ``logged``.
 
     Returns:
         The tasks.
@@ -116,7 +149,7 @@ def simulated_tasks(
     for place, (group, hidden) in enumerate(kinds.items()):
         for n in range(getattr(counts, group)):
             machine = replace(ways, machine=machines[n % len(machines)])
-            tasks.append(SimulatedTask(group, hidden[n % len(hidden)], seed + 1000 * place + n, machine))
+            tasks.append(SimulatedTask(group, hidden[n % len(hidden)], seed + 1000 * place + n, machine, logger))
     return [tasks[n] for n in np.random.default_rng(seed + 1).permutation(len(tasks))]
 
 
