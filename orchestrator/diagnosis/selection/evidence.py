@@ -50,10 +50,8 @@ def effect_evidence(result: SearchResult) -> list[EffectEvidence]:
 def _effect_evidence(result: SearchResult, label: str, base: float, remains: float) -> EffectEvidence:
     problem, final, review = result.problem, result.final, result.reviews[label]
     effect = problem.effects[label]
-    start = result.entries[label].before
-    leaving, entry = review.entry, result.entries[label].entry
+    leaving, (start, entry) = review.entry, result.entries[label]
     assert leaving is not None
-    assert entry is not None
     without, before, after = (missing_torque(problem, one.point) for one in (review.before, start, entry.fitted))
     kinds = {effect.kind, *(problem.effects[other].kind for other in review.family)}
     family = review.family

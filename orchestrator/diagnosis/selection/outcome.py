@@ -49,7 +49,7 @@ class SearchResult:
         base: the model with re-fitted parameters alone, as the problem of its own time had it.
         alone: effects that were fitted alone on top of the base, by gain.
         reviews: label -> the step that it makes in the final model, with the family that it has there.
-        entries: label -> the step that it makes beside those effects alone that take more than it.
+        entries: label -> the model of those effects alone that take more than it, and what it does on top of that.
         searched: whether effects were looked for.
         complete: False when time ran out.
         asked: labels of effects that were asked for: they stay, whatever they gain.
@@ -60,7 +60,7 @@ class SearchResult:
     final: FittedModel
     alone: tuple[TriedEffect, ...] = ()
     reviews: Mapping[str, SearchStep] = field(default_factory=dict)
-    entries: Mapping[str, SearchStep] = field(default_factory=dict)
+    entries: Mapping[str, tuple[FittedModel, TriedEffect]] = field(default_factory=dict)
     searched: bool = False
     complete: bool = True
     asked: frozenset[str] = field(default_factory=frozenset)

@@ -245,19 +245,16 @@ class _Round:
             before = self.fits[others] = fit_model(self.problem, after.point.without_effects([label]), 0)
         return before
 
-    def _entries(self) -> dict[str, SearchStep]:
+    def _entries(self) -> dict[str, tuple[FittedModel, TriedEffect]]:
         """Return what each effect takes beside those that take more than it: in other company it may stand for them."""
         entries, has = {}, self.has
         while has:
             after = self.fits[has]
             assert after is not None
-            steps = []
-            for label in has:
-                before = self._fit_without(after, label)
-                steps.append(SearchStep(before, (TriedEffect(label, compare(before, after), after),), label))
-            last = min(steps, key=lambda step: step.before.score)
-            entries[last.taken] = last
-            has -= {last.taken}
+            without = {label: self._fit_without(after, label) for label in has}
+            label = min(without, key=lambda one: without[one].score)
+            entries[label] = without[label], TriedEffect(label, compare(without[label], after), after)
+            has -= {label}
         return entries
 
     def _family(self, step: SearchStep) -> tuple[str, ...]:
