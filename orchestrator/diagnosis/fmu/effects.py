@@ -43,12 +43,9 @@ class Motion:
 
 
 def port_motions(problem: FmuProblem, reads: Array) -> dict[str, Motion]:
-    """Return the motion of each port: as measured where its position is a column of the record, else that of a run.
+    """Return the motion of each port: as measured where its position is a column, else that of a run (n, reads).
 
     A run of a model that lacks an effect may be far from the record; what the effect answers to is in the record.
-
-    Args:
-        reads: (n, reads) all that is read of a run.
     """
     from scipy.signal import savgol_filter
 

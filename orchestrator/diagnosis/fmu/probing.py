@@ -37,10 +37,9 @@ def prepare_problems(
     progress: Progress = lambda what: None,
     settings: FmuSettings = DEFAULT,
 ) -> tuple[tuple[FmuProblem, ...], tuple[str, ...]]:
-    """Return a probed problem for each record, all with the same processes, which the caller ends.
+    """Return a probed problem for each record, and sentences for the user; the caller ends their common processes.
 
-    Returns:
-        The problems, what does nothing left out of their map, and sentences for the user.
+    What does nothing is left out of their map.
     """
     inputs, reads = _variables(given, system)
     runner = Runner(system, inputs, reads, given.tunable, given.options.tolerance, workers, settings)
@@ -232,11 +231,7 @@ def third_differences(trace: Array) -> Array:
 
 
 def _start_notes(problem: FmuProblem, residual: Array) -> list[str]:
-    """Return a sentence for each output that is far from its run in the first rows: few effects are so quick.
-
-    Args:
-        residual: (n, outputs) of the nominal model, in units of the noise.
-    """
+    """Return a sentence for each output far from its nominal run in the first rows: few effects are so quick."""
     off = np.max(np.abs(residual[: FIRST_ROWS if problem.data.factor == 1 else 1]), axis=0)
     return [
         f"output `{name}` is {times:.0f} times its noise off in its first rows: it has an offset, or the record does "

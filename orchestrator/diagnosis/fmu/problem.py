@@ -164,11 +164,10 @@ class FmuProblem:
         return values
 
     def table(self, model: FmuModel) -> Array:
-        """Return what the FMU's inputs get: the recorded ones behind the effects in series with them.
+        """Return what the FMU's inputs get (steps, inputs): the recorded ones behind the effects in series with them.
 
-        Returns:
-            Shape (steps, inputs); the plain table itself where no effect acts on an input. Further columns are those
-            of parameters that may change within a run, where one does.
+        It is the plain table itself where no effect acts on an input. Further columns are those of parameters that may
+        change within a run, where one does.
         """
         plain = table = self.plain_table()
         if any(effect.row.site == PARAMETER for effect in model.effects):

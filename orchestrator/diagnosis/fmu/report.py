@@ -136,11 +136,7 @@ def first_test(workings: FmuWorkings) -> tuple[FmuProblem, int]:
 
 
 def stage_runs(workings: FmuWorkings) -> tuple[FmuProblem, dict[str, Array], int]:
-    """Return the runs of the three models over the first record as a whole, for figures.
-
-    Returns:
-        FMU and record, outputs (n, outputs) by the model's name, and the first row of the test part.
-    """
+    """Return the first record, outputs (n, outputs) over it by the model's name, and the test part's first row."""
     problem, row = first_test(workings)
     runs = problem.simulate(workings.models)
     empty = np.full(problem.data.outputs.shape, np.nan)

@@ -110,10 +110,7 @@ def start_responses(problem: FmuProblem, model: FmuModel, places: Sequence[int])
     """Return what another state at the start changes of the outputs, which an FMU need not let be set.
 
     Any state that inputs lead to is one that pulses before the record have left: what they change later on. The changes
-    are the principal components of that.
-
-    Returns:
-        Shape (changes, outputs, rows), each as large at most as the settings grant, a quarter longer than the record.
+    (k, outputs, rows), a quarter longer than the record, are the principal components of that.
     """
     reach = max(problem.n // 4, 8)
     rows = problem.n + reach

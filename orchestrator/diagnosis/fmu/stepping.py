@@ -23,19 +23,12 @@ SHORTER = 4.0  # how many times shorter the second such step is
 AT_ONCE = 0.5  # share of a response that the shorter step must leave, to depend at once
 SLIVER = 1e-9  # of a communication step by which it is cut short: above rounding, below all that an output shows
 FINE = 60  # communication steps in a sample that show an FMU's own: many whole numbers divide it
-BEFORE, AFTER = (
-    3,
-    8,
-)  # steps of its own before and after an input is pushed: a polynomial of degree 5 follows the latter
+BEFORE, AFTER = 3, 8  # steps of its own before and after an input is pushed: degree 5 follows the latter
 SMOOTH = 1e-4  # of a response, or of a step of an FMU's own, by which it may leave a smooth curve
 
 
 def least_steps(substeps: int, factor: int) -> int:
-    """Return how many communication steps a sample has, so many at least, and a whole number for each row of the file.
-
-    Args:
-        factor: rows of the file for one sample.
-    """
+    """Return how many communication steps a sample has at least: a whole number for each of its ``factor`` rows."""
     return factor * -(-substeps // factor)
 
 

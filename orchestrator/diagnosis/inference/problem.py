@@ -83,9 +83,8 @@ class FitProblem:
     def blocks_after(self, shares: Sequence[float]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the blocks of the whitened residuals after a share of each record, and their places (rows,) among all.
 
-        Returns:
-            Block of each such residual, contiguous in time and within one record, and its place. All have about as many
-            rows that say something: by rows alone a block of a machine at rest would be empty.
+        Blocks are contiguous in time and within one record. All have about as many rows that say something: by rows
+        alone a block of a machine at rest would be empty.
         """
         late = [
             whitening.rows >= share * model.size

@@ -73,12 +73,8 @@ def _missing_torque(diagnosis: Diagnosis, effect: GradedEffect) -> MissingTorque
 
 
 def _abscissa(diagnosis: Diagnosis, effect: GradedEffect, channel: int) -> tuple[Array, str]:
-    balance, row, unit = (
-        diagnosis.workings.balances[0],
-        diagnosis.model.plant.effect(effect.label),
-        diagnosis.test[0].signals[0].unit,
-    )
-    scales = balance.scales
+    balance, row = diagnosis.workings.balances[0], diagnosis.model.plant.effect(effect.label)
+    scales, unit = balance.scales, diagnosis.test[0].signals[0].unit
     site = effect.site if effect.site in scales.speeds else balance.channels[channel]
     if row.against == "speed":
         return scales.speeds[site], f"{site} speed [{unit}/s]"

@@ -84,10 +84,8 @@ def acts_one_way(problem: FitProblem, point: ModelPoint, label: str) -> bool:
 def where_it_acts(problem: FitProblem, point: ModelPoint, label: str) -> tuple[float, bool]:
     """Return what a model leaves where an effect acts, and whether that is one stretch of one record alone.
 
-    A law that is right leaves no more where it acts than elsewhere; one that stands for an unknown torque does.
-
-    Returns:
-        What is left over the effect's own torque there (rms), 0.0 where it is no more than elsewhere; one stretch.
+    A law that is right leaves no more where it acts than elsewhere (0.0); one that stands for an unknown torque does:
+    what is left is over the effect's own torque there (rms).
     """
     here, elsewhere, own_here, stretches = (np.zeros(0),) * 4
     for left, without, _ in _left_within_band(problem, point, point.without_effects([label])):
@@ -138,10 +136,7 @@ def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, 
     """Return the inertia that the record asks for by itself, in units of the nominal one, its error and its spread.
 
     The priors are off, and torque is regressed on motion: an inertia far from the model file's tells that the record
-    is of another machine.
-
-    Returns:
-        Inertia, standard error, spread in the model file; (1, 0, 0) of a model without one.
+    is of another machine. Of a model without one: (1, 0, 0).
     """
     shares = problem.models[0].inertia_shares()
     if not shares:

@@ -115,14 +115,7 @@ class RecordEvidence:
         return self.inertia + 2.0 * self.inertia_error
 
     def inertia_is_off(self, deviations: float) -> bool:
-        """Tell whether the record asks for an inertia that the model file does not allow, twice its error considered.
-
-        Args:
-            deviations: of the model file that count as outside.
-
-        Returns:
-            True where it does: the record is of no such machine.
-        """
+        """Tell whether the inertia and twice its error lie outside so many deviations of the model file."""
         width = deviations * np.log1p(self.inertia_spread)
         lowest = self.inertia - 2.0 * self.inertia_error
         return bool(np.log(max(self.highest_inertia, 1e-6)) < -width or np.log(max(lowest, 1e-6)) > width)
