@@ -21,8 +21,8 @@ from orchestrator.diagnosis.selection.grading import GRADE_RULES, GradeRule, hig
 
 HEADING = """# Ablation of the diagnosis's rules
 
-`python -m benchmarks.ablation ROWS.jsonl ... --docs docs/ablation.md` writes this page from the rows of other
-benchmarks. The records are those of [measurements](measurements.md#diagnosis), simulated and measured."""
+`python -m benchmarks.ablation ROWS.jsonl ... --docs docs/ablation.md` writes this part of the page from the rows that
+other benchmarks keep. The sections below say which these are."""
 LEAST = 2  # outcomes that a rule must change in RECORDS
 RECORDS = 730
 

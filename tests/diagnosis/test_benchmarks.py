@@ -1,6 +1,7 @@
 """The benchmarks' judge: what counts as right, allowed and wrong, under which grade, and what harm is."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,10 +12,11 @@ from benchmarks.judging import Row, Truth, grade_table, judge, size_line
 from benchmarks.measured import truth_of
 from benchmarks.simulated import Counts, simulated_tasks
 from benchmarks.verdicts import GRADES, Estimate, NamedEffect, Outcome
-from orchestrator.diagnosis.selection.grading import highest_grade
+from orchestrator.diagnosis.selection.grading import GRADE_RULES, highest_grade
 from tests.support.hidden_effects import MACHINES, Ways, none_case, single_case
 
 FRICTION = {"torque": Estimate(2.0, 1.5, 2.5)}
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "ablation.md"
 
 
 def named(**grades: str) -> Outcome:
@@ -136,6 +138,13 @@ def test_the_ablation_counts_the_names_whose_grade_would_rise_without_a_rule() -
     assert count_rule("sure size", rows) == RuleCount("sure size", records=2, wrong=1, right=1)
     assert count_rule("size", rows) == RuleCount("size", records=1, wrong=1, right=0)
     assert count_rule("inertia seen", rows) == RuleCount("inertia seen", records=0, wrong=0, right=0)
+
+
+def test_the_page_of_the_ablation_has_the_rules_as_they_are() -> None:
+    table = PAGE.read_text(encoding="utf-8").partition("\n## ")[0]
+    cells = [[cell.strip() for cell in line.split("|")[1:5]] for line in table.splitlines() if line.startswith("| ")]
+    rules = [[rule.name, rule.statistic, rule.setting and f"`{rule.setting}`", rule.reason] for rule in GRADE_RULES]
+    assert sorted(cells[1:]) == sorted(rules)
 
 
 def test_a_clean_record_that_is_said_to_lack_something_is_not_right() -> None:

@@ -17,7 +17,7 @@ from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
 from orchestrator.diagnosis.selection.screening import Screening, start_of_fit
 from orchestrator.diagnosis.selection.settling import fit_base, settle_anew
-from orchestrator.diagnosis.selection.subsets import Neighbours, Score, Subset
+from orchestrator.diagnosis.selection.subsets import Neighbours, Score, Subset, odds_against
 from orchestrator.diagnosis.settings import SelectionSettings
 from orchestrator.errors import ScenarioError
 
@@ -30,7 +30,6 @@ FITS = 24  # subsets that a round fits in full, at most
 SHOWN = 2.0  # sizes over their errors of an effect that the record shows
 TRIALS = 2  # in which an effect may be impossible
 RIVALS = 3  # fitted in an effect's place
-SURE = 3.0  # of the log score, by which an effect must be better than what stands in its place: odds of 20
 
 
 def search_effects(
@@ -260,8 +259,9 @@ class _Round:
     def _family(self, step: SearchStep) -> tuple[str, ...]:
         """Return the effects that the records do not tell from the one that a step took.
 
-        These are what it is not surely better than, and those of another kind over which it gains next to nothing of
-        the whole error: what is left of two laws that do the same differs by how exact either is, and no law is.
+        These are what it is not better than by as much as an effect must bring, for a law is no more exact beside
+        another law than beside none, and those of another kind over which it gains next to nothing of the whole error:
+        what is left of two laws that do the same differs by how exact either is, and no law is.
         """
         chosen, least = step.entry, self.settings.least_gain
         assert chosen is not None
@@ -273,7 +273,7 @@ class _Round:
                 continue
             score, foreign = self.score.score_fit(one.fitted), self.problem.effects[one.label].kind != kind
             alike = foreign and one.fitted.score < most and one.comparison.gain >= least
-            if alike or score > max(best - SURE, none):
+            if alike or score > max(best - odds_against(self.settings), none):
                 family.append(one.label)
         return tuple(family)
 

@@ -51,8 +51,7 @@ class Score:
         """Return the score for the whitening of a problem."""
         weights = np.concatenate([whitening.active.ravel() for whitening in problem.whitenings])
         rows = np.bincount(problem.blocks, weights**2).astype(float)
-        odds = -float(np.log(settings.effect_probability / (1.0 - settings.effect_probability)))
-        most = 2.0 * odds / max(settings.least_gain, 1e-9)
+        most = 2.0 * odds_against(settings) / max(settings.least_gain, 1e-9)
         return Score(problem, rows, max(problem.overdispersion, float(rows.sum()) / most), settings)
 
     def score_blocks(self, errors: Array, prior: Array, labels: Collection[str]) -> float:
@@ -71,10 +70,15 @@ class Score:
         A law that contains a simpler one is that law and one more: it costs as both do, or it would take the place of
         the simpler one for any gain.
         """
-        effect, p = self.problem.effects[label], self.settings.effect_probability
+        effect = self.problem.effects[label]
         starts = len(effect.starts) if effect.wave is None else effect.wave.cycles.size
         simpler = sum(self.log_prior(one) for one in effect.contains if one in self.problem.effects)
-        return float(np.log(p / (1.0 - p)) - np.log(max(starts, 1))) + simpler
+        return simpler - odds_against(self.settings) - float(np.log(max(starts, 1)))
+
+
+def odds_against(settings: SelectionSettings) -> float:
+    """Return the log odds against an effect before the record is seen: what its log score must bring."""
+    return float(np.log(1.0 / settings.effect_probability - 1.0))
 
 
 @dataclass(frozen=True, eq=False)
