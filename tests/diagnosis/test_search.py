@@ -100,6 +100,22 @@ def test_laws_of_two_kinds_that_do_the_same_are_a_family_though_one_is_more_exac
         assert found.reviews["a@motor"].family == family
 
 
+@pytest.mark.parametrize("probability", [0.02, 0.001])
+@pytest.mark.parametrize(("more", "family"), [(0.007, ("b@motor",)), (0.03, ())])
+def test_effects_are_told_apart_by_the_share_of_the_error_that_an_effect_must_take(probability, more, family):
+    """A model is known no better than to 1 % of its error: what leaves 0.7 % more is as good, whatever the odds."""
+    ramp, column, other, noise = np.random.default_rng(0).standard_normal((4, 2000))
+    other -= noise * (other @ noise) / (noise @ noise)
+    columns = {"a@motor": column, "b@motor": column + np.sqrt(more) * 0.1 / 0.4 * other}
+    data = 1.1 * ramp + 0.4 * column + 0.1 * noise
+    found = search_effects(
+        fit_problem([LinearModel(data, ramp, columns, 0.1)], FitSettings()),
+        SelectionSettings(effect_probability=probability),
+    )
+    assert found.final.labels == ("a@motor",)
+    assert found.reviews["a@motor"].family == family
+
+
 def test_no_more_effects_than_the_settings_allow():
     problem = linear_problem(dict.fromkeys(NAMES, 0.3))
     none = SelectionSettings(most_effects=0)
