@@ -124,8 +124,8 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     searched = workings.search
     record = record_evidence(searched, _dependences(workings, model, settings))
 
-    def tests(found: SearchResult) -> Tested:
-        own = _with_search(workings, found)
+    def tests(search: SearchResult) -> Tested:
+        own = _with_search(workings, search)
         misfits = misfit_on_test_data(own, model, settings)
         return misfits, misses_of(own, model, settings), torque_comparison(own, misfits, model, settings)
 

@@ -123,8 +123,8 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     arguments = port_arguments(workings.residuals)
     record = record_evidence(searched, find_dependences(searched, arguments, settings.selection))
 
-    def tests(one: SearchResult) -> Tested:
-        own = replace(workings, search=one)
+    def tests(search: SearchResult) -> Tested:
+        own = replace(workings, search=search)
         return misfit_on_test_data(own), misses_of(own), lambda point: None
 
     found, evidence, test = leave_out_refuted(searched, record, settings, tests)

@@ -141,13 +141,13 @@ def report_effects(
     """
     labels = result.final.labels
 
-    def report(source: SearchResult, one: EffectEvidence, in_model: bool) -> GradedEffect:
-        problem, final, (names, units) = source.problem, source.final, words(one.label)
-        name, _, site = one.label.partition("@")
+    def report(source: SearchResult, effect: EffectEvidence, in_model: bool) -> GradedEffect:
+        problem, final, label, (names, units) = source.problem, source.final, effect.label, words(effect.label)
+        name, _, site = label.partition("@")
         return GradedEffect(
-            name, site, *grade_effect(one, record, settings),
-            effect_estimates(problem, final, one.label, names, units, settings.report.level), one,
-            block_values(problem, final, one.label, names), problem.effects[one.label].of_log, in_model,
+            name, site, *grade_effect(effect, record, settings),
+            effect_estimates(problem, final, label, names, units, settings.report.level), effect,
+            block_values(problem, final, label, names), problem.effects[label].of_log, in_model,
         )  # fmt: skip
 
     graded = [report(result if one.label in labels else searched, one, one.label in labels) for one in evidence]

@@ -251,7 +251,7 @@ class _Round:
             after = self.fits[has]
             assert after is not None
             without = {label: self._fit_without(after, label) for label in has}
-            label = min(without, key=lambda one: without[one].score)
+            label = min(without, key=lambda last: without[last].score)
             entries[label] = without[label], TriedEffect(label, compare(without[label], after), after)
             has -= {label}
         return entries
