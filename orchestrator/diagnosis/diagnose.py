@@ -20,7 +20,6 @@ from orchestrator.diagnosis.report.estimates import (
     Tested,
     find_drive_gain,
     interval_width,
-    leave_out_refuted,
     parameter_estimates,
     report_effects,
     share_values,
@@ -33,6 +32,7 @@ from orchestrator.diagnosis.report.misfit_on_test_data import (
     torque_comparison,
     with_drift,
 )
+from orchestrator.diagnosis.report.testing import leave_out_refuted
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
 from orchestrator.diagnosis.selection.evidence import record_evidence, torque_shares
 from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence, SearchResult

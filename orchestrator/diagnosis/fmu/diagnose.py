@@ -20,8 +20,9 @@ from orchestrator.diagnosis.inference.fitting import fit_model, value_covariance
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParameter
-from orchestrator.diagnosis.report.estimates import Tested, leave_out_refuted, parameter_estimates, report_effects
+from orchestrator.diagnosis.report.estimates import Tested, parameter_estimates, report_effects
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
+from orchestrator.diagnosis.report.testing import leave_out_refuted
 from orchestrator.diagnosis.selection.evidence import record_evidence, torque_shares
 from orchestrator.diagnosis.selection.outcome import SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences

@@ -17,7 +17,6 @@ from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreCompariso
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import ModelPoint, Values
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, TestMisfit, ValueEstimate
-from orchestrator.diagnosis.selection.evidence import effect_evidence, leave_out_possible, possible_effects
 from orchestrator.diagnosis.selection.grading import grade_effect
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, RecordEvidence, SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -114,19 +113,6 @@ def interval_width(problem: FitProblem, level: float) -> float:
 
 def _wrap_phase(name: str, difference: float) -> float:
     return float((difference + np.pi) % (2.0 * np.pi) - np.pi) if name.endswith("phase") else difference
-
-
-def leave_out_refuted(
-    searched: SearchResult, record: RecordEvidence, settings: DiagnosisSettings, tests: Callable[[SearchResult], Tested]
-) -> tuple[SearchResult, list[EffectEvidence], tuple[TestMisfit, ...]]:
-    """Return the search without effects that are not even likely, or that test data refute; all evidence, misfits."""
-    result, evidence = searched, effect_evidence(searched)
-    while True:
-        result, evidence = leave_out_possible(result, evidence, record, settings)
-        test, missed, compared = tests(result)
-        evidence = add_test_evidence(evidence, result, test, missed, compared)
-        if not any(one.label in result.final.labels for one in possible_effects(evidence, record, settings)):
-            return result, evidence, test
 
 
 def report_effects(
