@@ -17,7 +17,7 @@ from orchestrator.diagnosis.model.plant_effects import effect_parameters, effect
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.estimates import (
     Named,
-    Tested,
+    add_test_evidence,
     find_drive_gain,
     interval_width,
     parameter_estimates,
@@ -32,10 +32,9 @@ from orchestrator.diagnosis.report.misfit_on_test_data import (
     torque_comparison,
     with_drift,
 )
-from orchestrator.diagnosis.report.testing import leave_out_refuted
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
-from orchestrator.diagnosis.selection.evidence import record_evidence, torque_shares
-from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence, SearchResult
+from orchestrator.diagnosis.selection.evidence import leave_out_refuted, record_evidence, torque_shares
+from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
 from orchestrator.diagnosis.selection.search import fit_effects, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -124,12 +123,15 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     searched = workings.search
     record = record_evidence(searched, _dependences(workings, model, settings))
 
-    def tests(search: SearchResult) -> Tested:
+    def add_tests(
+        search: SearchResult, evidence: Sequence[EffectEvidence]
+    ) -> tuple[list[EffectEvidence], tuple[TestMisfit, ...]]:
         own = _with_search(workings, search)
         misfits = misfit_on_test_data(own, model, settings)
-        return misfits, misses_of(own, model, settings), torque_comparison(own, misfits, model, settings)
+        missed, compared = misses_of(own, model, settings), torque_comparison(own, misfits, model, settings)
+        return add_test_evidence(evidence, search, misfits, missed, compared), misfits
 
-    result, evidence, test = leave_out_refuted(searched, record, settings, tests)
+    result, evidence, test = leave_out_refuted(searched, record, settings, add_tests)
     workings = _with_search(workings, result)
     test = with_drift(test, workings, model, settings.report)
     graded = report_effects(searched, result, evidence, partial(_words, model, result), record, settings)

@@ -20,11 +20,11 @@ from orchestrator.diagnosis.inference.fitting import fit_model, value_covariance
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParameter
-from orchestrator.diagnosis.report.estimates import Tested, parameter_estimates, report_effects
+from orchestrator.diagnosis.report.estimates import add_test_evidence, parameter_estimates, report_effects
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
-from orchestrator.diagnosis.report.testing import leave_out_refuted
-from orchestrator.diagnosis.selection.evidence import record_evidence, torque_shares
-from orchestrator.diagnosis.selection.outcome import SearchResult
+from orchestrator.diagnosis.result import TestMisfit
+from orchestrator.diagnosis.selection.evidence import leave_out_refuted, record_evidence, torque_shares
+from orchestrator.diagnosis.selection.outcome import EffectEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
 from orchestrator.diagnosis.selection.search import fit_effects, search_effects
 from orchestrator.diagnosis.selection.settling import fit_base
@@ -124,11 +124,14 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     arguments = port_arguments(workings.residuals)
     record = record_evidence(searched, find_dependences(searched, arguments, settings.selection))
 
-    def tests(search: SearchResult) -> Tested:
+    def add_tests(
+        search: SearchResult, evidence: Sequence[EffectEvidence]
+    ) -> tuple[list[EffectEvidence], tuple[TestMisfit, ...]]:
         own = replace(workings, search=search)
-        return misfit_on_test_data(own), misses_of(own), lambda point: None
+        misfits = misfit_on_test_data(own)
+        return add_test_evidence(evidence, search, misfits, misses_of(own), lambda point: None), misfits
 
-    found, evidence, test = leave_out_refuted(searched, record, settings, tests)
+    found, evidence, test = leave_out_refuted(searched, record, settings, add_tests)
     placed = workings.residuals[0].placed
     graded = report_effects(
         searched, found, evidence, lambda label: (placed[label].values_by_name, effect_units(problem, placed[label])),

@@ -26,7 +26,6 @@ from orchestrator.records.model_file import Model
 Array = NDArray[np.float64]
 Named = Callable[[Values], Mapping[str, float]]
 """Values of an effect -> its parameters by name."""
-Tested = tuple[tuple[TestMisfit, ...], Callable[[ModelPoint], float], Callable[[ModelPoint], ScoreComparison | None]]
 """Misfits on test data, and by the values of a model: what it misses, how much less the final one leaves."""
 CARRIERS = ("N.m", "kg.m2")  # begin the units of values that scale with the torque
 LEAST_CARRIERS = 4  # values that must agree

@@ -1,7 +1,8 @@
 """Evidence for the effects of a final model: what leaves with each, and what the record says of the whole model."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from orchestrator.diagnosis.selection.settling import leave_out
 from orchestrator.diagnosis.settings import DiagnosisSettings
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 FREE_SPREAD = 30.0  # of a parameter whose prior is off
 ACTIVE = 0.5  # of the largest weight, from which a row counts whole
 ACTS = 0.1  # of its largest torque, from which an effect acts
@@ -183,3 +185,20 @@ def _as_fitted(effect: EffectEvidence, result: SearchResult) -> EffectEvidence:
         return effect
     size = min(effect.size_t, size_over_error(problem, final, effect.label))
     return replace(effect, size_t=size, possible=effect.possible and problem.is_possible(effect.label, final.point))
+
+
+def leave_out_refuted(
+    searched: SearchResult, record: RecordEvidence, settings: DiagnosisSettings,
+    add_tests: Callable[[SearchResult, Sequence[EffectEvidence]], tuple[list[EffectEvidence], T]],
+) -> tuple[SearchResult, list[EffectEvidence], T]:  # fmt: skip
+    """Return the search without effects that are not even likely, or that test data refute; all evidence, misfits.
+
+    Args:
+        add_tests: a search and its evidence -> the evidence with what test data say, and the misfits of these.
+    """
+    result, evidence = searched, effect_evidence(searched)
+    while True:
+        result, evidence = leave_out_possible(result, evidence, record, settings)
+        evidence, test = add_tests(result, evidence)
+        if not any(one.label in result.final.labels for one in possible_effects(evidence, record, settings)):
+            return result, evidence, test
