@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import OrchestratorError
 from orchestrator.estimation.methods import maximum_likelihood
-from orchestrator.estimation.stages.locating import locate_gap
+from orchestrator.estimation.stages.location import locate_gap
 from orchestrator.records.model_file import Model, default_model, read_model
 from orchestrator.records.record import record_from_columns
 from tests.support.independent_plant import make_record

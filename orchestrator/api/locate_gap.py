@@ -19,8 +19,8 @@ from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.estimation.effort import Stop, never
 from orchestrator.estimation.protocol import LEVEL
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
-from orchestrator.estimation.stages.locating import locate_gap as find_gap
 from orchestrator.estimation.stages.location import Location, StageGap
+from orchestrator.estimation.stages.location import locate_gap as find_gap
 from orchestrator.estimation.stages.problem import GAPS
 from orchestrator.estimation.trust import trust_of_location
 from orchestrator.plants.known.two_stage_train import TRAIN

@@ -9,24 +9,13 @@ from numpy.typing import NDArray
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.joint import JointLikelihood
-from orchestrator.estimation.likelihood import GapFit, Likelihood
+from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.problem import ALPHA, STATE_NAMES, GapProblem, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
 MODEST_TORQUE_NOISE = 1e-2  # N.m.s^0.5, where no fit has told
 NOISE_PREFIXES = ("log_noise_", "log_torque_")
-
-
-def error_bound_of_fit(likelihood: Likelihood, fit: GapFit) -> float:
-    """Return the bound [rad] on alpha at a fit, noise levels and process noise as fitted.
-
-    The Fisher information of the innovations form: for Gaussian one-step errors e with variance s,
-    ``sum(e' e'^T / s) + sum(s' s'^T / s^2) / 2``, plus that of the priors. Where the fit found no process noise this
-    is the information of the deterministic plant.
-    """
-    column = list(fit.free).index(likelihood.problem.index(ALPHA))
-    return math.sqrt(fit.covariance[column, column])
 
 
 def error_bound(
@@ -87,5 +76,5 @@ def error_bound_at(record: Record, model: Model, alpha: float) -> float:
         alpha: [rad].
     """
     problem = make_problem(record, model)
-    noise = problem.noise.measured
+    noise = tuple(math.exp(u.mean) for u in problem.unknowns if u.name.startswith("log_noise_"))
     return error_bound(problem, {ALPHA: alpha}, noise, MODEST_TORQUE_NOISE)

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.estimation.cramer_rao import error_bound_of_fit
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
-from orchestrator.estimation.likelihood import Fit, GapFit, Likelihood
-from orchestrator.estimation.problem import DRY, LEAST_TORQUE_NOISE
+from orchestrator.estimation.likelihood import Fit, GapFit
+from orchestrator.estimation.problem import DRY, LEAST_TORQUE_NOISE, OFFSET
 from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import GapVerdictSettings
@@ -22,10 +21,10 @@ def describe(fit: GapFit) -> Estimate:
     """Return the estimate of a fit: interval, visibility, and what else the fit says."""
     wider = _widening(fit)
     fit, curve = profile(fit, NORMAL_95**2 * wider)
-    alpha, error, _ = _gap_of(fit)
+    alpha = fit.size
     low, high = curve.interval(alpha, NORMAL_95**2 * wider)
     # A profile point that is not quite the maximum makes the interval too short, never too long.
-    half = NORMAL_95 * math.sqrt(wider) * error
+    half = NORMAL_95 * math.sqrt(wider) * fit.size_deviation
     return _describe(fit, curve, wider, (min(low, max(alpha - half, 0.0)), max(high, alpha + half)))
 
 
@@ -34,13 +33,12 @@ def _widening(fit: GapFit) -> float:
 
     Kent (Biometrika 69(1), 1982): twice the drop of the log likelihood is chi-squared times that ratio.
     """
-    *_, column = _gap_of(fit)
-    return max(_misfit_variance(fit), block_variance(fit, column, fit.likelihood.settings.verdict.blocks))
+    return max(_misfit_variance(fit), block_variance(fit, fit.column, fit.likelihood.settings.verdict.blocks))
 
 
 def describe_unfinished(fit: GapFit, why: str) -> Estimate:
     """Return the estimate of a fit that was ended before it was done, its interval by the curvature alone."""
-    alpha, error, _ = _gap_of(fit)
+    alpha, error = fit.size, fit.size_deviation
     wider = fit.likelihood.settings.verdict.misfit_widening**2
     half = NORMAL_95 * math.sqrt(wider) * error
     places = np.maximum(alpha + 1.5 * half * np.linspace(-1.0, 1.0, 9), 0.0)
@@ -49,13 +47,6 @@ def describe_unfinished(fit: GapFit, why: str) -> Estimate:
     said = f"the fit was ended before it was done ({why}), and this is the best that it had reached"
     diagnostics = dict(found.diagnostics) | {"converged": False, "stopped": said}
     return replace(found, message="; ".join(text for text in (said, found.message) if text), diagnostics=diagnostics)
-
-
-def _gap_of(fit: GapFit) -> tuple[float, float, int]:
-    """Return half-gap and standard error [rad] of a fit, and the gap's place among the free unknowns."""
-    place = fit.likelihood.problem.index("alpha")
-    column = list(fit.free).index(place)
-    return float(fit.point.theta[place]), math.sqrt(fit.covariance[column, column]), column
 
 
 def _misfit_variance(fit: GapFit) -> float:
@@ -70,11 +61,9 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     """Return the estimate of a fit with this interval [rad], whose variance is ``wider`` times that of white errors."""
     likelihood = fit.likelihood
     problem, settings = likelihood.problem, likelihood.settings.verdict
-    alpha, error, _ = _gap_of(fit)
-    error *= math.sqrt(wider)
-    limit = NORMAL_95**2 * wider
+    alpha, error = fit.size, math.sqrt(wider) * fit.size_deviation
     low, high = interval
-    kept = likelihood.run(fit.point.theta, keep=True)
+    kept, levels = likelihood.run(fit.point.theta, keep=True), likelihood.noise(fit.point.theta)
     contacts = kept.contacts[:, 0]
     flanks = contacts[contacts != 0]
     traversals = int(np.count_nonzero(np.diff(flanks))) if alpha > 0.0 else 0
@@ -83,16 +72,16 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
         "converged": fit.converged,
         "iterations": fit.iterations,
         "traversals": traversals,
-        "profile_limit": limit,
-        "cramer_rao": error_bound_of_fit(likelihood, fit),
+        "profile_limit": NORMAL_95**2 * wider,
+        "cramer_rao": fit.size_deviation,
         "deviance": fit.point.deviance,
-        "parameters": _parameters(likelihood, fit),
+        "parameters": fit.parameters(),
         "innovation_autocorrelation": [float(autocorrelation(white[:, n])) for n in range(white.shape[1])],
-        "torque_noise": list(likelihood.noise(fit.point.theta).torque),
-        "measurement_noise": list(likelihood.noise(fit.point.theta).measured[: white.shape[1]]),
+        "torque_noise": list(levels.torque),
+        "measurement_noise": list(levels.measured[: white.shape[1]]),
     }
     visible, message = _verdict(alpha, low, high, traversals)
-    still = stillness_note(problem.outputs, likelihood.noise(fit.point.theta).measured, settings)
+    still = stillness_note(problem.outputs, levels.measured, settings)
     message = still or message
     if "cannot be seen" in message:  # then no number is an answer
         visible, alpha, error, low, high = False, math.nan, math.inf, 0.0, math.inf
@@ -104,7 +93,7 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     crawl = friction_note(fit, (high - low) / (2.0 * alpha)) if visible else ""
     message = "; ".join(text for text in (message, lacking, torque_words(problem), crawl) if text)
     curves = {"states": kept.states, "contacts": contacts, "errors": kept.errors, "profile": curve}
-    curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
+    curves["offset"] = float(fit.point.theta[problem.index(OFFSET)]) if OFFSET in problem.names else 0.0
     curves["model"] = likelihood.parameters(fit.point.theta)
     curves["covariance"] = wider * fit.covariance  # of diagnostics["parameters"], in their order
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
@@ -139,11 +128,6 @@ def block_variance_along(fit: Fit[Any], slope: Array, blocks: int) -> float:
     if not ratio > 2.0 * float(gammaincinv(0.5 * (blocks - 1), 0.975)) / (blocks - 1.0):
         return 1.0
     return ratio * (float(stdtrit(blocks - 1, 0.975)) / NORMAL_95) ** 2
-
-
-def _value(likelihood: Likelihood, fit: GapFit, name: str) -> float:
-    names = likelihood.problem.names
-    return float(fit.point.theta[names.index(name)]) if name in names else 0.0
 
 
 def _verdict(alpha: float, low: float, high: float, traversals: int) -> tuple[bool, str]:
@@ -184,10 +168,9 @@ def friction_note(fit: GapFit, reach: float) -> str:
         reach: half of the interval over the half-gap.
     """
     settings, names = fit.likelihood.settings.verdict, fit.likelihood.problem.names
-    _, error, column = _gap_of(fit)
     rest = [n for n, place in enumerate(fit.free) if names[place] not in DRY]
-    known = inverse(fit.information[np.ix_(rest, rest)])[rest.index(column), rest.index(column)]
-    share = 1.0 - float(known) / error**2
+    column = rest.index(fit.column)
+    share = 1.0 - float(inverse(fit.information[np.ix_(rest, rest)])[column, column]) / fit.size_deviation**2
     if share < settings.open_friction or reach < settings.worth_a_record:
         return ""
     return (
@@ -220,14 +203,3 @@ def autocorrelation(white: Array) -> float:
     """Return the autocorrelation at lag one."""
     centred = white - white.mean()
     return float(np.sum(centred[1:] * centred[:-1]) / max(float(np.sum(centred**2)), 1e-300))
-
-
-def _parameters(likelihood: Likelihood, fit: GapFit) -> dict[str, dict[str, float]]:
-    """Return value, standard error and nominal of each fitted unknown."""
-    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    table = {}
-    for n, error in zip(fit.free, errors, strict=True):
-        unknown = likelihood.problem.unknowns[n]
-        entry = {"value": float(fit.point.theta[n]), "standard_error": float(error), "nominal": unknown.mean}
-        table[unknown.name] = entry
-    return table

@@ -85,18 +85,12 @@ def design(
         raise DesignError(f"`duration` must be at least {SHORTEST:g} s, but is {duration:g}")
     time = np.arange(n) / rate
     task = _Task(time, model, alpha, limits, motor_only)
-    shapes = _simple_shapes(time)
+    shapes, say = _simple_shapes(time), tell or (lambda done, of: None)
     candidates = []
     for name, shape in shapes:
         candidates.append(_judge(name, shape, task))
-        if tell is not None:
-            tell(len(candidates), len(shapes) + SEARCH)
-
-    def look(done: int) -> None:
-        if tell is not None:
-            tell(len(shapes) + done, len(shapes) + SEARCH)
-
-    candidates.append(_search(task, look))
+        say(len(candidates), len(shapes) + SEARCH)
+    candidates.append(_search(task, lambda done: say(len(shapes) + done, len(shapes) + SEARCH)))
     return time, sorted(candidates, key=lambda candidate: candidate.bound)
 
 
@@ -109,8 +103,7 @@ def simple_candidates(
         alpha: half-gap that shall be measured [rad].
     """
     time = np.arange(round(duration * rate)) / rate
-    task = _Task(time, model, alpha, limits, motor_only)
-    found = [_judge(name, shape, task) for name, shape in _simple_shapes(time)[::2]]
+    found = [_judge(*entry, _Task(time, model, alpha, limits, motor_only)) for entry in _simple_shapes(time)[::2]]
     return sorted(found, key=lambda candidate: candidate.bound)
 
 

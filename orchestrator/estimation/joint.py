@@ -12,12 +12,12 @@ from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.filter.innovations import Innovations
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import Likelihood
-from orchestrator.estimation.problem import OFFSET, SAMPLED, STATE_NAMES, GapProblem
+from orchestrator.estimation.problem import OFFSET, SAMPLED, SMOOTH, STATE_NAMES, GapProblem
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.record import Record
 
-OWN = (*STATE_NAMES, OFFSET, SAMPLED)  # the unknowns that each record has for itself
+OWN = (*STATE_NAMES, OFFSET, SAMPLED, SMOOTH)  # the unknowns that each record has for itself
 
 
 def _joint_problem(problems: Sequence[GapProblem]) -> GapProblem:

@@ -30,6 +30,7 @@ from orchestrator.estimation.problem import (
     OFFSET,
     SAMPLED,
     SCALE,
+    SMOOTH,
     STATE_NAMES,
     TORQUE_OFFSET,
     GapProblem,
@@ -70,6 +71,8 @@ class FilterLikelihood(ABC, Generic[P]):
 
     Attributes:
         size: place of the gap's size among the unknowns.
+        torque_places: places of the levels of torque noise.
+        others: places of all other unknowns.
     """
 
     def __init__(
@@ -81,7 +84,8 @@ class FilterLikelihood(ABC, Generic[P]):
         self.size = problem.index(size)
         self._place = {name: n for n, name in enumerate(problem.names)}
         self._noise = [n for name, n in self._place.items() if name.startswith("log_noise_")]
-        self._torque = [n for name, n in self._place.items() if name.startswith("log_torque_")]
+        self.torque_places = [n for name, n in self._place.items() if name.startswith("log_torque_")]
+        self.others = [n for n in self._place.values() if n not in self.torque_places]
         self.information = np.diag([(10.0 / u.scale) ** 2 for u in problem.unknowns])  # the last one known
         self._floor = np.array([(0.1 / u.scale) ** 2 for u in problem.unknowns])
         self.effort = effort or Effort()
@@ -125,6 +129,8 @@ class FilterLikelihood(ABC, Generic[P]):
         u = record.u
         if SAMPLED in self._place and record.u_sampled is not None:
             u = u + self.value(theta, SAMPLED) * (record.u_sampled - u)
+        if SMOOTH in self._place:
+            u = u + self.value(theta, SMOOTH) * (smooth_torque(u) - u)
         u = delay(u, record.step, self.value(theta, LATE))
         return self.value(theta, SCALE) * u + self.value(theta, TORQUE_OFFSET)
 
@@ -132,7 +138,7 @@ class FilterLikelihood(ABC, Generic[P]):
         """Return the noise levels of a vector."""
         measured, torque = (
             tuple(math.exp(min(max(theta[n], LEAST_LOG_NOISE), LARGEST_LOG_NOISE)) for n in places)
-            for places in (self._noise, self._torque)
+            for places in (self._noise, self.torque_places)
         )
         return NoiseLevels(measured, torque)
 
@@ -280,6 +286,30 @@ class Fit(Generic[L]):
         """Return the inverse (k, k) of the information."""
         return inverse(self.information)
 
+    @property
+    def size(self) -> float:
+        """Return the gap's size [rad]."""
+        return float(self.point.theta[self.likelihood.size])
+
+    @property
+    def column(self) -> int:
+        """Return the place of the gap's size among the free unknowns."""
+        return list(self.free).index(self.likelihood.size)
+
+    @property
+    def size_deviation(self) -> float:
+        """Return the Cramer-Rao bound [rad] on the gap's size, noise levels and process noise as fitted."""
+        return math.sqrt(self.covariance[self.column, self.column])
+
+    def parameters(self) -> dict[str, dict[str, float]]:
+        """Return value, standard error and nominal of each free unknown."""
+        errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        unknowns = [self.likelihood.problem.unknowns[n] for n in self.free]
+        return {
+            unknown.name: {"value": float(self.point.theta[n]), "standard_error": float(error), "nominal": unknown.mean}
+            for n, unknown, error in zip(self.free, unknowns, errors, strict=True)
+        }
+
 
 class Likelihood(FilterLikelihood[GapProblem]):
     """The likelihood of a record of the drivetrain."""
@@ -312,12 +342,22 @@ class Likelihood(FilterLikelihood[GapProblem]):
 
 
 def delay(u: Array, step: float, late: float) -> Array:
-    """Return held values (n,) by ``late`` [s] later; where two share a sample, by the time that each has of it."""
+    """Return held values (n,) by ``late`` [s] later, between rows by Lagrange's cubic.
+
+    Weighting the two rows that share a sample by their time in it would smear the torque as a lag of the drive does.
+    """
     rows = math.floor(late / step)
-    part = late / step - rows
+    d = late / step - rows
     places = np.arange(u.size) - rows
-    before, after = (u[np.clip(places - n, 0, u.size - 1)] for n in (1, 0))
-    return np.asarray(part * before + (1.0 - part) * after)
+    weights = (d * (d - 1.0) * (2.0 - d) / 6.0, (d + 1.0) * (d - 1.0) * (d - 2.0) / 2.0,
+               (d + 1.0) * d * (2.0 - d) / 2.0, (d + 1.0) * d * (d - 1.0) / 6.0)  # fmt: skip
+    return np.asarray(sum(w * u[np.clip(places - n, 0, u.size - 1)] for n, w in enumerate(weights, -1)))
+
+
+def smooth_torque(u: Array) -> Array:
+    """Return the held values (n,) that act as a smooth torque through ``u``, half a row late: a hold spreads more."""
+    wide = np.concatenate([u[:1], u, u[-1:]])
+    return np.asarray(u - (wide[2:] - 2.0 * u + wide[:-2]) / 24.0)
 
 
 GapFit = Fit[Likelihood]

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import Array, NoiseLevels
+from orchestrator.estimation.filter.model import Array
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import rms, rms_behind_lag, robust_noise
@@ -23,9 +24,12 @@ LOAD_TORQUE = "effects.load_torque.torque"  # constant; of a prior as wide as th
 SCALE_SPREAD, OFFSET_SHARE, FRICTION_SHARE, LATE_SPREAD = 0.03, 0.03, 0.1, 3e-3
 SLIDING = 5e-3  # of a body's rms speed, at which its dry friction has set in by seven tenths
 SAMPLED = "u_sampled"  # way from a torque that is held between its own rows to a smooth one: 0 to 1
+SMOOTH = "u_smooth"  # the same of a torque that has a row for each of the record's
 OFFSET = "effects.sensor_offset.load.offset"
 IMPULSE = "contact_impulse"
-IMPULSE_DEPTH = 2e-3  # rad, within which a contact's damping sets in; prior standard deviation
+# Depth within which a contact's damping sets in, prior standard deviation: an angle [rad], or, where that is more, a
+# share of the shaft's twist under the drive's torque.
+IMPULSE_DEPTH, IMPULSE_SHARE = 2e-3, 0.1
 OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
 # White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record, and one whose contact
@@ -83,6 +87,12 @@ class UnknownProblem:
         chosen = [self.unknowns[n] for n in places]
         return np.array([unknown.lower for unknown in chosen]), np.array([unknown.upper for unknown in chosen])
 
+    def with_unknown(self, place: int, **changes: Any) -> Self:
+        """Return the problem with another mean, or other bounds, of the unknown at a place."""
+        unknowns = list(self.unknowns)
+        unknowns[place] = replace(unknowns[place], **changes)
+        return replace(self, unknowns=tuple(unknowns))
+
 
 @dataclass(frozen=True)
 class GapProblem(UnknownProblem):
@@ -90,13 +100,11 @@ class GapProblem(UnknownProblem):
 
     Attributes:
         base: parameter tuple of the model.
-        noise: nominal noise levels, for those that are not among the unknowns.
         torque_units: by what levels of torque noise at motor and load are to be multiplied for a drive as weak, or as
             strong, as this one.
     """
 
     base: tuple[float, ...]
-    noise: NoiseLevels
     torque_units: tuple[float, float] = (1.0, 1.0)
 
     @property
@@ -117,32 +125,25 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
     if both:
         unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
-    damping = model.parameters["c"].value
-    unknowns.append(Unknown(IMPULSE, 0.0, 0.5 * IMPULSE_DEPTH * damping, 0.5 * IMPULSE_DEPTH * damping))
+    pull = abs(ratio) * rms_behind_lag(record.u, record.step, model.parameters["tau"].value)
+    depth = max(IMPULSE_DEPTH, IMPULSE_SHARE * pull / model.parameters["k"].value)
+    impulse = 0.5 * depth * model.parameters["c"].value
+    unknowns.append(Unknown(IMPULSE, 0.0, impulse, impulse))
     unknowns += torque_unknowns(record, model, model.parameters["tau"].value, ratio)
     if LOAD_TORQUE not in (unknown.name for unknown in unknowns):
         own = model.parameters.get(LOAD_TORQUE)
-        pull = abs(ratio) * rms_behind_lag(record.u, record.step, model.parameters["tau"].value)
         unknowns.append(Unknown(LOAD_TORQUE, own.value if own is not None else 0.0, pull, 1e-3 * pull))
-    if record.u_sampled is not None:
-        unknowns.append(Unknown(SAMPLED, 0.0, math.inf, 0.1, 0.0, 1.0))
+    unknowns.append(Unknown(SMOOTH if record.u_sampled is None else SAMPLED, 0.0, math.inf, 0.1, 0.0, 1.0))
     units = _torque_units(record, model.parameters["tau"].value, ratio)
     unknowns += _initial_state(record, ratio, units[0])
-    levels, noises = [], []
     for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
-        level = measurement_noise(record, model, column)
-        levels.append(level)
-        noises.append(encoder_unknown(record, model, column, level))
+        unknowns.append(encoder_unknown(record, model, column))
     exact = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE)
     lows = scale_noise(exact if both else LEAST_WHERE_INEXACT, units)
     highs = scale_noise((LARGEST_TORQUE_NOISE, LARGEST_TORQUE_NOISE), units)
     for side, low, high in zip(("motor", "load"), lows, highs, strict=True):
-        noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(high)))
-    if not both:
-        levels.append(levels[0])
-    noise = NoiseLevels((levels[0], levels[1]), (1.0, 1.0))
-    sliding = sliding_speeds(record, ratio)
-    return GapProblem(record, tuple(unknowns + noises), outputs, sliding, model.values, noise, units)
+        unknowns.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(high)))
+    return GapProblem(record, tuple(unknowns), outputs, sliding_speeds(record, ratio), model.values, units)
 
 
 def parameter_unknowns(model: Model, without: Collection[str]) -> list[Unknown]:
@@ -187,9 +188,9 @@ def sliding_speeds(record: Record, ratio: float) -> tuple[float, float]:
     return max(speed, 1e-9), max(speed / abs(ratio), 1e-9)
 
 
-def encoder_unknown(record: Record, model: Model, column: str, level: float) -> Unknown:
-    """Return the logarithm of an encoder's noise, about ``level`` [rad] of :func:`measurement_noise`."""
-    encoder = model.encoder(column)
+def encoder_unknown(record: Record, model: Model, column: str) -> Unknown:
+    """Return the logarithm of an encoder's noise, about that of :func:`measurement_noise`."""
+    encoder, level = model.encoder(column), measurement_noise(record, model, column)
     known = encoder.noise is not None and encoder.resolution is not None and record.averaged == 1
     spread = 0.02 if known else NOISE_SPREAD
     least = max(math.log(level) - 6.0, math.log(max(rounding_noise(record, model, column), 1e-12)))
@@ -241,9 +242,7 @@ def measurement_noise(record: Record, model: Model, column: str) -> float:
     is sqrt(20)); rounding adds a twelfth of the squared count. What is stated of an encoder holds for its own samples,
     not for averages of them.
     """
-    values = record.theta_m if column == "theta_m" else record.theta_l
-    assert values is not None
-    encoder = model.encoder(column) if record.averaged == 1 else Encoder()
+    values, encoder = _encoder(record, model, column)
     rounding = rounding_noise(record, model, column)
     level = max(robust_noise(values), rounding) if encoder.noise is None else math.hypot(encoder.noise, rounding)
     return max(level, 1e-9)
@@ -254,14 +253,13 @@ def rounding_noise(record: Record, model: Model, column: str) -> float:
 
     No fitted noise is smaller: while a machine rests, its rounding errors are all the same, but they do not go away.
     """
-    values = record.theta_m if column == "theta_m" else record.theta_l
-    assert values is not None
-    encoder = model.encoder(column) if record.averaged == 1 else Encoder()
+    values, encoder = _encoder(record, model, column)
     count = quantisation_step(values[np.isfinite(values)]) if encoder.resolution is None else encoder.resolution
     return count / math.sqrt(12.0)
 
 
-def with_least_torque_noise(problem: GapProblem, least: tuple[float, float]) -> GapProblem:
-    """Return the problem with at least this much torque noise [N.m.s^0.5] at motor and load."""
-    low = {f"log_torque_{side}": math.log(value) for side, value in zip(("motor", "load"), least, strict=True)}
-    return replace(problem, unknowns=tuple(replace(u, lower=low.get(u.name, u.lower)) for u in problem.unknowns))
+def _encoder(record: Record, model: Model, column: str) -> tuple[Array, Encoder]:
+    """Return the angles of an encoder, and what is stated of it; nothing where the angles are averages of samples."""
+    values = record.theta_m if column == "theta_m" else record.theta_l
+    assert values is not None
+    return values, model.encoder(column) if record.averaged == 1 else Encoder()

@@ -41,31 +41,27 @@ def profile(fit: GapFit, limit: float) -> tuple[GapFit, Profile]:
 
     Where a place of it is better than the fit, that was no maximum: it goes on from there, and is returned.
     """
-    for _ in range(MOST_STARTS):
-        curve, better = _follow(fit, limit)
+    for start in range(MOST_STARTS + 1):
+        curve, better = _follow(fit, limit, BETTER if start < MOST_STARTS else math.inf)
         if better is None:
-            return fit, curve
+            break
         fit = maximise(better.likelihood, better.point.theta, list(fit.free), tolerance=2e-3)
-    return fit, _follow(fit, limit)[0]
+    return fit, curve
 
 
-def _follow(fit: GapFit, limit: float) -> tuple[Profile, GapFit | None]:
-    """Return the profile, and the place that is better than the fit, at which it stops."""
-    likelihood = fit.likelihood
-    place = likelihood.problem.index("alpha")
-    column = list(fit.free).index(place)
-    deviation = math.sqrt(fit.covariance[column, column])
-    slope = fit.covariance[:, column] / fit.covariance[column, column]
-    best, edge = float(fit.point.theta[place]), math.sqrt(limit)
+def _follow(fit: GapFit, limit: float, most: float) -> tuple[Profile, GapFit | None]:
+    """Return the profile, and the place that is better than the fit by ``most``, at which it stops."""
+    likelihood, place, best, edge = fit.likelihood, fit.likelihood.size, fit.size, math.sqrt(limit)
+    slope = fit.covariance[:, fit.column] / fit.size_deviation**2
     entries = {best: 0.0}
     for side in (-1.0, 1.0):
-        reach = 0.6 * edge * deviation
+        reach = 0.6 * edge * fit.size_deviation
         for _ in range(MOST_PLACES):
             alpha = min(max(best + side * reach, 0.0), likelihood.problem.unknowns[place].upper)
             held = _fit_at_size(likelihood, fit, place, alpha, slope)
             likelihood, drop = held.likelihood, held.point.objective - fit.point.objective
             entries[alpha] = drop
-            if drop < -BETTER:
+            if drop < -most:
                 return _curve(entries), held
             if drop > limit or alpha in (0.0, likelihood.problem.unknowns[place].upper):
                 break

@@ -1,14 +1,17 @@
 """Derived signals that the classical methods share: smoothed speeds and the shaft's torque."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from orchestrator.estimation.filter.model import Array
-from orchestrator.estimation.protocol import NotApplicableError
+from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.noise import robust_noise
+from orchestrator.shared.inference.normal import interval_95
 
 WINDOW = 0.06  # s, of the Savitzky-Golay derivatives
 
@@ -53,3 +56,23 @@ def shaft_signals(record: Record, model: Model) -> ShaftSignals:
     impulse[2 * width] = 1.0
     gain = float(np.linalg.norm(savgol_filter(impulse, width, 3, deriv=2, delta=h)))
     return ShaftSignals(twist, rate, torque, p["J_l"] * gain * robust_noise(record.theta_l))
+
+
+def sides_of(torque: Array, limit: float) -> Array:
+    """Return the flank (n,) that a torque loads: 1, -1, or 0 where it is within ``limit`` [N.m]."""
+    return np.where(torque > limit, 1, np.where(torque < -limit, -1, 0))
+
+
+def estimate_of(method: str, alpha: float, error: float, diagnostics: Mapping[str, Any]) -> Estimate:
+    """Return the estimate of a method: half-gap and standard error [rad]; no half-gap is negative."""
+    interval = interval_95(max(alpha, 0.0), error, 0.0)
+    return Estimate(method, max(alpha, 0.0), error, interval, interval[0] > 0.0, "", diagnostics)
+
+
+def estimate_of_sizes(
+    method: str, alpha: float, sizes: Array, systematic: float, diagnostics: Mapping[str, Any]
+) -> Estimate:
+    """Return an estimate whose error is the scatter of the median of ``sizes`` (n,) [rad], and a share of ``alpha``."""
+    scatter = 1.2533 * float(np.std(sizes, ddof=1)) / float(np.sqrt(sizes.size))
+    error = float(np.hypot(scatter, systematic * max(alpha, 0.0)))
+    return estimate_of(method, alpha, error, {**diagnostics, "scatter": scatter})

@@ -1,7 +1,5 @@
 """Whether a torque with rows of its own is held from one to the next, or sampled from a signal that never rests."""
 
-from dataclasses import replace
-
 from orchestrator.estimation.likelihood import GapFit, maximise
 from orchestrator.estimation.problem import SAMPLED, GapProblem
 
@@ -21,10 +19,8 @@ def settle_torque(fit: GapFit) -> GapFit:
 
 def _refit(fit: GapFit, place: int, reading: float) -> GapFit:
     """Return the fit, its values moved, with a reading of the torque at ``place`` of the unknowns."""
-    likelihood = fit.likelihood
-    unknowns = list(likelihood.problem.unknowns)
-    unknowns[place] = replace(unknowns[place], mean=reading, lower=reading, upper=reading)
-    likelihood = likelihood.with_options(problem=replace(likelihood.problem, unknowns=tuple(unknowns)))
+    problem = fit.likelihood.problem.with_unknown(place, mean=reading, lower=reading, upper=reading)
+    likelihood = fit.likelihood.with_options(problem=problem)
     start = fit.point.theta.copy()
     start[place] = reading
     return maximise(likelihood, start, [n for n in fit.free if n != place], tolerance=2e-3)

@@ -31,7 +31,6 @@ from orchestrator.estimation.problem import (
     TORQUE_OFFSET,
     make_problem,
     scale_noise,
-    with_least_torque_noise,
 )
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
@@ -130,20 +129,17 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit
     likelihood = likelihood.with_options(soft=short.soft, information=short.information)
     if _has_least_noise(short):
         likelihood = _with_least_noise(likelihood)
-    torque, others = _split(likelihood)
-    start = maximise(likelihood, first.point.theta, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
-    best = _free_fit(start.likelihood, start, torque, others)
-    return _with_contact(best, torque, others) if likelihood.problem.outputs.shape[1] == 2 else best
+    best = _fit_long(likelihood, first.point.theta)
+    return _with_contact(best) if likelihood.problem.outputs.shape[1] == 2 else best
 
 
 def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
     """Return the fit of all unknowns, by grid and continuation in the torque noise."""
     problem = likelihood.problem
-    torque, others = _split(likelihood)
     report("trying sizes", 0.0)
     if problem.outputs.shape[1] == 2:
         levels = _levels(likelihood, BOTH_ENCODERS)
-        tried, likelihood = _first_fits(likelihood, torque, others, np.log(levels[0]))
+        tried, likelihood = _first_fits(likelihood, np.log(levels[0]))
         firsts = _different(tried, problem.index("alpha"), likelihood.settings.fit.different)
         fits = []
         for n, first in enumerate(firsts):
@@ -151,24 +147,27 @@ def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
             best, likelihood = _continue(likelihood, first, levels[1:])
             fits.append(best)
         report("fitting the noise", BEFORE_FREE)
-        best = _free_fit(likelihood, min(fits, key=lambda fit: fit.point.objective), torque, others)
-        return _with_contact(best, torque, others)
-    best, likelihood = _fit_one_encoder(likelihood, torque, others)
-    return _free_fit(likelihood, best, torque, others)
+        best = _free_fit(likelihood, min(fits, key=lambda fit: fit.point.objective))
+        return _with_contact(best)
+    best, likelihood = _fit_one_encoder(likelihood)
+    return _free_fit(likelihood, best)
 
 
-def _with_contact(best: GapFit, torque: list[int], others: list[int]) -> GapFit:
+def _with_contact(best: GapFit) -> GapFit:
     """Return the fit, with a least torque noise where the machine's contact law is not the model's."""
     likelihood = best.likelihood
-    if not _has_other_contact(likelihood, best):
-        return best
-    if _has_least_noise(likelihood):
+    if not _has_other_contact(likelihood, best) or _has_least_noise(likelihood):
         return best
     likelihood = _with_least_noise(likelihood)
-    start = best.point.theta.copy()
-    start[torque] = np.maximum(start[torque], np.log(likelihood.problem.least_where_inexact))
-    best = maximise(likelihood, start, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
-    return _free_fit(best.likelihood, best, torque, others)
+    return _fit_long(
+        likelihood, np.maximum(best.point.theta, likelihood.problem.bounds(range(best.point.theta.size))[0])
+    )
+
+
+def _fit_long(likelihood: Likelihood, start: Array) -> GapFit:
+    """Return the fit with the torque noise free that starts from a vector near it."""
+    best = maximise(likelihood, start, likelihood.others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
+    return _free_fit(best.likelihood, best)
 
 
 def _has_least_noise(likelihood: Likelihood) -> bool:
@@ -180,7 +179,9 @@ def _has_least_noise(likelihood: Likelihood) -> bool:
 def _with_least_noise(likelihood: Likelihood) -> Likelihood:
     """Return the likelihood with the torque noise kept above what an inexact model needs."""
     problem = likelihood.problem
-    return likelihood.with_options(problem=with_least_torque_noise(problem, problem.least_where_inexact))
+    for side, least in zip(("motor", "load"), problem.least_where_inexact, strict=True):
+        problem = problem.with_unknown(problem.index(f"log_torque_{side}"), lower=math.log(least))
+    return likelihood.with_options(problem=problem)
 
 
 def _has_other_contact(likelihood: Likelihood, fit: GapFit) -> bool:
@@ -193,12 +194,11 @@ def _has_other_contact(likelihood: Likelihood, fit: GapFit) -> bool:
 
 def _continue(likelihood: Likelihood, best: GapFit, levels: Sequence[tuple[float, float]]) -> tuple[GapFit, Likelihood]:
     """Return the last fit that paid while the torque noise goes through ``levels``, and what it has learnt."""
-    torque, others = _split(likelihood)
     failures, least = 0, best.point.objective
     for level in levels:
         start = best.point.theta.copy()
-        start[torque] = np.log(level)
-        trial = maximise(likelihood, start, others, likelihood.settings.fit.steps_per_level, tolerance=1.0)
+        start[likelihood.torque_places] = np.log(level)
+        trial = maximise(likelihood, start, likelihood.others, likelihood.settings.fit.steps_per_level, tolerance=1.0)
         least = min(least, trial.point.objective)
         if trial.point.objective < least + likelihood.settings.fit.allowed_rise:
             best, failures, likelihood = trial, 0, trial.likelihood
@@ -209,7 +209,7 @@ def _continue(likelihood: Likelihood, best: GapFit, levels: Sequence[tuple[float
     return best, likelihood
 
 
-def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int]) -> tuple[GapFit, Likelihood]:
+def _fit_one_encoder(likelihood: Likelihood) -> tuple[GapFit, Likelihood]:
     """Return the best fit with little torque noise, and the likelihood with its flanks as that fit took them.
 
     The flanks are blurred at first and sharpened then. The second start of the grid is tried where the first one does
@@ -218,22 +218,20 @@ def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int
     """
     found: list[tuple[GapFit, Likelihood]] = []
     blur = _levels(likelihood, BLURRED)
-    firsts, likelihood = _first_fits(likelihood.with_options(soft=True), torque, others, np.log(blur[0]))
+    firsts, likelihood = _first_fits(likelihood.with_options(soft=True), np.log(blur[0]))
     for first in firsts[:2]:
         known = likelihood.information.copy()
         known[np.ix_(first.free, first.free)] = first.information
         blurred, likelihood = _continue(likelihood.with_options(soft=True, information=known), first, blur[1:])
         found.append((blurred, likelihood))
-        sharp, likelihood = _sharpen(likelihood.with_options(soft=False), blurred, torque, others)
+        sharp, likelihood = _sharpen(likelihood.with_options(soft=False), blurred)
         found.append((sharp, likelihood))
         if _is_calm(likelihood, sharp):
             break
     return min(found, key=lambda entry: entry[0].point.objective)
 
 
-def _sharpen(
-    likelihood: Likelihood, blurred: GapFit, torque: list[int], others: list[int]
-) -> tuple[GapFit, Likelihood]:
+def _sharpen(likelihood: Likelihood, blurred: GapFit) -> tuple[GapFit, Likelihood]:
     """Return the fit with sharp flanks that starts from one with ``blurred`` flanks, and what was learnt last.
 
     Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it.
@@ -242,8 +240,8 @@ def _sharpen(
     levels = _levels(likelihood, MOTOR_ENCODER)
     for place in SHARP_STARTS:
         start = blurred.point.theta.copy()
-        start[torque] = np.log(levels[place])
-        first = maximise(likelihood, start, others, likelihood.settings.fit.steps_per_level, tolerance=0.5)
+        start[likelihood.torque_places] = np.log(levels[place])
+        first = maximise(likelihood, start, likelihood.others, likelihood.settings.fit.steps_per_level, tolerance=0.5)
         best, learnt = _continue(first.likelihood, first, levels[place + 1 :])
         fits.append(best)
         if _is_calm(likelihood, best):
@@ -262,16 +260,7 @@ def _is_calm(likelihood: Likelihood, fit: GapFit) -> bool:
     return likelihood.noise(fit.point.theta).torque[1] <= most
 
 
-def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
-    """Return the places of the torque noise in the vector of unknowns, and all others."""
-    names = likelihood.problem.names
-    torque = [n for n, name in enumerate(names) if name.startswith("log_torque_")]
-    return torque, [n for n in range(len(names)) if n not in torque]
-
-
-def _first_fits(
-    likelihood: Likelihood, torque: list[int], others: list[int], level: Array
-) -> tuple[list[GapFit], Likelihood]:
+def _first_fits(likelihood: Likelihood, level: Array) -> tuple[list[GapFit], Likelihood]:
     """Return fits at high torque noise (its logarithm ``level``), the best first, and what they have learnt.
 
     They start from the two best places of a grid of alpha and from the smallest size that is about as good: where the
@@ -282,7 +271,7 @@ def _first_fits(
     points = []
     for alpha in GRID:
         theta = problem.start
-        theta[torque] = level
+        theta[likelihood.torque_places] = level
         theta[place] = alpha
         points.append(likelihood.at(theta))
     best = min(point.objective for point in points)
@@ -295,7 +284,7 @@ def _first_fits(
     fits: list[GapFit] = []
     # A first step of these too may leave the size behind for good.
     held = {SCALE, TORQUE_OFFSET, LATE, LOAD_TORQUE, *DRY}
-    early = [n for n in others if problem.names[n] not in held]
+    early = [n for n in likelihood.others if problem.names[n] not in held]
     for point in starts:
         fits.append(maximise(likelihood, point.theta, early, 3, tolerance=1.0))
         likelihood = fits[-1].likelihood
@@ -313,13 +302,13 @@ def _different(fits: list[GapFit], place: int, ratio: float) -> list[GapFit]:
     return chosen
 
 
-def _free_fit(likelihood: Likelihood, best: GapFit, torque: list[int], others: list[int]) -> GapFit:
+def _free_fit(likelihood: Likelihood, best: GapFit) -> GapFit:
     """Return the fit with the torque noise free, except where the record cannot tell it from none."""
-    _, information, likelihood = likelihood.derivatives(best.point, np.array(torque))
+    _, information, likelihood = likelihood.derivatives(best.point, np.array(likelihood.torque_places))
     flat = likelihood.settings.fit.flat_information
-    free = [n for n, value in zip(torque, np.diag(information), strict=True) if value > flat]
+    free = [n for n, value in zip(likelihood.torque_places, np.diag(information), strict=True) if value > flat]
     while True:
-        best = maximise(likelihood, best.point.theta, sorted(others + free), 40, tolerance=2e-3)
+        best = maximise(likelihood, best.point.theta, sorted(likelihood.others + free), 40, tolerance=2e-3)
         likelihood = best.likelihood
         column = {int(n): k for k, n in enumerate(best.free)}
         told = [n for n in free if best.information[column[n], column[n]] > flat]

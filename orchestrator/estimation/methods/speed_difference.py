@@ -8,10 +8,9 @@ wound up at both ends (torque over stiffness) is taken off.
 import numpy as np
 
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
-from orchestrator.estimation.signals import shaft_signals
+from orchestrator.estimation.signals import estimate_of_sizes, shaft_signals, sides_of
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-from orchestrator.shared.inference.normal import interval_95
 
 LEAST_TRAVERSALS = 3
 THRESHOLD = 4.0  # standard deviations of the torque's noise
@@ -24,7 +23,7 @@ def estimate(record: Record, model: Model) -> Estimate:
     shaft = shaft_signals(record, model)
     stiffness = model.parameters["k"].value
     limit = max(THRESHOLD * shaft.noise, LEAST_SHARE * float(np.sqrt(np.mean(shaft.torque**2))))
-    side = np.where(shaft.torque > limit, 1, np.where(shaft.torque < -limit, -1, 0))
+    side = sides_of(shaft.torque, limit)
     loaded = np.flatnonzero(side)
     turns = np.flatnonzero(np.diff(side[loaded]) != 0)
     sizes = []
@@ -36,10 +35,5 @@ def estimate(record: Record, model: Model) -> Estimate:
         sizes.append(0.5 * (moved - wound))
     if len(sizes) < LEAST_TRAVERSALS:
         raise NotApplicableError(f"the gap must be traversed {LEAST_TRAVERSALS} times, but is {len(sizes)} times")
-    values = np.array(sizes)
-    alpha = max(float(np.median(values)), 0.0)
-    scatter = 1.2533 * float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
-    error = float(np.hypot(scatter, SYSTEMATIC * alpha))
-    diagnostics = {"traversals": len(sizes), "torque_limit": limit, "scatter": scatter}
-    interval = interval_95(alpha, error, 0.0)
-    return Estimate("speed_difference", alpha, error, interval, interval[0] > 0.0, "", diagnostics)
+    diagnostics = {"traversals": len(sizes), "torque_limit": limit}
+    return estimate_of_sizes("speed_difference", float(np.median(sizes)), np.array(sizes), SYSTEMATIC, diagnostics)

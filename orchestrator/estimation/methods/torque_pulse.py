@@ -8,10 +8,9 @@ lines are fitted with one slope; half the distance of their intercepts is alpha.
 import numpy as np
 
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
-from orchestrator.estimation.signals import shaft_signals
+from orchestrator.estimation.signals import estimate_of, shaft_signals
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-from orchestrator.shared.inference.normal import interval_95
 
 LEAST_SAMPLES = 30
 SLOW = 0.25  # change of torque over the shaft's own time, over its effective value
@@ -42,7 +41,5 @@ def estimate(record: Record, model: Model) -> Estimate:
     independent = max(side.size * record.step / 0.06, 4.0)
     inverse = np.linalg.inv(table.T @ table / side.size)
     error = float(np.sqrt(inverse[1, 1] * np.var(left) / independent))
-    alpha = max(float(solution[1]), 0.0)
     diagnostics = {"rows": counts, "stiffness": float(1.0 / solution[0]) if solution[0] != 0.0 else None}
-    interval = interval_95(alpha, error, 0.0)
-    return Estimate("torque_pulse", alpha, error, interval, interval[0] > 0.0, "", diagnostics)
+    return estimate_of("torque_pulse", float(solution[1]), error, diagnostics)

@@ -9,7 +9,7 @@ best of all, so that no model that it holds is better than it.
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -133,10 +133,7 @@ def _renew(fit: StagesFit) -> Array:
 def _bound_share(likelihood: StagesLikelihood, shared: float) -> StagesLikelihood:
     """Return the likelihood in which each stage has at least a share of the gap."""
     problem = likelihood.problem
-    unknowns = list(problem.unknowns)
-    place = problem.index(SHARE)
-    unknowns[place] = replace(unknowns[place], lower=shared, upper=1.0 - shared)
-    return likelihood.with_options(problem=replace(problem, unknowns=tuple(unknowns)))
+    return likelihood.with_options(problem=problem.with_unknown(problem.index(SHARE), lower=shared, upper=1.0 - shared))
 
 
 def with_noise(likelihood: StagesLikelihood, theta: Array, level: float) -> Array:

@@ -6,6 +6,7 @@ stage has a notable share of the gap. What is left is the answer, a set where th
 """
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -13,11 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.estimation.description import autocorrelation, block_variance, block_variance_along
+from orchestrator.errors import RecordError
+from orchestrator.estimation.description import autocorrelation, block_variance, block_variance_along, stillness_note
+from orchestrator.estimation.effort import Effort, Stop, never
 from orchestrator.estimation.filter.model import Array
-from orchestrator.estimation.settings import StageSettings
-from orchestrator.estimation.stages.fit import GRID, StageFits, StagesFit
-from orchestrator.estimation.stages.problem import BODIES, OFFSET, SHARE, TOTAL
+from orchestrator.estimation.problem import measurement_noise
+from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings, StageSettings
+from orchestrator.estimation.stages.fit import GRID, Report, StageFits, StagesFit, fit_stages
+from orchestrator.estimation.stages.likelihood import StagesLikelihood
+from orchestrator.estimation.stages.problem import BODIES, ENCODERS, OFFSET, SHARE, TOTAL, make_problem
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
 
 FIRST, SECOND, BOTH = "1", "2", "both"
@@ -68,15 +75,45 @@ class Location:
         return ", ".join([*words[:-2], " or ".join(words[-2:])]) if words else "nowhere seen"
 
 
+def locate_gap(
+    record: Record,
+    model: Model,
+    settings: EstimationSettings = DEFAULT_SETTINGS,
+    time_limit: float = math.inf,
+    report: Report = lambda what, share: None,
+    stop: Stop = never,
+) -> Location:
+    """Return where the gap of a train of two stages is.
+
+    Args:
+        record: with torque and the angles of motor and load.
+        model: of a ``TwoStageTrain``.
+        time_limit: [s], after which the fit is given up.
+        report: called with what is done, and the share of the work that lies behind.
+        stop: returns why the work is to end; it is asked before each run of the filter.
+
+    Raises:
+        RecordError: motor or load hardly moves.
+        ConvergenceError: no fit is found, or not within the time limit.
+    """
+    problem = make_problem(record, model)
+    motor, load = (measurement_noise(record, model, name) for name in ENCODERS)
+    still = stillness_note(problem.outputs, (motor, load), settings.verdict)
+    if still:
+        raise RecordError(f"{record.source}: {still.split(';')[0]}: log a motion that reverses")
+    effort = Effort(time.monotonic() + time_limit, stop)
+    likelihood = StagesLikelihood(problem, 1, settings, effort)
+    return locate(fit_stages(likelihood, settings.stages, report), settings.stages)
+
+
 def locate(fits: StageFits, settings: StageSettings) -> Location:
     """Return what the fits of a record say."""
     behind = {
         name: 0.5 * (fit.point.objective - fits.free.point.objective)
         for name, fit in ((FIRST, fits.first), (SECOND, fits.second), (BOTH, fits.both))
     }
-    share = float(fits.free.point.theta[fits.free.likelihood.problem.index(SHARE)])
-    size = float(fits.free.point.theta[fits.free.likelihood.problem.index(TOTAL)])
-    explained = _torque_noise(fits.free) <= settings.unexplained and size <= GRID[-1]
+    share = fits.free.likelihood.value(fits.free.point.theta, SHARE)
+    explained = _torque_noise(fits.free) <= settings.unexplained and fits.free.size <= GRID[-1]
     answers = _possible_answers(behind, share, settings)
     if not explained:  # how far such fits are apart says nothing
         answers = [FIRST, SECOND, BOTH]
@@ -97,7 +134,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
     stages = [_join([each[n] for each in sizes]) for n in range(2)]
     if len(answers) == 1 and answers[0] != BOTH:
         absent = 1 if answers[0] == FIRST else 0
-        stages[absent] = StageGap(0.0, (0.0, _most(fits.free, absent, wider[answers[0]])))
+        stages[absent] = StageGap(0.0, (0.0, _sizes(fits.free, wider[answers[0]])[absent].interval[1]))
     kept = best.likelihood.run(best.point.theta, keep=True)
     traversals = sum(_changes(flanks) for flanks in kept.contacts.T)
     if not _total(best, settings.misfit_widening**2).interval[0] > 0.0 or traversals == 0:
@@ -112,7 +149,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         explained,
         traversals,
         (autocorrelation(white[:, 0]), autocorrelation(white[:, 1])),
-        _parameters(best),
+        best.parameters(),
         _curves(best, kept.states, kept.contacts, kept.errors),
     )
 
@@ -148,8 +185,7 @@ def _torque_noise(fit: StagesFit) -> float:
 
 def _scatter(fit: StagesFit) -> float:
     """Return by what the variance of the size among blocks of the record exceeds that of white errors."""
-    column = list(fit.free).index(fit.likelihood.problem.index(TOTAL))
-    return block_variance(fit, column, fit.likelihood.settings.verdict.blocks)
+    return block_variance(fit, fit.column, fit.likelihood.settings.verdict.blocks)
 
 
 def _scatter_of_stages(fit: StagesFit) -> float:
@@ -198,16 +234,8 @@ def _sizes_of_all(best: StagesFit, optima: Sequence[StagesFit], wider: float) ->
 
 
 def _total(fit: StagesFit, wider: float) -> StageGap:
-    place = fit.likelihood.problem.index(TOTAL)
-    column = list(fit.free).index(place)
-    value = float(fit.point.theta[place])
-    half = NORMAL_95 * math.sqrt(wider * fit.covariance[column, column])
-    return StageGap(value, (max(value - half, 0.0), value + half))
-
-
-def _most(free: StagesFit, stage: int, wider: float) -> float:
-    """Return the upper end [rad] of what the free fit leaves for a stage that has no gap."""
-    return _sizes(free, wider)[stage].interval[1]
+    half = NORMAL_95 * math.sqrt(wider) * fit.size_deviation
+    return StageGap(fit.size, (max(fit.size - half, 0.0), fit.size + half))
 
 
 def _join(gaps: list[StageGap]) -> StageGap:
@@ -215,15 +243,6 @@ def _join(gaps: list[StageGap]) -> StageGap:
     if len(gaps) == 1:
         return gaps[0]
     return StageGap(math.nan, (min(gap.interval[0] for gap in gaps), max(gap.interval[1] for gap in gaps)))
-
-
-def _parameters(fit: StagesFit) -> dict[str, dict[str, float]]:
-    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    unknowns = [fit.likelihood.problem.unknowns[n] for n in fit.free]
-    return {
-        unknown.name: {"value": float(fit.point.theta[n]), "standard_error": float(error), "nominal": unknown.mean}
-        for n, unknown, error in zip(fit.free, unknowns, errors, strict=True)
-    }
 
 
 def _curves(fit: StagesFit, states: Array, contacts: NDArray[np.int64], errors: Array) -> dict[str, Array]:

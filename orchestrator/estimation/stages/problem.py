@@ -13,7 +13,6 @@ from orchestrator.estimation.problem import (
     UnknownProblem,
     encoder_unknown,
     first_line,
-    measurement_noise,
     parameter_unknowns,
     sliding_speeds,
     torque_unknowns,
@@ -68,7 +67,7 @@ def make_problem(record: Record, model: Model) -> StagesProblem:
         Unknown(TORQUE, 0.0, 3.0 * rms, 0.01 * rms),
     ]
     unknowns += torque_unknowns(record, model, base["tau"], base["i_1"] * base["i_2"])
-    unknowns += (encoder_unknown(record, model, name, measurement_noise(record, model, name)) for name in ENCODERS)
+    unknowns += (encoder_unknown(record, model, name) for name in ENCODERS)
     for body, unit in zip(BODIES, units, strict=True):
         low, high = (math.log(unit / rms * level) for level in (LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE))
         high = math.log(unit * LARGEST_AT_SHAFT) if body == "middle" else high
