@@ -198,17 +198,10 @@ def best_fit(problem: FlankProblem) -> FlankFit:
     return problem.refine(max(fits, key=lambda fit: fit.loglik))
 
 
-@dataclass(frozen=True)
-class Deviations:
-    """Standard errors of half-gap [rad], lateness [s] and gear ratio."""
+def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Array, float]:
+    """Return standard errors of half-gap, lateness and ratio (3,), and their 95 % quantile.
 
-    alpha: float
-    late: float
-    ratio: float
-
-
-def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Deviations, float]:
-    """Return standard errors from fits that leave out one block of the record each, and their 95 % quantile.
+    They are the scatter of fits that leave out one block of the record each.
 
     Errors within a block may be correlated as they like (Quenouille 1956; Kuensch 1989).
     """
@@ -223,4 +216,4 @@ def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Deviations, float]:
         found.append((without.alpha, without.late, without.ratio))
     values = np.array(found)
     errors = np.sqrt((blocks - 1.0) / blocks * np.sum((values - values.mean(axis=0)) ** 2, axis=0))
-    return Deviations(*(float(error) for error in errors)), float(t.ppf(0.975, blocks - 1))
+    return np.asarray(errors), float(t.ppf(0.975, blocks - 1))

@@ -139,18 +139,18 @@ def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
     report("trying sizes", 0.0)
     if problem.outputs.shape[1] == 2:
         levels = _levels(likelihood, BOTH_ENCODERS)
-        tried, likelihood = _first_fits(likelihood, np.log(levels[0]))
-        firsts = _different(tried, problem.index("alpha"), likelihood.settings.fit.different)
+        firsts = _different(_first_fits(likelihood, np.log(levels[0])), likelihood.settings.fit.different)
         fits = []
         for n, first in enumerate(firsts):
             report("fitting all values", BEFORE_FIT + (BEFORE_FREE - BEFORE_FIT) * n / len(firsts))
-            best, likelihood = _continue(likelihood, first, levels[1:])
-            fits.append(best)
+            fits.append(_continue(first, levels[1:]))
         report("fitting the noise", BEFORE_FREE)
-        best = _free_fit(likelihood, min(fits, key=lambda fit: fit.point.objective))
-        return _with_contact(best)
-    best, likelihood = _fit_one_encoder(likelihood)
-    return _free_fit(likelihood, best)
+        return _with_contact(_free_fit(min(fits, key=_objective)))
+    return _free_fit(_fit_one_encoder(likelihood))
+
+
+def _objective(fit: GapFit) -> float:
+    return fit.point.objective
 
 
 def _with_contact(best: GapFit) -> GapFit:
@@ -167,7 +167,7 @@ def _with_contact(best: GapFit) -> GapFit:
 def _fit_long(likelihood: Likelihood, start: Array) -> GapFit:
     """Return the fit with the torque noise free that starts from a vector near it."""
     best = maximise(likelihood, start, likelihood.others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
-    return _free_fit(best.likelihood, best)
+    return _free_fit(best)
 
 
 def _has_least_noise(likelihood: Likelihood) -> bool:
@@ -192,61 +192,58 @@ def _has_other_contact(likelihood: Likelihood, fit: GapFit) -> bool:
     return abs(float(fit.point.theta[place])) > likelihood.settings.fit.clear_impulse * deviation
 
 
-def _continue(likelihood: Likelihood, best: GapFit, levels: Sequence[tuple[float, float]]) -> tuple[GapFit, Likelihood]:
-    """Return the last fit that paid while the torque noise goes through ``levels``, and what it has learnt."""
+def _continue(best: GapFit, levels: Sequence[tuple[float, float]]) -> GapFit:
+    """Return the last fit that paid while the torque noise goes through ``levels``."""
     failures, least = 0, best.point.objective
     for level in levels:
-        start = best.point.theta.copy()
-        start[likelihood.torque_places] = np.log(level)
-        trial = maximise(likelihood, start, likelihood.others, likelihood.settings.fit.steps_per_level, tolerance=1.0)
+        trial = _fit_at_level(best, level, 1.0)
         least = min(least, trial.point.objective)
-        if trial.point.objective < least + likelihood.settings.fit.allowed_rise:
-            best, failures, likelihood = trial, 0, trial.likelihood
+        if trial.point.objective < least + best.likelihood.settings.fit.allowed_rise:
+            best, failures = trial, 0
             continue
         failures += 1
         if failures == 2:
             break
-    return best, likelihood
+    return best
 
 
-def _fit_one_encoder(likelihood: Likelihood) -> tuple[GapFit, Likelihood]:
-    """Return the best fit with little torque noise, and the likelihood with its flanks as that fit took them.
+def _fit_at_level(fit: GapFit, level: tuple[float, float], tolerance: float) -> GapFit:
+    """Return the fit at a level of torque noise that starts from another."""
+    likelihood, start = fit.likelihood, fit.point.theta.copy()
+    start[likelihood.torque_places] = np.log(level)
+    return maximise(likelihood, start, likelihood.others, likelihood.settings.fit.steps_per_level, tolerance)
+
+
+def _fit_one_encoder(likelihood: Likelihood) -> GapFit:
+    """Return the best fit with little torque noise.
 
     The flanks are blurred at first and sharpened then. The second start of the grid is tried where the first one does
     not get down to little noise. Where no fit with sharp flanks comes up to a blurred one, that one stays, with the
     wide interval that it deserves.
     """
-    found: list[tuple[GapFit, Likelihood]] = []
+    found: list[GapFit] = []
     blur = _levels(likelihood, BLURRED)
-    firsts, likelihood = _first_fits(likelihood.with_options(soft=True), np.log(blur[0]))
-    for first in firsts[:2]:
-        known = likelihood.information.copy()
-        known[np.ix_(first.free, first.free)] = first.information
-        blurred, likelihood = _continue(likelihood.with_options(soft=True, information=known), first, blur[1:])
-        found.append((blurred, likelihood))
-        sharp, likelihood = _sharpen(likelihood.with_options(soft=False), blurred)
-        found.append((sharp, likelihood))
-        if _is_calm(likelihood, sharp):
+    for first in _first_fits(likelihood.with_options(soft=True), np.log(blur[0]))[:2]:
+        blurred = _continue(first, blur[1:])
+        found += [blurred, _sharpen(blurred)]
+        if _is_calm(found[-1]):
             break
-    return min(found, key=lambda entry: entry[0].point.objective)
+    return min(found, key=_objective)
 
 
-def _sharpen(likelihood: Likelihood, blurred: GapFit) -> tuple[GapFit, Likelihood]:
-    """Return the fit with sharp flanks that starts from one with ``blurred`` flanks, and what was learnt last.
+def _sharpen(blurred: GapFit) -> GapFit:
+    """Return the fit with sharp flanks that starts from one with ``blurred`` flanks.
 
     Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it.
     """
     fits: list[GapFit] = []
-    levels = _levels(likelihood, MOTOR_ENCODER)
+    levels = _levels(blurred.likelihood, MOTOR_ENCODER)
+    blurred = replace(blurred, likelihood=blurred.likelihood.with_options(soft=False))
     for place in SHARP_STARTS:
-        start = blurred.point.theta.copy()
-        start[likelihood.torque_places] = np.log(levels[place])
-        first = maximise(likelihood, start, likelihood.others, likelihood.settings.fit.steps_per_level, tolerance=0.5)
-        best, learnt = _continue(first.likelihood, first, levels[place + 1 :])
-        fits.append(best)
-        if _is_calm(likelihood, best):
+        fits.append(_continue(_fit_at_level(blurred, levels[place], 0.5), levels[place + 1 :]))
+        if _is_calm(fits[-1]):
             break
-    return min(fits, key=lambda fit: fit.point.objective), learnt
+    return min(fits, key=_objective)
 
 
 def _levels(likelihood: Likelihood, levels: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
@@ -254,14 +251,14 @@ def _levels(likelihood: Likelihood, levels: Sequence[tuple[float, float]]) -> li
     return [scale_noise(level, likelihood.problem.torque_units) for level in levels]
 
 
-def _is_calm(likelihood: Likelihood, fit: GapFit) -> bool:
+def _is_calm(fit: GapFit) -> bool:
     """Tell whether a fit of one encoder gets down to as little torque noise at the load as a right one does."""
-    most = likelihood.problem.torque_units[1] * likelihood.settings.fit.calm_torque_noise
-    return likelihood.noise(fit.point.theta).torque[1] <= most
+    most = fit.likelihood.problem.torque_units[1] * fit.likelihood.settings.fit.calm_torque_noise
+    return fit.likelihood.noise(fit.point.theta).torque[1] <= most
 
 
-def _first_fits(likelihood: Likelihood, level: Array) -> tuple[list[GapFit], Likelihood]:
-    """Return fits at high torque noise (its logarithm ``level``), the best first, and what they have learnt.
+def _first_fits(likelihood: Likelihood, level: Array) -> list[GapFit]:
+    """Return fits at high torque noise (its logarithm ``level``), the best first.
 
     They start from the two best places of a grid of alpha and from the smallest size that is about as good: where the
     gap is traversed rarely, much noise hides that sizes beyond it are too large.
@@ -288,22 +285,22 @@ def _first_fits(likelihood: Likelihood, level: Array) -> tuple[list[GapFit], Lik
     for point in starts:
         fits.append(maximise(likelihood, point.theta, early, 3, tolerance=1.0))
         likelihood = fits[-1].likelihood
-    return sorted(fits, key=lambda fit: fit.point.objective), likelihood
+    return sorted(fits, key=_objective)
 
 
-def _different(fits: list[GapFit], place: int, ratio: float) -> list[GapFit]:
-    """Return the fits of which no better one has about the same size; ``place`` is that of alpha."""
+def _different(fits: list[GapFit], ratio: float) -> list[GapFit]:
+    """Return the fits of which no better one has about the same size."""
     chosen: list[GapFit] = []
     for fit in fits:
-        size = float(fit.point.theta[place])
-        known = [float(other.point.theta[place]) for other in chosen]
-        if all(max(size, other) > ratio * min(size, other) + GRID[1] for other in known):
+        sizes = [(max(fit.size, other.size), min(fit.size, other.size)) for other in chosen]
+        if all(larger > ratio * smaller + GRID[1] for larger, smaller in sizes):
             chosen.append(fit)
     return chosen
 
 
-def _free_fit(likelihood: Likelihood, best: GapFit) -> GapFit:
+def _free_fit(best: GapFit) -> GapFit:
     """Return the fit with the torque noise free, except where the record cannot tell it from none."""
+    likelihood = best.likelihood
     _, information, likelihood = likelihood.derivatives(best.point, np.array(likelihood.torque_places))
     flat = likelihood.settings.fit.flat_information
     free = [n for n, value in zip(likelihood.torque_places, np.diag(information), strict=True) if value > flat]

@@ -56,19 +56,19 @@ def estimate(record: Record, model: Model, settings: EstimationSettings = DEFAUL
     curves = {"time": points.time, "twist": problem.twist(fit), "flank": flanks}
     if not two or traversals < RETURNED:
         return _unseen(diagnostics, curves, traversals if two else 0)
-    deviations, quantile = jackknife(problem, fit)
+    (of_alpha, of_late, of_ratio), quantile = jackknife(problem, fit)
     shape = limits.shape * noise
-    error = math.hypot(max(deviations.alpha, math.sqrt(fit.covariance[ALPHA, ALPHA])), shape)
+    error = math.hypot(max(of_alpha, math.sqrt(fit.covariance[ALPHA, ALPHA])), shape)
     reach = quantile * error
     diagnostics |= {
-        "load_late": {"value": fit.late, "standard_error": deviations.late, "unit": "s"},
+        "load_late": {"value": fit.late, "standard_error": float(of_late), "unit": "s"},
         "parameters": {
-            "i": {"value": fit.ratio, "standard_error": deviations.ratio, "nominal": model.parameters["i"].value}
+            "i": {"value": fit.ratio, "standard_error": float(of_ratio), "nominal": model.parameters["i"].value}
         },
     }
     message = (
         f"the load's channel is {1e3 * abs(fit.late):.3g} ms {'late' if fit.late >= 0.0 else 'early'} (standard error "
-        f"{1e3 * deviations.late:.2g} ms), "
+        f"{1e3 * of_late:.2g} ms), "
         f"the gear ratio {fit.ratio:.6g}; {WOUND_UP}"
     )
     return Estimate(
