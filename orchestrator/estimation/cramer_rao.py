@@ -10,7 +10,7 @@ from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.joint import JointLikelihood
 from orchestrator.estimation.likelihood import Likelihood
-from orchestrator.estimation.problem import ALPHA, STATE_NAMES, GapProblem, make_problem
+from orchestrator.estimation.problem import ALPHA, OFFSET, STATE_NAMES, GapProblem, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
@@ -57,12 +57,12 @@ def _refine_information(likelihood: Likelihood, theta: Array, free: NDArray[np.i
 
 
 def truth_values(linear: Mapping[str, float], alpha: float, *states: Array) -> dict[str, float]:
-    """Return true values by the names of the unknowns: linear parameters, alpha and initial states (5,).
+    """Return true values by the names of the unknowns: linear parameters, alpha and initial states (5,); no offset.
 
     Args:
         alpha: true half-gap [rad].
     """
-    values = {**linear, ALPHA: alpha}
+    values = {**linear, ALPHA: alpha, OFFSET: 0.0}
     for number, state in enumerate(states, start=1):
         names = STATE_NAMES if number == 1 else [f"{name}@{number}" for name in STATE_NAMES]
         values |= dict(zip(names, map(float, state), strict=True))

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from orchestrator.estimation.filter.model import Array
+from orchestrator.estimation.zeros import play_of
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import rms, rms_behind_lag, robust_noise
@@ -124,7 +125,7 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     ratio = model.parameters["i"].value
     unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
     if both:
-        unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
+        unknowns.append(Unknown(OFFSET, -0.5 * sum(play_of(record.fill_missing(), model)), OFFSET_SPREAD, 1e-3))
     pull = abs(ratio) * rms_behind_lag(record.u, record.step, model.parameters["tau"].value)
     depth = max(IMPULSE_DEPTH, IMPULSE_SHARE * pull / model.parameters["k"].value)
     impulse = 0.5 * depth * model.parameters["c"].value

@@ -28,14 +28,19 @@ def set_zeros(record: Record, model: Model) -> Record:
         return _shift(record, TURN * _far_turns(filled.theta_m), 0.0)
     load = TURN * _far_turns(filled.theta_l)
     filled = _shift(filled, 0.0, load)
-    shaft = shaft_signals(filled, model)
-    unwound = shaft.twist - shaft.torque / model.parameters["k"].value
-    low, high = np.quantile(unwound, (TAIL, 1.0 - TAIL))
-    centre = 0.5 * float(low + high)
+    low, high = play_of(filled, model)
+    centre = 0.5 * (low + high)
     ratio = model.parameters["i"].value
     held = abs(float(np.mean(filled.u))) * ratio / model.parameters["k"].value if record.has_torque else 0.0
-    lies_within = abs(centre) <= max(FAR_TWIST, 0.5 * float(high - low)) + held
+    lies_within = abs(centre) <= max(FAR_TWIST, 0.5 * (high - low)) + held
     return _shift(record, 0.0 if lies_within else centre * ratio, load)
+
+
+def play_of(record: Record, model: Model) -> tuple[float, float]:
+    """Return where the twist of a record without missing rows lies but for what the shaft is wound up by [rad]."""
+    shaft = shaft_signals(record, model)
+    low, high = np.quantile(shaft.twist - shaft.torque / model.parameters["k"].value, (TAIL, 1.0 - TAIL))
+    return float(low), float(high)
 
 
 def _far_turns(angle: np.ndarray) -> int:
