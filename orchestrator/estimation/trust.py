@@ -7,6 +7,7 @@ user allows, whether the gap was traversed. The other methods have no such check
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
+from orchestrator.estimation.problem import ALPHA
 from orchestrator.estimation.protocol import FITTED, Estimate
 from orchestrator.estimation.settings import EstimationSettings, TrustSettings
 from orchestrator.estimation.stages.location import BOTH, FIRST, SECOND, Location
@@ -86,13 +87,16 @@ def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Re
             yield Reason(Level.AMBER, f"the gap is traversed only {_times(traversals)}")
         if fit.standard_error > settings.widest * fit.alpha:
             yield Reason(Level.AMBER, "the standard error is more than a fifth of the half-gap")
-    yield from _of_values(fit.diagnostics.get("parameters", {}), model, settings)
+    yield from _of_values(fit.diagnostics.get("parameters", {}), model, settings, fit)
 
 
 def _of_values(
-    parameters: Mapping[str, Mapping[str, float]], model: Model, settings: TrustSettings
+    parameters: Mapping[str, Mapping[str, float]], model: Model, settings: TrustSettings, fit: Estimate | None = None
 ) -> Iterator[Reason]:
-    """Yield each fitted value that lies outside what the model file allows."""
+    """Yield each fitted value that lies outside what the model file allows.
+
+    One that is far outside is red, but where the half-gap of ``fit`` stays in its interval with the value as stated.
+    """
     for name, entry in parameters.items():
         stated = model.parameters.get(name)
         if stated is None or stated.uncertainty <= 0.0:
@@ -100,9 +104,20 @@ def _of_values(
         off = abs(entry["value"] - stated.value)
         if off <= stated.uncertainty + settings.beyond * entry["standard_error"]:
             continue
-        level = Level.RED if off > settings.far_beyond * stated.uncertainty else Level.AMBER
+        far = off > settings.far_beyond * stated.uncertainty
+        level = Level.RED if far and (fit is None or _moves_gap(fit, name, off - stated.uncertainty)) else Level.AMBER
         text = f"`{name}` is fitted as {entry['value']:.4g}, but stated as {stated.value:.4g} to within"
         yield Reason(level, f"{text} {stated.uncertainty:.2g}")
+
+
+def _moves_gap(fit: Estimate, name: str, move: float) -> bool:
+    """Return whether the half-gap leaves its interval where a value moves, and all others follow as the record says."""
+    names = list(fit.diagnostics["parameters"])
+    if not fit.visible or ALPHA not in names or "covariance" not in fit.curves:
+        return True
+    own, gap = names.index(name), names.index(ALPHA)
+    slope = fit.curves["covariance"][gap, own] / fit.curves["covariance"][own, own]
+    return bool(abs(slope * move) > 0.5 * (fit.interval[1] - fit.interval[0]))
 
 
 def _compare_methods(estimate: Estimate, fit: Estimate | None, fit_trust: Trust | None) -> Iterator[Reason]:
