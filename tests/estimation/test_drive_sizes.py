@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from orchestrator.estimation.information import inverse
 from orchestrator.estimation.likelihood import Fit, Likelihood
 from orchestrator.estimation.methods import maximum_likelihood
 from orchestrator.estimation.problem import DRY, Unknown, make_problem
-from orchestrator.records.model_file import Model, default_model
+from orchestrator.records.model_file import Model, default_model, read_model
 from orchestrator.records.record import Record, record_from_columns
+from tests.support.frictional_drive import draw_frictional_drive
 from tests.support.independent_plant import make_record
 
 TORQUES = ("J_m", "J_l", "k", "c", "b_m", "b_l")  # parameters that a torque's unit is in
@@ -43,6 +45,18 @@ def test_all_torques_by_a_factor_leave_the_gap_as_it_is() -> None:
     assert found[1].alpha == pytest.approx(found[0].alpha, rel=1e-5)
     assert found[1].standard_error == pytest.approx(found[0].standard_error, rel=0.01)
     assert found[1].message == found[0].message
+
+
+def test_a_stiff_shaft_is_found_wherever_the_zeros_of_the_encoders_lie(tmp_path: Path) -> None:
+    """Flanks that start half a gap off ask for torques that no drive has: the fit took noise for them, and no size."""
+    drive = draw_frictional_drive(3000)
+    path = tmp_path / "drive.toml"
+    path.write_text(drive.model_text(), encoding="utf-8")
+    record = record_from_columns({name: column[:1200] for name, column in drive.columns.items()}, "drive")
+    found = maximum_likelihood.estimate(record, read_model(path))
+    assert found.alpha == pytest.approx(drive.gap, rel=1e-3)
+    low, high = found.interval
+    assert low < drive.gap < high < low + 0.01 * drive.gap
 
 
 def test_levels_of_noise_at_the_load_follow_the_gear() -> None:

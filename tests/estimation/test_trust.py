@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from orchestrator.estimation.protocol import Estimate
@@ -67,6 +68,16 @@ def test_a_fit_with_nothing_against_it_is_green() -> None:
 )
 def test_what_keeps_a_fit_from_green(estimate: Estimate, level: Level) -> None:
     assert level_of(estimate) is level
+
+
+@pytest.mark.parametrize(("correlation", "level"), [(0.1, Level.AMBER), (0.9, Level.RED)])
+def test_a_value_far_outside_is_red_where_the_half_gap_hangs_on_it(correlation: float, level: Level) -> None:
+    tau = default_model().parameters["tau"].value
+    parameters = {"alpha": {"value": 0.02, "standard_error": 1e-5, "nominal": 0.0}}
+    parameters["tau"] = {"value": 0.85 * tau, "standard_error": 0.01 * tau, "nominal": tau}
+    errors = np.array([1e-5, 0.01 * tau])
+    covariance = np.outer(errors, errors) * np.array([[1.0, correlation], [correlation, 1.0]])
+    assert level_of(replace(with_diagnostics(parameters=parameters), curves={"covariance": covariance})) is level
 
 
 def test_a_value_outside_its_stated_range_is_named_with_both() -> None:
