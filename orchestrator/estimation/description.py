@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.likelihood import Fit, GapFit
@@ -85,8 +86,7 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     low, high = interval
     kept, levels = likelihood.run(fit.point.theta, keep=True), likelihood.noise(fit.point.theta)
     contacts = kept.contacts[:, 0]
-    flanks = contacts[contacts != 0]
-    traversals = int(np.count_nonzero(np.diff(flanks))) if alpha > 0.0 else 0
+    traversals = count_traversals(contacts) if alpha > 0.0 else 0
     white = kept.errors / np.sqrt(kept.variances)
     diagnostics = {
         "converged": fit.converged,

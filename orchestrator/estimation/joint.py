@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from orchestrator.estimation.effort import Effort
-from orchestrator.estimation.filter.innovations import Innovations
+from orchestrator.estimation.filter.innovations import Innovations, count_traversals
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.problem import OFFSET, SAMPLED, SMOOTH, STATE_NAMES, GapProblem
@@ -89,14 +89,12 @@ def by_record(estimate: Estimate, records: Sequence[Record]) -> Estimate:
 
 def _evidence(record: Record, estimate: Estimate, start: int, stop: int) -> dict[str, object]:
     """Return how often a record traverses the gap, and how well the common values explain it."""
-    flanks = estimate.curves["contacts"][start:stop]
-    flanks = flanks[flanks != 0]
     errors = estimate.curves["errors"][start:stop]
     noise = estimate.diagnostics["measurement_noise"]
     return {
         "source": record.source,
         "rows": record.size,
         "missing": record.n_missing,
-        "traversals": int(np.count_nonzero(np.diff(flanks))),
+        "traversals": count_traversals(estimate.curves["contacts"][start:stop]),
         "one_step_error_in_noise": [float(np.sqrt(np.mean(errors[:, k] ** 2))) / noise[k] for k in range(len(noise))],
     }

@@ -58,9 +58,9 @@ def shaft_signals(record: Record, model: Model) -> ShaftSignals:
     return ShaftSignals(twist, rate, torque, p["J_l"] * gain * robust_noise(record.theta_l))
 
 
-def sides_of(torque: Array, limit: float) -> Array:
-    """Return the flank (n,) that a torque loads: 1, -1, or 0 where it is within ``limit`` [N.m]."""
-    return np.where(torque > limit, 1, np.where(torque < -limit, -1, 0))
+def sides_of(values: Array, limit: float) -> Array:
+    """Return the flank (n,) that a torque loads, or a twist reaches: 1, -1, or 0 where it is within ``limit``."""
+    return np.where(values > limit, 1, np.where(values < -limit, -1, 0))
 
 
 def estimate_of(method: str, alpha: float, error: float, diagnostics: Mapping[str, Any]) -> Estimate:

@@ -7,6 +7,7 @@ is the likelihood in innovation form, in which an imperfect model does not drift
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,12 @@ def innovations(
         np.zeros(x0.size) if spread is None else spread, errors, variances, states, contacts, soft,
     )  # fmt: skip
     return Innovations(errors, variances, states, contacts)
+
+
+def count_traversals(flanks: NDArray[Any]) -> int:
+    """Return how often teeth that left a flank met the other one; flanks (n,) are -1, 0 (free) or 1."""
+    touched = flanks[flanks != 0]
+    return int(np.count_nonzero(np.diff(touched)))
 
 
 def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:

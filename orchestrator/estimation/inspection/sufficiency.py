@@ -8,10 +8,11 @@ import numpy as np
 
 from orchestrator.errors import RecordError
 from orchestrator.estimation.design import Excitation, MachineLimits, error_bound_of_excitation, simple_candidates
-from orchestrator.estimation.filter.innovations import simulate
+from orchestrator.estimation.filter.innovations import count_traversals, simulate
 from orchestrator.estimation.filter.model import affine_model
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
+from orchestrator.estimation.signals import sides_of
 from orchestrator.plants.known.two_stage_train import TRAIN
 from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible, smooth, smooth_rows
@@ -151,8 +152,7 @@ def _traversals(model: Model, record: Record, size: float) -> int:
     p = DrivetrainParameters._make(model.values)._replace(alpha=size)
     states = simulate(affine_model(p), record.u, record.step, np.zeros(5))
     twist = states[:, 0] / p.i - states[:, 2]
-    flanks = np.where(twist > size, 1, np.where(twist < -size, -1, 0))
-    return int(np.count_nonzero(np.diff(flanks[flanks != 0])))
+    return count_traversals(sides_of(twist, size))
 
 
 def _between(bounds: Sequence[tuple[float, float]]) -> float:

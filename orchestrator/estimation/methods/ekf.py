@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.building.translation.kernels import Kernels
+from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
@@ -71,10 +72,12 @@ def estimate(record: Record, model: Model) -> Estimate:
     if not math.isfinite(alpha):
         raise NotApplicableError("the online estimator diverged on this record")
     half = NORMAL_95 * error
-    flanks = run.contact[run.contact != 0.0]
-    traversals = int(np.count_nonzero(np.diff(flanks)))
     settled = error < 0.2 * alpha
     message = "" if settled else "the online estimate has not settled: its standard deviation is above a fifth of it"
-    diagnostics = {"traversals": traversals, "level": LEVEL, "settings": default_settings(record, model)._asdict()}
+    diagnostics = {
+        "traversals": count_traversals(run.contact),
+        "level": LEVEL,
+        "settings": default_settings(record, model)._asdict(),
+    }
     curves = {"alpha": run.alpha, "deviation": run.deviation}
     return Estimate("ekf", alpha, error, (max(alpha - half, 0.0), alpha + half), settled, message, diagnostics, curves)

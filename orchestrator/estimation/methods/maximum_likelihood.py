@@ -18,6 +18,7 @@ import numpy as np
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import describe, describe_unfinished
 from orchestrator.estimation.effort import Effort, Stop, StoppedError, never
+from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
@@ -121,9 +122,10 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit
     """Return the fit that starts from that of the beginning; None where the beginning does not show the gap."""
     first = fit_record(short)
     short = first.likelihood
-    flanks = short.run(first.point.theta, keep=True).contacts[:, 0]
-    flanks = flanks[flanks != 0]
-    if np.count_nonzero(np.diff(flanks)) < likelihood.settings.fit.enough_traversals:
+    if (
+        count_traversals(short.run(first.point.theta, keep=True).contacts[:, 0])
+        < likelihood.settings.fit.enough_traversals
+    ):
         return None
     report("fitting the whole record", BEFORE_WHOLE)
     likelihood = likelihood.with_options(soft=short.soft, information=short.information)
@@ -155,8 +157,9 @@ def _objective(fit: GapFit) -> float:
 
 def _with_contact(best: GapFit) -> GapFit:
     """Return the fit, with a least torque noise where the machine's contact law is not the model's."""
-    likelihood = best.likelihood
-    if not _has_other_contact(likelihood, best) or _has_least_noise(likelihood):
+    likelihood, impulse = best.likelihood, best.parameters()[IMPULSE]
+    is_clear = abs(impulse["value"]) > likelihood.settings.fit.clear_impulse * impulse["standard_error"]
+    if not is_clear or _has_least_noise(likelihood):
         return best
     likelihood = _with_least_noise(likelihood)
     return _fit_long(
@@ -182,14 +185,6 @@ def _with_least_noise(likelihood: Likelihood) -> Likelihood:
     for side, least in zip(("motor", "load"), problem.least_where_inexact, strict=True):
         problem = problem.with_unknown(problem.index(f"log_torque_{side}"), lower=math.log(least))
     return likelihood.with_options(problem=problem)
-
-
-def _has_other_contact(likelihood: Likelihood, fit: GapFit) -> bool:
-    """Return whether the machine's contact law is clearly another than the model's."""
-    place = likelihood.problem.index(IMPULSE)
-    column = list(fit.free).index(place)
-    deviation = math.sqrt(max(float(fit.covariance[column, column]), 0.0))
-    return abs(float(fit.point.theta[place])) > likelihood.settings.fit.clear_impulse * deviation
 
 
 def _continue(best: GapFit, levels: Sequence[tuple[float, float]]) -> GapFit:

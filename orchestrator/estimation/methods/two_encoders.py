@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.flanks.fit import ALPHA, FlankProblem, best_fit, jackknife
 from orchestrator.estimation.flanks.points import points_of
 from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
@@ -36,8 +37,7 @@ def estimate(record: Record, model: Model, settings: EstimationSettings = DEFAUL
     fit = best_fit(problem)
     noise = math.sqrt(fit.variance)
     flanks = np.argmax(fit.share, axis=1) - 1
-    touched = flanks[flanks != 0]
-    traversals = int(np.count_nonzero(np.diff(touched)))
+    traversals = count_traversals(flanks)
     separate = fit.alpha / noise
     touching = float(1.0 - fit.share[:, 1].mean())
     count = max(points.count, points.motor.count / abs(fit.ratio))

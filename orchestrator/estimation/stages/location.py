@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from orchestrator.errors import RecordError
 from orchestrator.estimation.description import autocorrelation, block_variance, block_variance_along, stillness_note
 from orchestrator.estimation.effort import Effort, Stop, never
+from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings, StageSettings
@@ -136,7 +137,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         absent = 1 if answers[0] == FIRST else 0
         stages[absent] = StageGap(0.0, (0.0, _sizes(fits.free, wider[answers[0]])[absent].interval[1]))
     kept = best.likelihood.run(best.point.theta, keep=True)
-    traversals = sum(_changes(flanks) for flanks in kept.contacts.T)
+    traversals = sum(count_traversals(flanks) for flanks in kept.contacts.T)
     if not _total(best, settings.misfit_widening**2).interval[0] > 0.0 or traversals == 0:
         answers = []
     white = kept.errors / np.sqrt(kept.variances)
@@ -166,11 +167,6 @@ def _possible_answers(behind: dict[str, float], share: float, settings: StageSet
     if other < settings.negligible:
         return [nearest, *answers]
     return [BOTH]
-
-
-def _changes(flanks: NDArray[np.int64]) -> int:
-    touched = flanks[flanks != 0]
-    return int(np.count_nonzero(np.diff(touched)))
 
 
 def _torque_noise(fit: StagesFit) -> float:
