@@ -116,6 +116,7 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     curves["offset"] = float(fit.point.theta[problem.index(OFFSET)]) if OFFSET in problem.names else 0.0
     curves["model"] = likelihood.parameters(fit.point.theta)
     curves["covariance"] = wider * fit.covariance  # of diagnostics["parameters"], in their order
+    curves["covariance"][fit.column, fit.column] += shift**2
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
 
 
