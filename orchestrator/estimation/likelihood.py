@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from orchestrator.estimation.filter.innovations import Innovations, innovations
 from orchestrator.estimation.filter.model import AffineModel, Array, NoiseLevels, affine_model
 from orchestrator.estimation.information import covariance_factor, inverse
 from orchestrator.estimation.problem import (
+    ALPHA,
     DRY,
     IMPULSE,
     LATE,
@@ -43,6 +44,7 @@ JUMP = 100.0
 START_DAMPING = 1e-6
 DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
 NEAR = 2.0  # steps from a bound, within which a difference quotient looks inward
+PLACES = {name: n for n, name in enumerate(NAMES) if name != OFFSET}  # of a plant's parameters that are fitted
 LEAST_LOG_NOISE, LARGEST_LOG_NOISE = -40.0, 20.0  # beyond all bounds, where a difference quotient may look
 
 
@@ -70,18 +72,25 @@ class FilterLikelihood(ABC, Generic[P]):
     Nothing of it changes once it is made: a fit returns another one with what it has learnt.
 
     Attributes:
-        size: place of the gap's size among the unknowns.
+        gap: name of the gap's size.
+        size: its place among the unknowns.
         torque_places: places of the levels of torque noise.
         others: places of all other unknowns.
     """
 
+    gap: ClassVar[str]
+
     def __init__(
-        self, problem: P, size: str, threads: int, settings: EstimationSettings, effort: Effort | None
+        self,
+        problem: P,
+        threads: int = 1,
+        settings: EstimationSettings = DEFAULT_SETTINGS,
+        effort: Effort | None = None,
     ) -> None:
         self.problem = problem
         self.settings = settings
         self.soft = False
-        self.size = problem.index(size)
+        self.size = problem.index(self.gap)
         self._place = {name: n for n, name in enumerate(problem.names)}
         self._noise = [n for name, n in self._place.items() if name.startswith("log_noise_")]
         self.torque_places = [n for name, n in self._place.items() if name.startswith("log_torque_")]
@@ -314,22 +323,13 @@ class Fit(Generic[L]):
 class Likelihood(FilterLikelihood[GapProblem]):
     """The likelihood of a record of the drivetrain."""
 
-    def __init__(
-        self,
-        problem: GapProblem,
-        threads: int = 1,
-        settings: EstimationSettings = DEFAULT_SETTINGS,
-        effort: Effort | None = None,
-    ) -> None:
-        super().__init__(problem, "alpha", threads, settings, effort)
-        self._places = [(n, NAMES.index(name)) for name, n in self._place.items() if name in NAMES and name != OFFSET]
-        self._state = [problem.index(name) for name in STATE_NAMES]
+    gap = ALPHA
 
     def parameters(self, theta: Array) -> DrivetrainParameters:
         """Return the parameters ``p`` of a vector."""
         p = list(self.problem.base)
-        for place, name in self._places:
-            p[name] = float(theta[place])
+        for name in self._place.keys() & PLACES.keys():
+            p[PLACES[name]] = self.value(theta, name)
         return DrivetrainParameters._make(p)
 
     def model(self, theta: Array) -> AffineModel:
@@ -338,7 +338,7 @@ class Likelihood(FilterLikelihood[GapProblem]):
 
     def first(self, theta: Array) -> tuple[Array, Array]:
         """Return the state at the first row, which is unknown, and so exact for the filter: (5,) each."""
-        return theta[self._state], np.zeros(len(self._state))
+        return np.array([self.value(theta, name) for name in STATE_NAMES]), np.zeros(len(STATE_NAMES))
 
 
 def delay(u: Array, step: float, late: float) -> Array:

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.filter.model import AffineModel, Array, row_model
 from orchestrator.estimation.likelihood import FilterLikelihood
-from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.estimation.stages.problem import SHARE, SPEED_DEVIATIONS, TORQUE, TOTAL, TWIST, StagesProblem
 
 DIFFERENCE = 0.3  # step of a difference quotient, in standard deviations
@@ -14,14 +12,7 @@ DIFFERENCE = 0.3  # step of a difference quotient, in standard deviations
 class StagesLikelihood(FilterLikelihood[StagesProblem]):
     """The likelihood of a record of a train of two stages."""
 
-    def __init__(
-        self,
-        problem: StagesProblem,
-        threads: int = 1,
-        settings: EstimationSettings = DEFAULT_SETTINGS,
-        effort: Effort | None = None,
-    ) -> None:
-        super().__init__(problem, TOTAL, threads, settings, effort)
+    gap = TOTAL
 
     @property
     def difference(self) -> float:
