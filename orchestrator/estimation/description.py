@@ -115,8 +115,9 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     curves = {"states": kept.states, "contacts": contacts, "errors": kept.errors, "profile": curve}
     curves["offset"] = float(fit.point.theta[problem.index(OFFSET)]) if OFFSET in problem.names else 0.0
     curves["model"] = likelihood.parameters(fit.point.theta)
-    curves["covariance"] = wider * fit.covariance  # of diagnostics["parameters"], in their order
-    curves["covariance"][fit.column, fit.column] += shift**2
+    covariance = wider * fit.covariance  # of diagnostics["parameters"], in their order
+    covariance[fit.column, fit.column] += shift**2
+    curves["covariance"] = covariance
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
 
 

@@ -125,7 +125,10 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     ratio = model.parameters["i"].value
     unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
     if both:
-        unknowns.append(Unknown(OFFSET, -0.5 * sum(play_of(record.fill_missing(), model)), OFFSET_SPREAD, 1e-3))
+        low, high = play_of(record.fill_missing(), model)
+        # Where a torque such as a weight's holds one flank throughout, the middle of the play is not in the record.
+        held = abs(ratio * float(np.mean(record.u))) / model.parameters["k"].value > 0.5 * (high - low)
+        unknowns.append(Unknown(OFFSET, 0.0 if held else -0.5 * (low + high), OFFSET_SPREAD, 1e-3))
     pull = abs(ratio) * rms_behind_lag(record.u, record.step, model.parameters["tau"].value)
     depth = max(IMPULSE_DEPTH, IMPULSE_SHARE * pull / model.parameters["k"].value)
     impulse = 0.5 * depth * model.parameters["c"].value
