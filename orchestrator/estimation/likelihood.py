@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.effort import Effort
+from orchestrator.estimation.filter.held_torque import delay, smooth_torque
 from orchestrator.estimation.filter.innovations import Innovations, innovations
 from orchestrator.estimation.filter.model import AffineModel, Array, NoiseLevels, affine_model
 from orchestrator.estimation.information import covariance_factor, inverse
@@ -339,25 +340,6 @@ class Likelihood(FilterLikelihood[GapProblem]):
     def first(self, theta: Array) -> tuple[Array, Array]:
         """Return the state at the first row, which is unknown, and so exact for the filter: (5,) each."""
         return np.array([self.value(theta, name) for name in STATE_NAMES]), np.zeros(len(STATE_NAMES))
-
-
-def delay(u: Array, step: float, late: float) -> Array:
-    """Return held values (n,) by ``late`` [s] later, between rows by Lagrange's cubic.
-
-    Weighting the two rows that share a sample by their time in it would smear the torque as a lag of the drive does.
-    """
-    rows = math.floor(late / step)
-    d = late / step - rows
-    places = np.arange(u.size) - rows
-    weights = (d * (d - 1.0) * (2.0 - d) / 6.0, (d + 1.0) * (d - 1.0) * (d - 2.0) / 2.0,
-               (d + 1.0) * d * (2.0 - d) / 2.0, (d + 1.0) * d * (d - 1.0) / 6.0)  # fmt: skip
-    return np.asarray(sum(w * u[np.clip(places - n, 0, u.size - 1)] for n, w in enumerate(weights, -1)))
-
-
-def smooth_torque(u: Array) -> Array:
-    """Return the held values (n,) that act as a smooth torque through ``u``, half a row late: a hold spreads more."""
-    wide = np.concatenate([u[:1], u, u[-1:]])
-    return np.asarray(u - (wide[2:] - 2.0 * u + wide[:-2]) / 24.0)
 
 
 GapFit = Fit[Likelihood]

@@ -11,9 +11,9 @@ import pytest
 import orchestrator as oc
 from orchestrator.building.translation.kernel_arrays import plain_array
 from orchestrator.cli import main
+from orchestrator.estimation.filter.held_torque import delay
 from orchestrator.estimation.filter.innovations import KERNELS, _arrays
 from orchestrator.estimation.filter.model import row_model
-from orchestrator.estimation.likelihood import delay
 from orchestrator.estimation.problem import OFFSET
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.estimation.stages.fit import fit_stages, look_nearby, move_share
