@@ -95,7 +95,7 @@ def _of_values(
 ) -> Iterator[Reason]:
     """Yield each fitted value that lies outside what the model file allows.
 
-    One that is far outside is red, but where the half-gap of ``fit`` stays in its interval with the value as stated.
+    One that is far outside is red, unless the half-gap of ``fit`` stays in its interval with the value as stated.
     """
     for name, entry in parameters.items():
         stated = model.parameters.get(name)
