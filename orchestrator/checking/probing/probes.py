@@ -184,13 +184,13 @@ def life_cycle(context: Context) -> None:
                 if n == 0:
                     raise StatusError("DoStep", DISCARD, "a first step must be done, but each is discarded") from None
                 bench.job = replace(job, steps=n)
-                _end_early(context, t, "discards the step from there")
                 break
             except TerminatedError as ended:
                 if n == 0 and str(ended):
                     raise StatusError("DoStep", DISCARD, f"a first step must be done, but {ended}") from None
                 bench.job = replace(job, steps=max(n, 1))
-                _end_early(context, t + job.step, "asks to end the run there")
+                text = f"what comes after t = {t + job.step:g} is not checked, because the FMU ends the run there"
+                context.report("run.skipped", text)
                 break
             when = f"at t = {t + job.step:g}"
             context.quiet.append(driver.read(outputs, when))
@@ -200,10 +200,6 @@ def life_cycle(context: Context) -> None:
                 break
         driver.terminate()
         remarks(context, driver)
-
-
-def _end_early(context: Context, t: float, why: str) -> None:
-    context.report("run.skipped", f"what comes after t = {t:g} is not checked, because the FMU {why}")
 
 
 def remarks(context: Context, driver: Driver) -> None:
