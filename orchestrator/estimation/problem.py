@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from orchestrator.estimation.filter.model import Array
-from orchestrator.estimation.zeros import play_of
+from orchestrator.estimation.zeros import held_twist, play_of
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import rms, rms_behind_lag, robust_noise
@@ -125,9 +125,10 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     ratio = model.parameters["i"].value
     unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
     if both:
-        low, high = play_of(record.fill_missing(), model)
+        filled = record.fill_missing()
+        low, high = play_of(filled, model)
         # Where a torque such as a weight's holds one flank throughout, the middle of the play is not in the record.
-        held = abs(ratio * float(np.mean(record.u))) / model.parameters["k"].value > 0.5 * (high - low)
+        held = held_twist(filled, model) > 0.5 * (high - low)
         unknowns.append(Unknown(OFFSET, 0.0 if held else -0.5 * (low + high), OFFSET_SPREAD, 1e-3))
     pull = abs(ratio) * rms_behind_lag(record.u, record.step, model.parameters["tau"].value)
     depth = max(IMPULSE_DEPTH, IMPULSE_SHARE * pull / model.parameters["k"].value)

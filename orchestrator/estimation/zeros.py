@@ -30,10 +30,8 @@ def set_zeros(record: Record, model: Model) -> Record:
     filled = _shift(filled, 0.0, load)
     low, high = play_of(filled, model)
     centre = 0.5 * (low + high)
-    ratio = model.parameters["i"].value
-    held = abs(float(np.mean(filled.u))) * ratio / model.parameters["k"].value if record.has_torque else 0.0
-    lies_within = abs(centre) <= max(FAR_TWIST, 0.5 * (high - low)) + held
-    return _shift(record, 0.0 if lies_within else centre * ratio, load)
+    lies_within = abs(centre) <= max(FAR_TWIST, 0.5 * (high - low)) + held_twist(filled, model)
+    return _shift(record, 0.0 if lies_within else centre * model.parameters["i"].value, load)
 
 
 def play_of(record: Record, model: Model) -> tuple[float, float]:
@@ -41,6 +39,12 @@ def play_of(record: Record, model: Model) -> tuple[float, float]:
     shaft = shaft_signals(record, model)
     low, high = np.quantile(shaft.twist - shaft.torque / model.parameters["k"].value, (TAIL, 1.0 - TAIL))
     return float(low), float(high)
+
+
+def held_twist(record: Record, model: Model) -> float:
+    """Return the twist [rad] by which the mean torque of a record without missing rows winds the shaft up."""
+    torque = abs(float(np.mean(record.u)) * model.parameters["i"].value) if record.has_torque else 0.0
+    return torque / model.parameters["k"].value
 
 
 def _far_turns(angle: np.ndarray) -> int:
