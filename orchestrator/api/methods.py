@@ -11,22 +11,14 @@ from orchestrator.shared.trust import Trust
 
 @dataclass(frozen=True)
 class MethodResult:
-    """What one method says.
-
-    Attributes:
-        estimate: the estimate, or None where the method does not apply.
-        bound: the record's Cramer-Rao bound on the standard error [rad].
-        seconds: wall time [s].
-        reason: why the method does not apply, or empty.
-        trust: how far the estimate can be trusted, or None where there is none.
-    """
+    """What one method says."""
 
     method: str
-    estimate: Estimate | None
-    bound: float
-    seconds: float
-    reason: str = ""
-    trust: Trust | None = None
+    estimate: Estimate | None  # the estimate, or None where the method does not apply
+    bound: float  # the record's Cramer-Rao bound on the standard error [rad]
+    seconds: float  # wall time [s]
+    reason: str = ""  # why the method does not apply, or empty
+    trust: Trust | None = None  # how far the estimate can be trusted, or None where there is none
 
 
 def describe_record(record: Record) -> RecordFound:

@@ -47,9 +47,7 @@ def waves_of(plant: Plant, p: Array) -> dict[int, float]:
 def coarse_steps(plant: Plant, p: Array, h: float, turn: float) -> int:
     """Return the steps in a sample, at most ``MOST_STEPS``, with which a free run follows a model's modes and waves.
 
-    Args:
-        h: a sample [s].
-        turn: the farthest that the motor turns in it [rad].
+    ``h``: a sample [s]; ``turn``: the farthest that the motor turns in it [rad].
     """
     return _coarse_steps(plant, p.tobytes(), h, turn)
 

@@ -88,45 +88,30 @@ class Plant:
 
     The state of the analysis has eight places (as in ``pyfmu_sources.drivetrain.equations``), of which a plant may
     use fewer.
-
-    Attributes:
-        linear: names of the parameters of the plant with every effect off.
-        states: places of the state that the plant with every effect off uses.
-        bodies: the driven body first; each has an encoder.
-        drive: what a requested torque passes.
-        starts: place of a state -> name of its start value in the FMU.
-        offsets: names of the encoder offsets, in the order of the bodies.
-        bank: the effects that it may lack.
-        kernel: name of the module of its equations; see :mod:`orchestrator.plants.kernels`.
-        shaft: between the two bodies; None: a single body.
-        resonance: an added inertia; None: the plant has none.
-        followers: (place, followed place): states that are shifted with another when that is corrected.
-        nuisances: parameters of the analysis alone, appended to the table.
-        enumerations: names of parameters whose FMU variable counts from one.
-        spread: relative uncertainty of each linear parameter where a model file states none.
-        refused: values by name -> why records cannot be diagnosed against such a plant; "": they can.
-        realised: parameters of the analysis -> those of the FMU (n,), with what it alone has fitted put in.
-        presliding: of each body with dry friction, name of the logarithm of the distance over which it builds up.
     """
 
     name: str
     table: tuple[Parameter, ...]
-    linear: tuple[str, ...]
-    states: tuple[int, ...]
-    bodies: tuple[Body, ...]
-    drive: Drive
-    starts: Mapping[int, str]
-    offsets: tuple[str, ...]
-    bank: tuple[Effect, ...]
-    kernel: str
-    shaft: Shaft | None = None
-    resonance: Resonance | None = None
+    linear: tuple[str, ...]  # names of the parameters of the plant with every effect off
+    states: tuple[int, ...]  # places of the state that the plant with every effect off uses
+    bodies: tuple[Body, ...]  # the driven body first; each has an encoder
+    drive: Drive  # what a requested torque passes
+    starts: Mapping[int, str]  # place of a state -> name of its start value in the FMU
+    offsets: tuple[str, ...]  # names of the encoder offsets, in the order of the bodies
+    bank: tuple[Effect, ...]  # the effects that it may lack
+    kernel: str  # name of the module of its equations; see :mod:`orchestrator.plants.kernels`
+    shaft: Shaft | None = None  # between the two bodies; None: a single body
+    resonance: Resonance | None = None  # an added inertia; None: the plant has none
+    # (place, followed place): states that are shifted with another when that is corrected
     followers: tuple[tuple[int, int], ...] = ()
-    nuisances: tuple[Parameter, ...] = ()
-    enumerations: tuple[str, ...] = ()
-    spread: float = 0.0
+    nuisances: tuple[Parameter, ...] = ()  # parameters of the analysis alone, appended to the table
+    enumerations: tuple[str, ...] = ()  # names of parameters whose FMU variable counts from one
+    spread: float = 0.0  # relative uncertainty of each linear parameter where a model file states none
+    # values by name -> why records cannot be diagnosed against such a plant; "": they can
     refused: Callable[[Mapping[str, float]], str] = _accept_all
+    # parameters of the analysis -> those of the FMU (n,), with what it alone has fitted put in
     realised: Callable[[Array], Array] | None = None
+    # of each body with dry friction, name of the logarithm of the distance over which it builds up
     presliding: tuple[str, ...] = ()
     _index: dict[str, int] = field(default_factory=dict, repr=False)
 
@@ -177,9 +162,7 @@ class Plant:
     def follow_requests(self, p: Array, u: Array, h: float) -> tuple[Array, Array]:
         """Return what requests (n,) [N.m] become behind a second lag and a limited rate.
 
-        Args:
-            u: requests (n,), each held for ``h``.
-            h: sample time [s].
+        ``u``: requests (n,), each held for ``h``; ``h``: sample time [s].
 
         Returns:
             their mean over each sample (n,), and the value at its beginning (n,).

@@ -155,10 +155,7 @@ class Record:
 
 
 def interpolate_missing(values: Array) -> Array:
-    """Return values with straight lines over NaN.
-
-    Args:
-        values: (n,).
+    """Return values with straight lines over NaN. ``values``: (n,).
 
     Returns:
         Shape (n,); unchanged when nothing is missing, or everything.
@@ -171,10 +168,6 @@ def interpolate_missing(values: Array) -> Array:
 
 
 def runs_of(flags: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the runs in which flags hold.
-
-    Args:
-        flags: (n,).
-    """
+    """Return the runs in which flags hold. ``flags``: (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return edges[::2], edges[1::2]

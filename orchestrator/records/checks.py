@@ -70,9 +70,7 @@ def check_driven(u: Array, label: str, source: str) -> None:
 def motion_span(theta: Array, time: Array) -> tuple[float, float] | None:
     """Return from when to when [s after the first row] the motor moves, where that is a short part of the record.
 
-    Args:
-        theta: (n,) angle of the motor [rad], without missing samples.
-        time: (n,) [s].
+    ``theta``: (n,) angle of the motor [rad], without missing samples; ``time``: (n,) [s].
     """
     edges = np.linspace(0, theta.size, BLOCKS + 1).astype(int)
     travels = np.array([np.ptp(theta[a:b]) for a, b in itertools.pairwise(edges)])

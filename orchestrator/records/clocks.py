@@ -25,23 +25,14 @@ SERIAL_DAYS = ((20_000.0, 80_000.0), (690_000.0, 800_000.0))  # of 1954 to 2119,
 
 @dataclass(frozen=True)
 class Clock:
-    """The time of the motor's rows.
+    """The time of the motor's rows."""
 
-    Attributes:
-        time: (n,) [s].
-        spoken: words that say what it was.
-        factor: seconds in the file's numbers; None: it was not made from these.
-        start: what the file says at 0 s, in its numbers after factor and offset, or as a date.
-        first: what the file says first.
-        numbered: whether the file's numbers count samples.
-    """
-
-    time: Array
-    spoken: str
-    factor: float | None = None
-    start: Any = 0.0
-    first: float = 0.0
-    numbered: bool = False
+    time: Array  # (n,) [s]
+    spoken: str  # words that say what it was
+    factor: float | None = None  # seconds in the file's numbers; None: it was not made from these
+    start: Any = 0.0  # what the file says at 0 s, in its numbers after factor and offset, or as a date
+    first: float = 0.0  # what the file says first
+    numbered: bool = False  # whether the file's numbers count samples
 
 
 def read_clock(

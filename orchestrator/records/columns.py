@@ -53,39 +53,25 @@ class Column:
     """Where a column of a record comes from, and how its numbers become SI.
 
     The file's number times ``factor`` plus ``offset`` is the value in ``unit``.
-
-    Attributes:
-        name: name in the file, or ``#3`` for the third column; empty: the column's own name, or recognised.
-        unit: unit in the file; empty: what the file says, or SI.
-        factor: of the file's numbers; -1 turns a sign round.
-        offset: added after ``factor`` [unit].
-        counts_per_rev: counts of one revolution, for ``counts``.
-        rated_value: what 100 % is [N.m or N], for ``%``.
-        torque_constant: [N.m/A], for ``A`` and ``V``.
-        resistance: of the winding [ohm], for ``V``.
-        back_emf_constant: [V.s/rad], for ``V``; None: the torque constant, which is the same in SI.
-        inductance: of the winding [H], for ``V``; None: none.
-        relative_uncertainty: of the scale of ``u``, as a share: of the torque constant, for instance.
-        modulo: value at which an angle or a time starts again from zero [unit]; None: it does not. Of a torque what the
-            file's numbers have in addition, before ``factor``, where they are negative, such as 65536.
-        sign_bit: what the file's numbers have in addition where they are negative, such as 32768; None: nothing.
-        rate: samples per second, where the time is a sample number.
     """
 
-    name: str = ""
-    unit: str = ""
-    factor: float = 1.0
-    offset: float = 0.0
-    counts_per_rev: float | None = None
-    rated_value: float | None = None
-    torque_constant: float | None = None
-    resistance: float | None = None
-    back_emf_constant: float | None = None
-    inductance: float | None = None
-    relative_uncertainty: float = 0.0
+    name: str = ""  # name in the file, or ``#3`` for the third column; empty: the column's own name, or recognised
+    unit: str = ""  # unit in the file; empty: what the file says, or SI
+    factor: float = 1.0  # of the file's numbers; -1 turns a sign round
+    offset: float = 0.0  # added after ``factor`` [unit]
+    counts_per_rev: float | None = None  # counts of one revolution, for ``counts``
+    rated_value: float | None = None  # what 100 % is [N.m or N], for ``%``
+    torque_constant: float | None = None  # [N.m/A], for ``A`` and ``V``
+    resistance: float | None = None  # of the winding [ohm], for ``V``
+    back_emf_constant: float | None = None  # [V.s/rad], for ``V``; None: the torque constant, which is the same in SI
+    inductance: float | None = None  # of the winding [H], for ``V``; None: none
+    relative_uncertainty: float = 0.0  # of the scale of ``u``, as a share: of the torque constant, for instance
+    # value at which an angle or a time starts again from zero [unit]; None: it does not. Of a torque what the file's
+    # numbers have in addition, before ``factor``, where they are negative, such as 65536
     modulo: float | None = None
+    # what the file's numbers have in addition where they are negative, such as 32768; None: nothing
     sign_bit: float | None = None
-    rate: float | None = None
+    rate: float | None = None  # samples per second, where the time is a sample number
 
 
 def unit_of(name: str, column: Column, written: str, label: str, source: str) -> RecordUnit | None:

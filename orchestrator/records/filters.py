@@ -22,10 +22,7 @@ def decimate(record: Record, rate: float) -> Record:
 
     All columns go through the same symmetric low-pass filter, so linear dynamics between them stay as they are and
     nothing is delayed; ``u`` is then averaged over the sample in which the slower record holds it. Contacts shorter
-    than a new sample are blurred.
-
-    Args:
-        rate: [1/s].
+    than a new sample are blurred. ``rate``: [1/s].
     """
     factor = math.floor(1.0 / (record.step * rate) + 1e-6)
     if factor < 2:

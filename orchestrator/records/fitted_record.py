@@ -11,30 +11,18 @@ NotNegative = Annotated[float, msgspec.Meta(ge=0.0)]
 
 
 class FittedRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Verdict and joint uncertainty of a fit, and the signals that it had.
+    """Verdict and joint uncertainty of a fit, and the signals that it had."""
 
-    Attributes:
-        source: the record's file.
-        verdict: "none", "parameters", "effects" or "unknown".
-        trust: "green", "amber" or "red".
-        reasons: why it is not green.
-        torque: largest request of the record [N.m].
-        noise: standard deviation of each encoder, motor first, rounding included [rad].
-        counts: one count of each encoder [rad]; 0: not rounded.
-        unknowns: names of the parameters that were fitted.
-        values: that were fitted, in their units.
-        covariance: (unknowns, unknowns) of these, in their units; its 95 % intervals are those of the fit.
-    """
-
-    source: str
-    verdict: str
-    trust: str
-    reasons: tuple[str, ...] = ()
-    torque: Positive
-    noise: tuple[NotNegative, ...]
-    counts: tuple[NotNegative, ...]
-    unknowns: tuple[str, ...] = ()
-    values: tuple[float, ...] = ()
+    source: str  # the record's file
+    verdict: str  # "none", "parameters", "effects" or "unknown"
+    trust: str  # "green", "amber" or "red"
+    reasons: tuple[str, ...] = ()  # why it is not green
+    torque: Positive  # largest request of the record [N.m]
+    noise: tuple[NotNegative, ...]  # standard deviation of each encoder, motor first, rounding included [rad]
+    counts: tuple[NotNegative, ...]  # one count of each encoder [rad]; 0: not rounded
+    unknowns: tuple[str, ...] = ()  # names of the parameters that were fitted
+    values: tuple[float, ...] = ()  # that were fitted, in their units
+    # (unknowns, unknowns) of these, in their units; its 95 % intervals are those of the fit
     covariance: tuple[tuple[float, ...], ...] = ()
 
     def problem(self, parameters: frozenset[str]) -> str:

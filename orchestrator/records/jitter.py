@@ -18,9 +18,7 @@ MOST_OFF = 0.5  # of a step: below it each row is the one nearest to its stamp, 
 def fit_clock(time: Array, place: NDArray[np.int64] | None = None) -> tuple[float, float, Array]:
     """Return start and step [s] of the uniform clock that fits stamps best, and how far these are off.
 
-    Args:
-        time: (n,) stamps [s].
-        place: (n,) row of each on the clock; None: no row is lost.
+    ``time``: (n,) stamps [s]. ``place``: (n,) row of each on the clock; None: no row is lost.
     """
     row = (np.arange(time.size) if place is None else place).astype(float)
     row -= row.mean()

@@ -41,44 +41,27 @@ ANGLES_OF = ("theta_l", "theta_m")
 
 @dataclass(frozen=True)
 class Reading:
-    """How a file is to be read.
+    """How a file is to be read."""
 
-    Attributes:
-        part: first and last time to keep [s], from the first row on; None: all.
-        resample: "uniform" (only the stamps jitter), "linear" or "cubic"; None: the motion decides.
-        rate: samples per second to come down to; None: as in the file.
-        torque_needed: whether a file of two angles without a torque is refused.
-        holes: whether long holes may stay, for who takes the parts between them.
-        header: line of the names in a text, from 1; 0: it has none; None: found.
-    """
-
-    part: tuple[float, float] | None = None
-    resample: str | None = None
-    rate: float | None = None
-    torque_needed: bool = True
-    header: int | None = None
-    holes: bool = False
+    part: tuple[float, float] | None = None  # first and last time to keep [s], from the first row on; None: all
+    resample: str | None = None  # "uniform" (only the stamps jitter), "linear" or "cubic"; None: the motion decides
+    rate: float | None = None  # samples per second to come down to; None: as in the file
+    torque_needed: bool = True  # whether a file of two angles without a torque is refused
+    header: int | None = None  # line of the names in a text, from 1; 0: it has none; None: found
+    holes: bool = False  # whether long holes may stay, for who takes the parts between them
 
 
 @dataclass(frozen=True)
 class Loaded:
-    """What was read.
+    """What was read."""
 
-    Attributes:
-        table: columns in SI by name; ``SAMPLED``: the torque as a sampled signal, where it has rows of its own.
-        labels: their names in the file.
-        notes: what was detected and assumed.
-        doubts: readings that failed; see ``Record``.
-        torque_raster: step of the torque's own rows [s], where they are rarer than the angles'; else 0.0.
-        angle_unit: of the load's angles, else of the motor's; see ``Record``.
-    """
-
+    # columns in SI by name; ``SAMPLED``: the torque as a sampled signal, where it has rows of its own
     table: dict[str, Array]
-    labels: dict[str, str]
-    notes: tuple[str, ...]
-    doubts: tuple[str, ...] = ()
-    torque_raster: float = 0.0
-    angle_unit: str = "rad"
+    labels: dict[str, str]  # their names in the file
+    notes: tuple[str, ...]  # what was detected and assumed
+    doubts: tuple[str, ...] = ()  # readings that failed; see ``Record``
+    torque_raster: float = 0.0  # step of the torque's own rows [s], where they are rarer than the angles'; else 0.0
+    angle_unit: str = "rad"  # of the load's angles, else of the motor's; see ``Record``
 
 
 def load(

@@ -141,9 +141,7 @@ def _check_slope(source: str, motor: Array, load: Array, ratio: float, name: str
 def smooth(record: Record, tau: float) -> tuple[Array, Array, Array, Array]:
     """Return impulse, speed and angle of the motor, smoothed over a short time.
 
-    Args:
-        record: with every sample of its grid, missing ones filled.
-        tau: lag of the drive [s].
+    ``record``: with every sample of its grid, missing ones filled; ``tau``: lag of the drive [s].
 
     Returns:
         Impulse of the torque [N.m.s], speed [rad/s], angle [rad], and the impulse [s] of a unit torque that the drive

@@ -23,22 +23,15 @@ MOST_UNEVEN = 0.2  # of the steps may be longer than half as much again; else th
 
 @dataclass(frozen=True)
 class Request:
-    """A torque, row by row of the angles.
+    """A torque, row by row of the angles."""
 
-    Attributes:
-        held: (n,) mean of the torque that is held while a row lasts; NaN where there is none.
-        within: rms of what it is off by within rows [unit of the values]; 0.0: it changes at rows only.
-        sampled: (n,) a smooth signal through the torque's rows, at the rows of the angles; None: these are not rarer,
-            or the torque is logged when it changes.
-        raster: step of the torque's own rows [s], where there is such a reading; else 0.0.
-        undated: its own rows without a time stamp, which are left out.
-    """
-
-    held: Array
-    within: float
+    held: Array  # (n,) mean of the torque that is held while a row lasts; NaN where there is none
+    within: float  # rms of what it is off by within rows [unit of the values]; 0.0: it changes at rows only
+    # (n,) a smooth signal through the torque's rows, at the rows of the angles; None: these are not rarer, or the
+    # torque is logged when it changes
     sampled: Array | None
-    raster: float
-    undated: int = 0
+    raster: float  # step of the torque's own rows [s], where there is such a reading; else 0.0
+    undated: int = 0  # its own rows without a time stamp, which are left out
 
     def describe(self, label: str, lost: int) -> str:
         """Return what was done in words; ``lost``: rows of the angles before and after the torque."""

@@ -60,11 +60,7 @@ class StampReader:
         self.has_fractions = False
 
     def read(self, cells: Sequence[str], row: int) -> NDArray[np.int64]:
-        """Return stamps as ns (n,), the least integer for empty cells.
-
-        Args:
-            row: number of the first one, from 0.
-        """
+        """Return stamps as ns (n,), the least integer for empty cells. ``row``: number of the first one, from 0."""
         out = np.empty(len(cells), dtype=np.int64)
         for n, cell in enumerate(cells):
             self._row = row + n

@@ -22,38 +22,24 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Wanted:
-    """A column that is asked for.
+    """A column that is asked for."""
 
-    Attributes:
-        column: its name in the file, or ``#3`` for the third; for the time, ``time`` is recognised by other names, too.
-        where: what asks for it, such as ``$.inputs.u.column``, for messages.
-        cure: what to do where its unit is not known, for messages.
-        unit: its unit, which goes before what the file states; empty: what the file states.
-    """
-
+    # its name in the file, or ``#3`` for the third; for the time, ``time`` is recognised by other names, too
     column: str
-    where: str
-    cure: str
-    unit: str = ""
+    where: str  # what asks for it, such as ``$.inputs.u.column``, for messages
+    cure: str  # what to do where its unit is not known, for messages
+    unit: str = ""  # its unit, which goes before what the file states; empty: what the file states
 
 
 @dataclass(frozen=True)
 class NamedColumns:
-    """Columns of a file.
+    """Columns of a file."""
 
-    Attributes:
-        time: (n,) s; NaN where there is none.
-        values: an array (n,) for each column that was asked for, in the file's numbers; NaN: missing.
-        units: the unit of each, as it is stated; empty: it is not.
-        labels: what the file calls the time and each column.
-        notes: what was detected, a few words each.
-    """
-
-    time: Array
-    values: tuple[Array, ...]
-    units: tuple[str, ...]
-    labels: tuple[str, ...]
-    notes: tuple[str, ...]
+    time: Array  # (n,) s; NaN where there is none
+    values: tuple[Array, ...]  # an array (n,) for each column that was asked for, in the file's numbers; NaN: missing
+    units: tuple[str, ...]  # the unit of each, as it is stated; empty: it is not
+    labels: tuple[str, ...]  # what the file calls the time and each column
+    notes: tuple[str, ...]  # what was detected, a few words each
 
 
 def read_columns(

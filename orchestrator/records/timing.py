@@ -27,23 +27,14 @@ LEAST_FALLS, LEAST_FALL = 2, 0.2  # s: of 0.9 to 0.1, 0.95 to 0.1 and 0.5 to 0.1
 
 @dataclass(frozen=True)
 class Timing:
-    """What the time stamps of a file say.
+    """What the time stamps of a file say."""
 
-    Attributes:
-        step: mean sample time [s].
-        jitter: root mean square distance of the stamps from a uniform grid [s].
-        largest_jitter: the largest such distance [s].
-        missing: rows that the grid has and the file has not.
-        gaps: places of the gaps on the grid: (first missing row, rows) each.
-        rounded: step that the stamps themselves are rounded to [s], 0.0: none found.
-    """
-
-    step: float
-    jitter: float
-    largest_jitter: float
-    missing: int
-    gaps: tuple[tuple[int, int], ...] = ()
-    rounded: float = 0.0
+    step: float  # mean sample time [s]
+    jitter: float  # root mean square distance of the stamps from a uniform grid [s]
+    largest_jitter: float  # the largest such distance [s]
+    missing: int  # rows that the grid has and the file has not
+    gaps: tuple[tuple[int, int], ...] = ()  # places of the gaps on the grid: (first missing row, rows) each
+    rounded: float = 0.0  # step that the stamps themselves are rounded to [s], 0.0: none found
 
     def describe(self) -> str:
         """Return the timing in words."""
@@ -59,21 +50,15 @@ class Timing:
 
 @dataclass(frozen=True)
 class Grid:
-    """A uniform grid for rows: ``place`` (n,) is where each row of the file belongs on its ``size`` rows.
-
-    Attributes:
-        trusted: whether the rows are uniform, and not their stamps.
-        uniform: whether they lie on the grid at all; else the samples were taken at uneven times.
-        note: words for what was found, where nobody said that they are.
-    """
+    """A uniform grid for rows: ``place`` (n,) is where each row of the file belongs on its ``size`` rows."""
 
     start: float
     timing: Timing
     place: NDArray[np.int64]
     size: int
-    trusted: bool = False
-    uniform: bool = True
-    note: str = ""
+    trusted: bool = False  # whether the rows are uniform, and not their stamps
+    uniform: bool = True  # whether they lie on the grid at all; else the samples were taken at uneven times
+    note: str = ""  # words for what was found, where nobody said that they are
 
 
 def grid_of(

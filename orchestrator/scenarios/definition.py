@@ -12,17 +12,13 @@ from orchestrator.master.system import System
 
 @dataclass(frozen=True)
 class Derived:
-    """A signal that follows from a recorded one: ``factor * source + offset``.
-
-    Attributes:
-        unit: of the signal; None where none is stated.
-    """
+    """A signal that follows from a recorded one: ``factor * source + offset``."""
 
     name: str
     source: str
     factor: float
     offset: float
-    unit: str | None
+    unit: str | None  # of the signal; None where none is stated
 
 
 @dataclass(frozen=True)

@@ -38,19 +38,13 @@ _SLACK = 1 << 20
 
 @dataclass(frozen=True)
 class Safety:
-    """How far FMUs are trusted.
+    """How far FMUs are trusted."""
 
-    Attributes:
-        trust: all of them are treated as ours: they run in this process, with the rights of the user.
-        time: seconds that a run may take; ``None``: the default for FMUs that are not ours, no limit for others.
-        memory: resident bytes of a child process.
-        allow_nonfinite: a result may hold NaN and infinities.
-    """
-
-    trust: bool = False
+    trust: bool = False  # all of them are treated as ours: they run in this process, with the rights of the user
+    # seconds that a run may take; ``None``: the default for FMUs that are not ours, no limit for others
     time: float | None = None
-    memory: int = DEFAULT_MEMORY_LIMIT
-    allow_nonfinite: bool = False
+    memory: int = DEFAULT_MEMORY_LIMIT  # resident bytes of a child process
+    allow_nonfinite: bool = False  # a result may hold NaN and infinities
 
     @property
     def limits(self) -> Limits:

@@ -18,10 +18,8 @@ def read_table(
 ) -> tuple[Table, str]:
     """Read a ``Table`` from two named columns of a file, and the unit of its values as the file states it.
 
-    Two rows at one time are a jump: the value of the last one holds from that time on.
-
-    Args:
-        header: line of the names in a text, from 1; None: found.
+    Two rows at one time are a jump: the value of the last one holds from that time on. ``header``: line of the names in
+    a text, from 1; None: found.
     """
     asked = Wanted(time, "`time`", "write the times in seconds"), Wanted(column, "`column`", 'say `unit = "..."`')
     try:

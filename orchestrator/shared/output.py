@@ -85,9 +85,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def write_columns(path: Path, columns: Mapping[str, Any], cell: Callable[[Any], Any] | None = None) -> None:
     """Write arrays of shape (n,) as CSV under their headings.
 
-    Args:
-        columns: arrays by heading, in their order.
-        cell: what is written of a value (default: the value, exactly).
+    ``columns``: arrays by heading, in their order; ``cell``: what is written of a value (default: the value, exactly).
     """
     try:
         with path.open("w", encoding="utf-8", newline="") as stream:

@@ -10,15 +10,10 @@ ARCMIN = 60.0 * 180.0 / math.pi  # arc minutes in a radian
 
 @dataclass(frozen=True)
 class Play:
-    """A backlash.
+    """A backlash."""
 
-    Attributes:
-        alpha: half-gap [rad] at the load.
-        ratio: gear ratio, motor angle over load angle.
-    """
-
-    alpha: float
-    ratio: float
+    alpha: float  # half-gap [rad] at the load
+    ratio: float  # gear ratio, motor angle over load angle
 
     @property
     def total(self) -> float:

@@ -45,9 +45,7 @@ def _place(staging: Path, directory: Path) -> Path:
 def publish(staging: Path, directory: Path, stale: Collection[str]) -> None:
     """Put the files of ``staging`` into ``directory``, and remove the ``stale`` files of an earlier result.
 
-    Args:
-        staging: beside ``directory`` or in it, see ``make_staging``.
-        stale: names of files in ``directory``.
+    ``staging``: beside ``directory`` or in it, see ``make_staging``; ``stale``: names of files in ``directory``.
     """
     directory.mkdir(parents=True, exist_ok=True)  # another command that failed may have taken an empty one away
     with hold_folder(directory.parent), signals_held():

@@ -34,15 +34,10 @@ class Reason:
 
 @dataclass(frozen=True)
 class Trust:
-    """A level with the reasons that keep it from green; no reasons: green.
+    """A level with the reasons that keep it from green; no reasons: green."""
 
-    Attributes:
-        level: the worst level of the reasons.
-        reasons: what was found, worst first.
-    """
-
-    level: Level
-    reasons: tuple[str, ...] = ()
+    level: Level  # the worst level of the reasons
+    reasons: tuple[str, ...] = ()  # what was found, worst first
 
     def to_result(self) -> TrustFound:
         """Return the level's word and the reasons, as they stand in result files."""

@@ -156,15 +156,11 @@ _MASS_FOR_FORCE = {"pound": "pound_force", "ounce": "ounce_force"}  # where they
 
 @dataclass(frozen=True)
 class KnownUnit:
-    """A unit: the number of it times ``factor`` plus ``offset`` is the value in SI.
-
-    Attributes:
-        offset: added after ``factor``; other than 0.0 for temperatures alone.
-    """
+    """A unit: the number of it times ``factor`` plus ``offset`` is the value in SI."""
 
     dimension: Dimension
     factor: float
-    offset: float = 0.0
+    offset: float = 0.0  # added after ``factor``; other than 0.0 for temperatures alone
 
 
 def dimension_of(**exponents: int) -> Dimension:

@@ -96,13 +96,9 @@ def _type(children: str, attributes: dict[str, _Attribute]) -> _Type:
 
 @dataclass
 class Fault:
-    """Faults of one kind: the first place, what is wrong there, and how many there are.
+    """Faults of one kind: the first place, what is wrong there, and how many there are."""
 
-    Attributes:
-        element: the first that has it.
-    """
-
-    element: etree._Element
+    element: etree._Element  # the first that has it
     message: str
     count: int = 0
 

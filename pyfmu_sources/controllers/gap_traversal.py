@@ -59,11 +59,9 @@ def later_parts(first: float, torque: float, ratio: float, level: float, tau: fl
     """Return whether a first part of ``first`` [s] can end without torque at the speed asked for, and the others [s].
 
     With ``x = exp(-second/tau)``, ``E = exp(-first/tau)`` and the torque ``T_1`` after the first part, the torque and
-    the change of momentum at the end give ``(T_1 + level) x^2 - 2 level x + E ratio level = 0``.
-
-    Args:
-        torque: at the start [N.m].
-        ratio: ``exp(c/tau)``, where ``c`` [s] is how long ``level`` takes for the change of momentum asked for.
+    the change of momentum at the end give ``(T_1 + level) x^2 - 2 level x + E ratio level = 0``. ``torque``: at the
+    start [N.m]; ``ratio``: ``exp(c/tau)``, where ``c`` [s] is how long ``level`` takes for the change of momentum asked
+    for.
     """
     fade = exp(-first / tau)
     reached = level + (torque - level) * fade

@@ -26,10 +26,8 @@ NEGLIGIBLE_TWIST = 1e-18
 def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, table: Table) -> tuple[State, bool]:
     """Return the state after one product with the transition matrix, and whether no event can lie inside.
 
-    An event is ruled out when both ends are farther from it than the speeds at both ends could carry.
-
-    Args:
-        table: ``prepare(p, h)`` of the same ``p`` and ``h``.
+    An event is ruled out when both ends are farther from it than the speeds at both ends could carry. ``table``:
+    ``prepare(p, h)`` of the same ``p`` and ``h``.
     """
     i = p.i
     model = backlash_model(p)

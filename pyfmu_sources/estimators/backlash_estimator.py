@@ -270,9 +270,7 @@ def begin(
 ) -> None:
     """Set all filters at the first measured angles [rad] with the settings ``s``.
 
-    Args:
-        alpha_start: half-gap to start from [rad]; 0: not known.
-        alpha_spread: its relative standard deviation.
+    ``alpha_start``: half-gap to start from [rad]; 0: not known. ``alpha_spread``: its relative standard deviation.
     """
     if alpha_start <= 0.0:
         for n in range(FILTERS):

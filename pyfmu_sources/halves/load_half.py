@@ -70,9 +70,7 @@ def settled(x: State, contact: int, p: Parameters, theta_m: float, speed: float)
     """Return the flank that touches once the gap allows it; 1 without a gap.
 
     A motor's angle from elsewhere is never exact: within ``LOOSE`` a contact ends only when the teeth move on that way.
-
-    Args:
-        speed: derivative of the twist [rad/s].
+    ``speed``: derivative of the twist [rad/s].
     """
     if p.alpha == 0.0:
         return 1

@@ -176,9 +176,7 @@ def locate(
     """Return (state, time, guard) at which the first guard turns negative inside a step.
 
     Regula falsi with halved ends (Illinois), and every third time the middle, where a guard is far from straight.
-
-    Args:
-        beyond: state at the end of the step, which violates the guard ``which``.
+    ``beyond``: state at the end of the step, which violates the guard ``which``.
     """
     low, high, last = 0.0, h, 0
     above, below = depth(x, mode, which, p, u, T_l), depth(beyond, mode, which, p, u, T_l)

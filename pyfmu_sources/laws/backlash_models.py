@@ -8,33 +8,19 @@ from typing import NamedTuple
 
 
 class BacklashModel(NamedTuple):
-    """One model.
+    """One model."""
 
-    Attributes:
-        name: as in the FMU and on the command line.
-        description: of the FMU's enumeration.
-        gap: False for the shaft without one.
-        plain_when_closed: without a gap it is the plain shaft.
-        rigid: teeth in contact couple motor and load as one body.
-        held: the load stands still inside the gap.
-        bounces: teeth that meet rebound by the coefficient of restitution.
-        never_pulls: teeth part when their torque reaches zero.
-        own_contact: stiffness and damping are those of the contact, not of the shaft.
-        gradual: the damping of teeth that meet may set in with their penetration.
-        predicted: the one-step predictor of a diagnosis can follow it.
-    """
-
-    name: str
-    description: str
-    gap: bool = True
-    plain_when_closed: bool = False
-    rigid: bool = False
-    held: bool = False
-    bounces: bool = False
-    never_pulls: bool = False
-    own_contact: bool = False
-    gradual: bool = False
-    predicted: bool = False
+    name: str  # as in the FMU and on the command line
+    description: str  # of the FMU's enumeration
+    gap: bool = True  # False for the shaft without one
+    plain_when_closed: bool = False  # without a gap it is the plain shaft
+    rigid: bool = False  # teeth in contact couple motor and load as one body
+    held: bool = False  # the load stands still inside the gap
+    bounces: bool = False  # teeth that meet rebound by the coefficient of restitution
+    never_pulls: bool = False  # teeth part when their torque reaches zero
+    own_contact: bool = False  # stiffness and damping are those of the contact, not of the shaft
+    gradual: bool = False  # the damping of teeth that meet may set in with their penetration
+    predicted: bool = False  # the one-step predictor of a diagnosis can follow it
 
 
 MODELS = (

@@ -65,9 +65,7 @@ def built_up(memory: float, rate: float, width: float, time: float) -> float:
 def resonance_torque(angle: float, speed: float, inertia: float, frequency: float, damping_ratio: float) -> float:
     """Return the torque [N.m] that drives a sprung inertia which lags the load by ``angle`` and ``speed``.
 
-    Args:
-        inertia: that is sprung [kg.m2].
-        frequency: its own, undamped [rad/s].
+    ``inertia``: that is sprung [kg.m2]; ``frequency``: its own, undamped [rad/s].
     """
     return inertia * frequency * (frequency * angle + 2.0 * damping_ratio * speed)
 

@@ -122,9 +122,7 @@ def meets(x: Point, rate: Point, values: Values, h: float) -> bool:
 def rates(x: Point, signs: tuple[float, float], values: Values, u: float) -> Point:
     """Return the rates of the states; the damping of teeth that meet grows with their penetration.
 
-    Args:
-        signs: mean directions of dry friction.
-        u: torque that is asked for [N.m].
+    ``signs``: mean directions of dry friction; ``u``: torque that is asked for [N.m].
     """
     p = values.plant
     full = whole(x, u)

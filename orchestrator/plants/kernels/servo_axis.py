@@ -76,9 +76,7 @@ def meets(x: Point, rate: Point, values: Values, h: float) -> bool:
 def rates(x: Point, signs: tuple[float, float], values: Values, u: float) -> Point:
     """Return the rates of the states.
 
-    Args:
-        signs: mean direction of dry friction, first.
-        u: torque that is asked for [N.m].
+    ``signs``: mean direction of dry friction, first; ``u``: torque that is asked for [N.m].
     """
     speed, acceleration, lag, _, _ = fmu_rates((x[0], x[1], x[4], 0.0, u), signs[0], values.plant, u, 0.0)
     return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)

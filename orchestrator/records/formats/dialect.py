@@ -21,28 +21,17 @@ STRAY_ROWS = 4  # of numbers above the names: with more, two records stand in on
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a text is to be read.
+    """How a text is to be read."""
 
-    Attributes:
-        separator: between cells; a blank stands for any run of blanks.
-        decimal: sign before the fraction.
-        width: cells of a row.
-        first: line of the first row, from 0.
-        texts: places of columns that hold words.
-        preamble: lines before the names.
-        units_row: whether a row of its own holds the units.
-        named: whether there is a row of names.
-    """
-
-    separator: str
-    decimal: str
+    separator: str  # between cells; a blank stands for any run of blanks
+    decimal: str  # sign before the fraction
     heads: tuple[Head, ...]
-    width: int
-    first: int
-    texts: frozenset[int]
-    preamble: tuple[str, ...]
-    units_row: bool
-    named: bool
+    width: int  # cells of a row
+    first: int  # line of the first row, from 0
+    texts: frozenset[int]  # places of columns that hold words
+    preamble: tuple[str, ...]  # lines before the names
+    units_row: bool  # whether a row of its own holds the units
+    named: bool  # whether there is a row of names
 
     def describe(self, encoding: str) -> str:
         """Return the dialect in words."""

@@ -127,11 +127,7 @@ def _collect_structure(name: str, fields: Mapping[str, Any], vectors: Vectors, d
 
 
 def _columns_of(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    """Return the columns of an array: itself, or the columns of a table, numbered from 1.
-
-    Args:
-        array: of any shape.
-    """
+    """Return the columns of an array: itself, or the columns of a table, numbered from 1. ``array``: of any shape."""
     if array.dtype.kind not in "fiubM" or array.size < 2:
         return {}
     if array.ndim == 1 or (array.ndim == 2 and 1 in array.shape):

@@ -17,18 +17,12 @@ _SHOWN = 3
 
 @dataclass(frozen=True)
 class RowBlock:
-    """Rows that follow each other.
+    """Rows that follow each other."""
 
-    Attributes:
-        first: number of the first row in the table, from 0.
-        text: the rows, a line each.
-        count: rows in ``text``.
-        misfit: number of the first row that has more or fewer cells than the table, and how many; None: none has.
-    """
-
-    first: int
-    text: str
-    count: int
+    first: int  # number of the first row in the table, from 0
+    text: str  # the rows, a line each
+    count: int  # rows in ``text``
+    # number of the first row that has more or fewer cells than the table, and how many; None: none has
     misfit: tuple[int, int] | None = None
 
 
@@ -38,16 +32,13 @@ class TableRows:
 
     A line is left out where its first cell is a word, though the column holds numbers, and few of its cells are
     values. Below the last row the word alone suffices (`Mean;1.2;...`), and a last row that is cut off is left out.
-
-    Attributes:
-        left_out: lines among the rows and below them that are no rows, by number from 1.
-        broken: whether some of them stand among the rows.
     """
 
     file: TextFile
     dialect: Dialect
+    # lines among the rows and below them that are no rows, by number from 1
     left_out: dict[int, str] = field(default_factory=dict)
-    broken: bool = False
+    broken: bool = False  # whether some of them stand among the rows
 
     def __post_init__(self) -> None:
         self._end = self.file.lines - self._count_tail()
@@ -58,11 +49,7 @@ class TableRows:
         return max(self._end - self.dialect.first, 0)
 
     def blocks(self, part: slice = slice(0, None)) -> Iterator[RowBlock]:
-        """Yield the rows in blocks.
-
-        Args:
-            part: the rows to yield, by number from 0.
-        """
+        """Yield the rows in blocks. ``part``: the rows to yield, by number from 0."""
         row, first, last = 0, part.start or 0, part.stop
         width, separator = self.dialect.width, self.dialect.separator
         for line, whole in self.file.blocks(self.dialect.first, self._end):

@@ -16,36 +16,22 @@ MAXIMUM_CHANNELS = 20_000
 
 @dataclass(frozen=True)
 class Head:
-    """One channel of a file.
+    """One channel of a file."""
 
-    Attributes:
-        name: as the file writes it, without its unit.
-        unit: as the file writes it, or empty.
-        kind: "number", or "stamp" where the values are dates or times of day.
-        raster: which channels share their rows; channels of another raster have other time stamps.
-        full: name and unit as the file writes them together, which also names the channel.
-    """
-
-    name: str
-    unit: str = ""
-    kind: str = "number"
-    raster: int = 0
-    full: str = ""
+    name: str  # as the file writes it, without its unit
+    unit: str = ""  # as the file writes it, or empty
+    kind: str = "number"  # "number", or "stamp" where the values are dates or times of day
+    raster: int = 0  # which channels share their rows; channels of another raster have other time stamps
+    full: str = ""  # name and unit as the file writes them together, which also names the channel
 
 
 class RecordSource(Protocol):
-    """An opened file.
-
-    Attributes:
-        dialect: what was detected, in one line.
-        rate: samples per second where the file states it outside its channels, or None.
-        broken: what stands among the rows of a text and is no row, as far as it was read; empty: nothing.
-    """
+    """An opened file."""
 
     heads: Sequence[Head]
-    dialect: str
-    rate: float | None
-    broken: str = ""
+    dialect: str  # what was detected, in one line
+    rate: float | None  # samples per second where the file states it outside its channels, or None
+    broken: str = ""  # what stands among the rows of a text and is no row, as far as it was read; empty: nothing
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """Return the values of the channels at ``places``, float64 or datetime64; NaN or NaT where one is missing.

@@ -16,20 +16,13 @@ _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", 
 
 @dataclass(frozen=True)
 class TextFile:
-    """A text whose encoding is known. Lines are counted from 0.
-
-    Attributes:
-        encoding: as Python names it.
-        lines: how many there are, the last one included where nothing ends it.
-        last_comma: the last line that has a comma; -1: none has.
-        tail: the last lines, whole ones.
-    """
+    """A text whose encoding is known. Lines are counted from 0."""
 
     path: Path
-    encoding: str
-    lines: int
-    last_comma: int
-    tail: str = field(repr=False)
+    encoding: str  # as Python names it
+    lines: int  # how many there are, the last one included where nothing ends it
+    last_comma: int  # the last line that has a comma; -1: none has
+    tail: str = field(repr=False)  # the last lines, whole ones
 
     def head(self, first: int, length: int) -> str:
         """Return at most so many characters from line ``first`` on."""

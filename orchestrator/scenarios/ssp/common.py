@@ -135,12 +135,7 @@ def add_master(system: etree._Element, step: float, solver_tolerance: float | No
 
 
 def add_experiment(root: etree._Element, start: float, stop: float, step: float) -> None:
-    """Say when a system runs, and its communication step where libcosim reads it.
-
-    Args:
-        start: [s].
-        stop: [s].
-    """
+    """Say when a system runs, and its communication step where libcosim reads it. ``start``, ``stop``: [s]."""
     times = {"startTime": repr(start), "stopTime": repr(stop)}
     experiment = etree.SubElement(root, tag("ssd", "DefaultExperiment"), times)
     annotations = etree.SubElement(experiment, tag("ssd", "Annotations"))

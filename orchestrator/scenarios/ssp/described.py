@@ -13,18 +13,12 @@ from orchestrator.master.system import Instance
 
 @dataclass(frozen=True)
 class SspVariable:
-    """A variable or an array.
-
-    Attributes:
-        type: its element in SSP.
-        sizes: of an array's dimensions.
-        first: the variable, or the array's first element.
-    """
+    """A variable or an array."""
 
     name: str
-    type: str
-    sizes: tuple[int, ...]
-    first: Variable
+    type: str  # its element in SSP
+    sizes: tuple[int, ...]  # of an array's dimensions
+    first: Variable  # the variable, or the array's first element
 
 
 def described(instance: Instance, names: Iterable[str], version: str) -> Iterator[SspVariable]:

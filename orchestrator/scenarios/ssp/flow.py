@@ -23,38 +23,27 @@ Node = tuple[str, str]
 
 @dataclass
 class Structure:
-    """What is found while walking through nested systems. Elements are named by their path, joined by slashes.
+    """What is found while walking through nested systems. Elements are named by their path, joined by slashes."""
 
-    Attributes:
-        folder: of the unpacked archive.
-        units: that the file declares.
-        components: file of each component.
-        exchanged: names of the components that are to be run as model exchange.
-        kinds: kind of each connector.
-        elements: for each element of an array that a connection names, the array and its place in it.
-        connector_units: of those that state one.
-        sizes: of the dimensions of those that are arrays; None where the file does not say.
-        without_number: ``Clock`` or ``Binary``, for connectors of these types.
-        clock_times: ``interval`` and ``shift`` of the connectors of type ``Clock``, where they are stated [s].
-        drivers: for each connector that is fed: what feeds it, factor and offset.
-        given: values of parameter bindings.
-        remarks: what is passed over.
-    """
-
-    folder: Path
-    units: Mapping[str, Unit]
+    folder: Path  # of the unpacked archive
+    units: Mapping[str, Unit]  # that the file declares
     problems: list[Problem] = field(default_factory=list)
-    components: dict[str, Path] = field(default_factory=dict)
-    exchanged: set[str] = field(default_factory=set)
-    kinds: dict[Node, str] = field(default_factory=dict)
+    components: dict[str, Path] = field(default_factory=dict)  # file of each component
+    exchanged: set[str] = field(default_factory=set)  # names of the components that are to be run as model exchange
+    kinds: dict[Node, str] = field(default_factory=dict)  # kind of each connector
+    # for each element of an array that a connection names, the array and its place in it
     elements: dict[Node, tuple[Node, str]] = field(default_factory=dict)
-    connector_units: dict[Node, Unit] = field(default_factory=dict)
+    connector_units: dict[Node, Unit] = field(default_factory=dict)  # of those that state one
+    # of the dimensions of those that are arrays; None where the file does not say
     sizes: dict[Node, tuple[int | None, ...]] = field(default_factory=dict)
+    # ``Clock`` or ``Binary``, for connectors of these types
     without_number: dict[Node, str] = field(default_factory=dict)
+    # ``interval`` and ``shift`` of the connectors of type ``Clock``, where they are stated [s]
     clock_times: dict[Node, dict[str, Fraction]] = field(default_factory=dict)
+    # for each connector that is fed: what feeds it, factor and offset
     drivers: dict[Node, tuple[Node, float, float]] = field(default_factory=dict)
-    given: dict[Node, Given] = field(default_factory=dict)
-    remarks: list[RunRemark] = field(default_factory=list)
+    given: dict[Node, Given] = field(default_factory=dict)  # values of parameter bindings
+    remarks: list[RunRemark] = field(default_factory=list)  # what is passed over
 
 
 @dataclass

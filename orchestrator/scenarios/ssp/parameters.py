@@ -64,22 +64,14 @@ def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
 
 @dataclass(frozen=True)
 class Place:
-    """Where the parameter bindings of an element are read.
+    """Where the parameter bindings of an element are read."""
 
-    Attributes:
-        path: of the element, for messages.
-        folder: of the unpacked archive.
-        component: the element's own file, against which a ``sourceBase`` of ``component`` is resolved; None: it is a
-            system.
-        problems: what is wrong is added here.
-        remarks: what is passed over is added here.
-    """
-
-    path: str
-    folder: Path
+    path: str  # of the element, for messages
+    folder: Path  # of the unpacked archive
+    # the element's own file, against which a ``sourceBase`` of ``component`` is resolved; None: it is a system
     component: Path | None
-    problems: list[Problem]
-    remarks: list[str] = field(default_factory=list)
+    problems: list[Problem]  # what is wrong is added here
+    remarks: list[str] = field(default_factory=list)  # what is passed over is added here
 
     def refuse(self, where: str, text: str) -> None:
         """Add a problem at ``where`` in the element."""

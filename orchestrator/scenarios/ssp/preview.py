@@ -10,22 +10,15 @@ from orchestrator.scenarios.ssp.read import open_ssp
 
 
 class SystemPreview(msgspec.Struct, frozen=True):
-    """A system of FMUs.
-
-    Attributes:
-        components: model name of each FMU, by the name that it has in results.
-        variables: of all FMUs, called ``component.variable``, with the starts that the file gives.
-        connections: pairs of an output and an input.
-        stop: stop time [s].
-        remarks: what is passed over.
-    """
+    """A system of FMUs."""
 
     file: str
-    components: dict[str, str]
+    components: dict[str, str]  # model name of each FMU, by the name that it has in results
+    # of all FMUs, called ``component.variable``, with the starts that the file gives
     variables: tuple[VariableShown, ...]
-    connections: tuple[tuple[str, str], ...]
-    stop: float
-    remarks: tuple[str, ...]
+    connections: tuple[tuple[str, str], ...]  # pairs of an output and an input
+    stop: float  # stop time [s]
+    remarks: tuple[str, ...]  # what is passed over
 
 
 def preview_ssp(path: Path) -> SystemPreview:

@@ -57,11 +57,9 @@ def open_ssp(
 ) -> Iterator[Scenario]:
     """Yield the scenario that an SSP file describes; its FMUs lie in a private folder until the block ends.
 
-    All outputs are recorded. Components of nested systems are called ``system/component``.
-
-    Args:
-        step: communication step [s]; default: the file's own annotation, else a thousandth of the stop time.
-        events: event mode is used where an FMU of FMI 3.0 has it.
+    All outputs are recorded. Components of nested systems are called ``system/component``. ``step``: communication step
+    [s]; default: the file's own annotation, else a thousandth of the stop time. ``events``: event mode is used where an
+    FMU of FMI 3.0 has it.
     """
     if os.path.isdir(path):
         raise ScenarioError(f"`ssp` must be an archive, but {path} is a directory; zip what is in it")

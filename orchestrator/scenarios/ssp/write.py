@@ -29,10 +29,7 @@ from orchestrator.shared.units import EXPONENTS
 def write_ssp(path: Path, scenario: Scenario, version: str = "1.0") -> None:
     """Write a scenario of FMUs as an SSP archive, whole or not at all.
 
-    Sources that are constant become start values; SSP has no way to say others.
-
-    Args:
-        version: of SSP, "1.0" or "2.0".
+    Sources that are constant become start values; SSP has no way to say others. ``version``: of SSP, "1.0" or "2.0".
     """
     scenario.system.check()
     _check_clocks(scenario.system)

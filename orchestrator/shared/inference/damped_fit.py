@@ -13,37 +13,24 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Linearised(Generic[T]):
-    """A cost near one point.
+    """A cost near one point."""
 
-    Attributes:
-        hessian: (k, k) of the cost, Gauss-Newton's.
-        gradient: (k,) of the cost.
-        moved: (k,) step -> the point there and its cost, which may be infinite or NaN.
-        exact: the derivatives are those of this point; where they are not, a step that fails says nothing of damping.
-    """
-
-    hessian: Array
-    gradient: Array
+    hessian: Array  # (k, k) of the cost, Gauss-Newton's
+    gradient: Array  # (k,) of the cost
     cost: float
-    moved: Callable[[Array], tuple[T, float]]
+    moved: Callable[[Array], tuple[T, float]]  # (k,) step -> the point there and its cost, which may be infinite or NaN
+    # the derivatives are those of this point; where they are not, a step that fails says nothing of damping
     exact: bool = True
 
 
 @dataclass(frozen=True)
 class Damping:
-    """How steps are damped.
+    """How steps are damped."""
 
-    Attributes:
-        first: damping of the first step, in units of the Hessian's diagonal.
-        floor: least damping after a step that failed.
-        ridge: Hessian -> what is added to its diagonal, so that blind directions stay put.
-        tries: dampings tried in one step.
-    """
-
-    first: float
-    floor: float
-    ridge: Callable[[Array], float]
-    tries: int
+    first: float  # damping of the first step, in units of the Hessian's diagonal
+    floor: float  # least damping after a step that failed
+    ridge: Callable[[Array], float]  # Hessian -> what is added to its diagonal, so that blind directions stay put
+    tries: int  # dampings tried in one step
 
 
 def fit_damped(

@@ -10,15 +10,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Repeats:
-    """What repeats differ by: no model does better, and none need.
+    """What repeats differ by: no model does better, and none need."""
 
-    Attributes:
-        sources: the records that have one input.
-        floor: rms of one run about what the runs have in common, by signal.
-    """
-
-    sources: tuple[str, ...]
-    floor: dict[str, float]
+    sources: tuple[str, ...]  # the records that have one input
+    floor: dict[str, float]  # rms of one run about what the runs have in common, by signal
 
 
 def repeat_variance(first: Array, second: Array, width: int) -> Array:

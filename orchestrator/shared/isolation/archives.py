@@ -24,16 +24,11 @@ Members = dict[str, zipfile.ZipInfo | None]
 
 @dataclass(frozen=True)
 class ArchiveLimits:
-    """What an archive may hold.
+    """What an archive may hold."""
 
-    Attributes:
-        total: bytes of all files unpacked.
-        ratio: unpacked over packed size of a file larger than 1 MiB.
-    """
-
-    total: int = 1024 * MEBIBYTE
+    total: int = 1024 * MEBIBYTE  # bytes of all files unpacked
     files: int = 20_000
-    ratio: float = 200.0
+    ratio: float = 200.0  # unpacked over packed size of a file larger than 1 MiB
 
 
 def unpack(path: Path, target: Path, limits: ArchiveLimits | None = None) -> None:

@@ -11,22 +11,14 @@ PATIENCE = 5.0
 
 @dataclass(frozen=True)
 class Limits:
-    """What a child may use.
+    """What a child may use."""
 
-    Attributes:
-        time: seconds that one answer may take.
-        output: bytes of any one file, and of the printed text.
-        total: time that all calls may take together [s].
-        disk: bytes of all files in the scratch folder.
-        entries: number of files and folders in the scratch folder.
-    """
-
-    time: float = 20.0
+    time: float = 20.0  # seconds that one answer may take
     memory: int = 2048 * MEBIBYTE
-    output: int = 8 * MEBIBYTE
-    total: float = 600.0
-    disk: int = 64 * MEBIBYTE
-    entries: int = 10_000
+    output: int = 8 * MEBIBYTE  # bytes of any one file, and of the printed text
+    total: float = 600.0  # time that all calls may take together [s]
+    disk: int = 64 * MEBIBYTE  # bytes of all files in the scratch folder
+    entries: int = 10_000  # number of files and folders in the scratch folder
     threads: int = 256
     open_files: int = 256
 

@@ -20,15 +20,10 @@ _LONGEST = 1e8
 
 @dataclass(frozen=True)
 class Walls:
-    """What the kernel enforces.
+    """What the kernel enforces."""
 
-    Attributes:
-        landlock: version of Landlock's interface; 0: files are not protected.
-        seccomp: whether sockets and further processes are refused.
-    """
-
-    landlock: int
-    seccomp: bool
+    landlock: int  # version of Landlock's interface; 0: files are not protected
+    seccomp: bool  # whether sockets and further processes are refused
 
     @property
     def not_enforced(self) -> str:

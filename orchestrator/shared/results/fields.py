@@ -17,21 +17,13 @@ ROW_LIMIT = 500
 
 @dataclass(frozen=True)
 class Display:
-    """What readers are told of a number, of a word, or of an interval.
+    """What readers are told of a number, of a word, or of an interval."""
 
-    Attributes:
-        label: its name in tables and facts.
-        unit: in which it is shown.
-        digits: significant ones, of numbers.
-        factor: of what is shown over the value: 100 for a share in percent.
-        to: of an interval, the label of its upper end; ``label`` is that of its lower one.
-    """
-
-    label: str
-    unit: str = ""
-    digits: int = 4
-    factor: float = 1.0
-    to: str = ""
+    label: str  # its name in tables and facts
+    unit: str = ""  # in which it is shown
+    digits: int = 4  # significant ones, of numbers
+    factor: float = 1.0  # of what is shown over the value: 100 for a share in percent
+    to: str = ""  # of an interval, the label of its upper end; ``label`` is that of its lower one
 
     @property
     def columns(self) -> "tuple[TableColumn, ...]":
