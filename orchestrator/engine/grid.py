@@ -6,7 +6,7 @@ Every design computes its row ``i`` from ``i`` alone, so a sweep of any size nee
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Any, ClassVar, Protocol
 
@@ -59,8 +59,7 @@ class Listed(Design):
         return (self.values[index],)
 
     def definition(self) -> Mapping[str, Any]:
-        """Return kind, name and values."""
-        return {"kind": "list", "name": self.name, "values": list(self.values)}
+        return {"kind": "list", **asdict(self)}
 
 
 @dataclass(frozen=True)
@@ -98,9 +97,7 @@ class Ranged(Design):
         return (_between(self.first, self.last, index / (self.count - 1), self.logarithmic),)
 
     def definition(self) -> Mapping[str, Any]:
-        """Return kind, name, ends, count and spacing."""
-        return {"kind": "range", "name": self.name, "first": self.first, "last": self.last, "count": self.count,
-                "logarithmic": self.logarithmic}  # fmt: skip
+        return {"kind": "range", **asdict(self)}
 
 
 @dataclass(frozen=True)
@@ -125,10 +122,6 @@ class Bounds:
     def at(self, fraction: float) -> float:
         """Map ``fraction`` in [0, 1) into the interval."""
         return _between(self.low, self.high, fraction, self.logarithmic)
-
-    def definition(self) -> Mapping[str, Any]:
-        """Return name, bounds and spacing."""
-        return {"name": self.name, "low": self.low, "high": self.high, "logarithmic": self.logarithmic}
 
 
 @dataclass(frozen=True)
@@ -160,9 +153,7 @@ class _Drawn(Design):
         raise NotImplementedError
 
     def definition(self) -> Mapping[str, Any]:
-        """Return kind, bounds, count and seed."""
-        bounds = [b.definition() for b in self.bounds]
-        return {"kind": self.kind, "bounds": bounds, "count": self.count, "seed": self.seed}
+        return {"kind": self.kind, **asdict(self)}
 
 
 class Randomised(_Drawn):

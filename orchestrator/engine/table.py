@@ -3,7 +3,7 @@
 import csv
 from collections.abc import Iterable, Iterator, Sequence
 from importlib.util import find_spec
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,7 @@ def write_parquet(path: Path, names: Sequence[str], columns: Sequence[ResultColu
     types = [int, *kinds, str, *(c.kind for c in columns), str]
     schema = pyarrow.schema([(name, arrow[kind]) for name, kind in zip(header(names, columns), types, strict=True)])
     with pyarrow.parquet.ParquetWriter(path, schema) as writer:
-        for batch in _batches(stream if first is None else _chain(first, stream)):
+        for batch in _batches(stream if first is None else chain((first,), stream)):
             table = [_cells(row, names, columns) for row in batch]
             arrays = [
                 pyarrow.array(column, field.type)
@@ -63,11 +63,6 @@ def _cells(row: Row, names: Sequence[str], columns: Sequence[ResultColumn]) -> l
     outcome = row.outcome
     values: Sequence[Any] = outcome.values or (None,) * len(columns)
     return [outcome.index, *(row.case.parameters[n] for n in names), outcome.status.value, *values, outcome.message]
-
-
-def _chain(first: Row, rows: Iterator[Row]) -> Iterator[Row]:
-    yield first
-    yield from rows
 
 
 def _batches(rows: Iterator[Row]) -> Iterator[list[Row]]:
