@@ -5,6 +5,7 @@ the Python loop gives the same bits.
 """
 
 import ctypes
+import re
 import time
 from collections.abc import Sequence
 from functools import cache
@@ -32,72 +33,18 @@ CHUNK_TIME = 0.1
 _Address, _Whole, _Real = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
-class _Transfer(ctypes.Structure):
-    _fields_ = (
-        ("function", _Address),
-        ("references", _Address),
-        ("variables", _Whole),
-        ("count", _Whole),
-        ("number", _Whole),
-        ("sized", _Whole),
-    )
+def _structures() -> dict[str, Any]:
+    """Return the structures that ``loop.c`` declares, by their names: of whole numbers, reals and addresses."""
+    code = re.sub(r"/\*.*?\*/", "", SOURCE.read_text(encoding="utf-8"), flags=re.DOTALL)
+    kinds = {"int64_t": _Whole, "double": _Real}
+    found: dict[str, Any] = {}
+    for body, name in re.findall(r"typedef struct \{(.*?)\} (\w+);", code, re.DOTALL):
+        fields = [(word, kinds.get(kind.strip(), _Address)) for kind, word in re.findall(r"([\w ]+[ *])(\w+);", body)]
+        found[name] = type(name, (ctypes.Structure,), {"_fields_": fields})
+    return found
 
 
-class _Slave(ctypes.Structure):
-    _fields_ = (
-        ("component", _Address),
-        ("step", _Address),
-        ("reports", _Whole),
-        ("inputs", _Address),
-        ("outputs", _Address),
-        ("input_transfers", _Whole),
-        ("output_transfers", _Whole),
-        ("first_input", _Whole),
-        ("first_output", _Whole),
-        ("first_feed", _Whole),
-        ("feeds", _Whole),
-        ("scratch", _Address),
-        ("warnings", _Whole),
-        ("first_call", _Whole),
-        ("first_step", _Whole),
-        ("astray", _Whole),
-        ("first_astray", _Whole),
-        ("farthest", _Real),
-        ("reached", _Real),
-    )
-
-
-class _Feed(ctypes.Structure):
-    _fields_ = (
-        ("slot", _Whole),
-        ("source", _Whole),
-        ("row", _Whole),
-        ("plain", _Whole),
-        ("factor", _Real),
-        ("offset", _Real),
-        ("quantum", _Real),
-    )
-
-
-class _Run(ctypes.Structure):
-    _fields_ = (
-        ("slaves", _Address),
-        ("feeds", _Address),
-        ("values", _Address),
-        ("table", _Address),
-        ("recorded", _Address),
-        ("rows", _Address),
-        ("slave_count", _Whole),
-        ("columns", _Whole),
-        ("records", _Whole),
-        ("start", _Real),
-        ("length", _Real),
-        ("simultaneous", _Whole),
-    )
-
-
-class _Failure(ctypes.Structure):
-    _fields_ = (("call", _Whole), ("slave", _Whole), ("step", _Whole))
+_Transfer, _Slave, _Feed, _Run, _Failure = _structures().values()
 
 
 @cache
