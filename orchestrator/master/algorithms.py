@@ -57,7 +57,7 @@ class FixedStepLoop(Protocol):
         """Communication step [s]."""
 
     def run(self, wiring: Wiring, table: Array, start: float, steps: int, rows: Array, record: Slots) -> int:
-        """Run on the grid; see ``fixed_step.run_sequential`` for the arguments. Return the number of passes."""
+        """Run on the grid; see ``fixed_step.run_fixed_step`` for the arguments. Return the number of passes."""
 
 
 Algorithm = GaussSeidel | Jacobi | Adaptive | FixedStepLoop

@@ -1,9 +1,11 @@
 """Gauss-Seidel and Jacobi on the grid ``start + n * step``; time is never accumulated."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from orchestrator.master.protocol import RunEndedError
-from orchestrator.master.wiring import Array, Slots, Stage, Wiring, gather
+from orchestrator.master.wiring import Array, Slots, Stage, View, Wiring, gather
 
 
 def do_step(stage: Stage, time: float, step: float) -> RunEndedError | None:
@@ -17,51 +19,53 @@ def do_step(stage: Stage, time: float, step: float) -> RunEndedError | None:
     return None
 
 
-def run_sequential(
-    wiring: Wiring, table: Array, start: float, step: float, steps: int, rows: Array, record: Slots
+def step_in_turn(
+    stages: Sequence[Stage], view: View, table: Array, column: int, time: float, step: float
+) -> RunEndedError | None:
+    """Step instances one after the other with the newest values; return how one ended the run at the step's end."""
+    ended = None
+    for stage in stages:
+        gather(stage, view, table, column)
+        stage.send()
+        ended = do_step(stage, time, step) or ended
+        stage.receive()
+    return ended
+
+
+def step_side_by_side(
+    stages: Sequence[Stage], view: View, table: Array, column: int, time: float, step: float
+) -> RunEndedError | None:
+    """Step instances with the values of the start of the step; return how one ended the run at the step's end."""
+    ended = None
+    for stage in stages:
+        gather(stage, view, table, column)
+    for stage in stages:
+        stage.send()
+        ended = do_step(stage, time, step) or ended
+    for stage in stages:
+        stage.receive()
+    return ended
+
+
+def run_fixed_step(
+    wiring: Wiring, table: Array, start: float, step: float, simultaneous: bool, rows: Array, record: Slots
 ) -> None:
-    """Step the instances one after the other, each with the newest values there are.
+    """Step all instances on the grid.
 
     Args:
         table: signals, shape (signals, steps + 1).
         start: time of the first step [s].
         step: communication step [s].
+        simultaneous: side by side (Jacobi), else in turn (Gauss-Seidel).
         rows: results, shape (steps + 1, recorded); row 0 is already there.
         record: recorded slots, shape (recorded,).
 
     Raises:
         RunEndedError: a slave wants the run to end; the row of its time is there.
     """
-    values, view, stages = wiring.values, wiring.view, wiring.stages
-    for n in range(steps):
-        time, ended = start + n * step, None
-        for stage in stages:
-            for target, source in stage.copies:
-                target[:] = source
-            if stage.mixed:
-                gather(stage, view, table, n + 1)
-            stage.send()
-            ended = do_step(stage, time, step) or ended
-            stage.receive()
-        np.take(values, record, out=rows[n + 1], mode="clip")
-        if ended is not None:
-            raise ended
-
-
-def run_simultaneous(
-    wiring: Wiring, table: Array, start: float, step: float, steps: int, rows: Array, record: Slots
-) -> None:
-    """Step all instances with the values of the start of the step; arguments as for ``run_sequential``."""
-    values, view, stages = wiring.values, wiring.view, wiring.stages
-    for n in range(steps):
-        time, ended = start + n * step, None
-        for stage in stages:
-            gather(stage, view, table, n + 1)
-        for stage in stages:
-            stage.send()
-            ended = do_step(stage, time, step) or ended
-        for stage in stages:
-            stage.receive()
-        np.take(values, record, out=rows[n + 1], mode="clip")
+    advance = step_side_by_side if simultaneous else step_in_turn
+    for n in range(len(rows) - 1):
+        ended = advance(wiring.stages, wiring.view, table, n + 1, start + n * step, step)
+        np.take(wiring.values, record, out=rows[n + 1], mode="clip")
         if ended is not None:
             raise ended

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import ScenarioError
 from orchestrator.master.fixed_point import solve_fixed_point
-from orchestrator.master.fixed_step import do_step
+from orchestrator.master.fixed_step import step_in_turn
 from orchestrator.master.layout import Layout
 from orchestrator.master.protocol import RunEndedError
-from orchestrator.master.wiring import Array, Slots, Stage, View, Wiring, gather
+from orchestrator.master.wiring import Array, Slots, Stage, Wiring, gather
 
 
 def backward_slots(layout: Layout, names: Iterable[str]) -> Slots:
@@ -72,7 +72,7 @@ class Iterated:
             for stages, cut in groups:
                 found: RunEndedError | None
                 if len(cut) == 0:
-                    found = _pass(stages, wiring.view, table, n + 1, time, self.step)
+                    found = step_in_turn(stages, wiring.view, table, n + 1, time, self.step)
                     passes += 1
                 else:
                     count, found = _solve(stages, cut, wiring, table, n + 1, time, self)
@@ -107,19 +107,6 @@ def loop_groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], Slots]]:
     return groups
 
 
-def _pass(
-    stages: tuple[Stage, ...], view: View, table: Array, column: int, time: float, step: float
-) -> RunEndedError | None:
-    """Step instances once; return how one ended the run at the end of the step."""
-    ended = None
-    for stage in stages:
-        gather(stage, view, table, column)
-        stage.send()
-        ended = do_step(stage, time, step) or ended
-        stage.receive()
-    return ended
-
-
 def _solve(
     stages: tuple[Stage, ...],
     cut: NDArray[np.int64],
@@ -141,7 +128,7 @@ def _solve(
                 stage.slave.set_state(state)
         first = False
         values[cut] = point
-        ended = _pass(stages, wiring.view, table, column, time, settings.step)
+        ended = step_in_turn(stages, wiring.view, table, column, time, settings.step)
         return values[cut]
 
     try:

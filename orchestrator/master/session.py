@@ -15,7 +15,7 @@ from orchestrator.master.divergence import divergence_remarks
 from orchestrator.master.event_steps import FixedSteps
 from orchestrator.master.event_windows import EventWindows
 from orchestrator.master.events import EventIteration
-from orchestrator.master.fixed_step import run_sequential, run_simultaneous
+from orchestrator.master.fixed_step import run_fixed_step
 from orchestrator.master.iterated import Iterated, backward_slots, initialise
 from orchestrator.master.layout import Layout, lay_out
 from orchestrator.master.own_steps import own_step_remarks
@@ -277,6 +277,5 @@ class Session:
         if compiled is not None:
             compiled.run(table, self.start, algorithm.step, simultaneous, rows, record)
             return MACHINE_CODE
-        run = run_simultaneous if simultaneous else run_sequential
-        run(wiring, table, self.start, algorithm.step, self.steps, rows, record)
+        run_fixed_step(wiring, table, self.start, algorithm.step, simultaneous, rows, record)
         return PYTHON
