@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -185,7 +184,7 @@ def sweep(
     cases = plan.cases()
     if tell is not None:
         tell("preparing FMUs and calibration")
-    builds = ensure_fastest(FMUS, partial(_ready, chosen))
+    builds = ensure_fastest(FMUS, partial(loop_values, chosen))  # designed while the compiler runs
     fmus = builds.paths
     check_parameters(loop_system(plan.experiment, fmus, (MACHINE,)), cases, OWN_PARAMETERS)
     calibrations = plan.calibrations(tell, calibrated)
@@ -193,12 +192,6 @@ def sweep(
     given: dict[str, object] = {"experiment": chosen.name, "backlash_model": chosen.backlash_model, "sizes": text}
     given |= {"noise": ",".join(exact_text(level) for level in levels), "seeds": seeds, "vary": list(words)}
     return SweepResult(plan, cases, done, fmus, calibrations, options.parquet, given, builds.kind)
-
-
-def _ready(experiment: Experiment) -> None:
-    """Do while the compiler runs what is wanted later and takes a second: imports and the loop's design."""
-    import_module("orchestrator.paired.figures")
-    loop_values(experiment)
 
 
 def _levels(noise: float | Sequence[float]) -> tuple[float, ...]:
