@@ -1,22 +1,28 @@
 """What the first answer costs, and the second: commands in this checkout and in another, in turn.
 
     python -m benchmarks.first_answer --other ../before --commands diagnose,estimate
+    python -m benchmarks.first_answer --other COMMIT --commands cases,long-diagnose --rows 1000000
 
 Each command runs twice in a copy of either checkout, at first with an empty home: nothing that a run leaves is there,
 such as FMUs, bytecode or caches beside the sources, but kernels that were compiled at installation. Printed are user
 processor time of the command and its children, and the largest resident memory of any of them, with the ratios of this
-checkout to the other.
+checkout to the other. Commands that begin with "long" read a log of ``--rows`` rows at 5 kHz, which is simulated
+beforehand. A commit of this repository is unpacked into a temporary folder.
 """
 
 import argparse
+import io
 import json
 import os
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+
+from benchmarks.long_log import write_log
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORD, MODEL = "docs/examples/machine.csv", "docs/examples/machine.toml"
@@ -26,7 +32,14 @@ COMMANDS = {
     "inspect": ["inspect", RECORD],
     "simulate": ["simulate"],
     "sweep": ["sweep"],
+    "cases": ["sweep", "--sizes", "random:2000", "--workers", "1"],
+    "help": ["estimate", "--help"],
+    "build": ["build", "--native", "--force"],
+    "long-inspect": ["inspect", "{log}"],
+    "long-estimate": ["estimate", "{log}", "--no-diagnose"],
+    "long-diagnose": ["diagnose", "{log}", "--model", MODEL],
 }
+USUAL = ("diagnose", "estimate", "inspect", "simulate", "sweep")
 _RUN = """
 import json, resource, subprocess, sys
 done = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
@@ -47,7 +60,8 @@ def run(root: Path, command: list[str], home: Path) -> Cost:
     """Run a command of a checkout with a home of its own."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("XDG_", "PYTHON"))}
     environment |= {"PYTHONPATH": str(root), "HOME": str(home)}
-    words = [sys.executable, "-m", "orchestrator", *command, "--out", str(home / "out")]
+    out = [] if "--help" in command else ["--out", str(home / "out")]
+    words = [sys.executable, "-m", "orchestrator", *command, *out]
     done = subprocess.run(
         [sys.executable, "-c", _RUN, *words], cwd=root, env=environment, capture_output=True, text=True, check=True
     )
@@ -58,25 +72,46 @@ def run(root: Path, command: list[str], home: Path) -> Cost:
     return Cost(seconds, memory)
 
 
+def checkout(name: str, folder: Path) -> Path:
+    """Return a checkout: a folder that is one, else this repository's commit of that name, unpacked."""
+    if Path(name).is_dir():
+        return Path(name).resolve()
+    packed = subprocess.run(["git", "archive", name], cwd=ROOT, capture_output=True, check=True).stdout
+    with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
+        archive.extractall(folder, filter="data")
+    return folder
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--other", type=Path, required=True, help="a checkout, whose libraries this Python has")
-    parser.add_argument("--commands", default=",".join(COMMANDS))
+    parser.add_argument("--other", required=True, help="a checkout or a commit, whose libraries this Python has")
+    parser.add_argument("--commands", default=",".join(USUAL), help=f"of {', '.join(COMMANDS)} (default: %(default)s)")
+    parser.add_argument("--rows", type=int, default=1_000_000, help="of the long log (default: %(default)s)")
     arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        compare(arguments.commands.split(","), checkout(arguments.other, Path(folder) / "other"), arguments.rows)
+
+
+def compare(names: list[str], other_root: Path, rows: int) -> None:
+    """Print the table of these commands."""
     print(
-        f"{'command':10}{'run':6}{'this s':>8}{'other s':>9}{'ratio':>7}{'this MiB':>10}{'other MiB':>11}{'ratio':>7}"
+        f"{'command':14}{'run':6}{'this s':>8}{'other s':>9}{'ratio':>7}{'this MiB':>10}{'other MiB':>11}{'ratio':>7}"
     )
-    for name in arguments.commands.split(","):
+    for name in names:
         with tempfile.TemporaryDirectory() as folder:
             homes = [Path(folder) / "this", Path(folder) / "other"]
             copies = [home / "checkout" for home in homes]
-            for root, copy in zip((ROOT, arguments.other.resolve()), copies, strict=True):
+            for root, copy in zip((ROOT, other_root), copies, strict=True):
                 shutil.copytree(root, copy, ignore=shutil.ignore_patterns(".*", "__pycache__", "*.fmu"))
+            log = Path(folder) / "log.csv"
+            if name.startswith("long"):
+                write_log(log, rows)
+            command = [word.replace("{log}", str(log)) for word in COMMANDS[name]]
             for state in ("cold", "warm"):
-                this, other = (run(root, COMMANDS[name], home) for root, home in zip(copies, homes, strict=True))
+                this, other = (run(root, command, home) for root, home in zip(copies, homes, strict=True))
                 print(
-                    f"{name:10}{state:6}{this.seconds:8.1f}{other.seconds:9.1f}{this.seconds / other.seconds:7.2f}"
+                    f"{name:14}{state:6}{this.seconds:8.1f}{other.seconds:9.1f}{this.seconds / other.seconds:7.2f}"
                     f"{this.memory:10.0f}{other.memory:11.0f}{this.memory / other.memory:7.2f}", flush=True,
                 )  # fmt: skip
 
