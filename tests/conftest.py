@@ -1,8 +1,12 @@
 """Fixtures that all areas share, and the order in which files run."""
 
+import os
+
+# Before a library starts threads that wait for each other: the workers use all processors.
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
 import compileall
 import gc
-import os
 import shutil
 import signal
 import sys
