@@ -50,7 +50,7 @@ def test_the_oldest_versions_are_those_that_are_allowed():
     }
 
 
-@pytest.mark.slow
+@pytest.mark.night  # by day the wheel has the marker of types
 def test_a_type_checker_finds_the_types_from_another_folder(tmp_path):
     """Of an editable installation too: an import hook in place of a path entry would leave everything untyped."""
     (tmp_path / "script.py").write_text("import orchestrator as oc\nreveal_type(oc.run_pair(alpha=0.02))\n")
@@ -86,7 +86,7 @@ def made(folder, *platforms):
     return release.build(source, folder / "dist", 1_700_000_000, platforms)
 
 
-@pytest.mark.slow
+@pytest.mark.night
 def test_the_same_sources_give_the_same_artefacts(tmp_path, built):
     before = os.umask(0o077)
     try:

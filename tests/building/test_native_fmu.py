@@ -37,7 +37,7 @@ def native(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
 def test_random_calls_give_the_same_as_the_python_fmu(native: dict[str, Path], name: str, seed: int) -> None:
     python = ensure_built([name])[name]
     table = getattr(importlib.import_module(f"pyfmu_sources.{recipe_of(name).module}"), name).table
-    count = 60 if name == "BacklashEstimator" else 300
+    count = 60 if name == "BacklashEstimator" else 300 if seed or name == "Drivetrain" else 120
     assert random_calls([Driver(python), Driver(native[name])], table, count, seed) > count // 10
 
 

@@ -65,7 +65,7 @@ def test_fmpy_finds_nothing(kinds: dict[str, Path], kind: str) -> None:
     assert validate_fmu(str(kinds[kind])) == []
 
 
-@pytest.mark.parametrize("kind", [pytest.param("2 native", marks=pytest.mark.night), "3 native"])
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.night) for kind in ("2 native", "3 native")])
 def test_the_check_finds_nothing(kinds: dict[str, Path], kind: str) -> None:
     report = check_fmu(kinds[kind], CheckOptions())
     assert report.findings == ()

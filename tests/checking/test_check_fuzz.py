@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.night) for n in (1, 2, 3))])
 def test_damage_gives_findings_and_nothing_else(seed: int, tmp_path: Path) -> None:
     rng = random.Random(seed)
     codes = [one_case(rng, tmp_path, run_share=0.05)[0] for _ in range(40)]

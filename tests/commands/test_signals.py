@@ -70,16 +70,17 @@ def heeded() -> Iterator[None]:
 @pytest.mark.parametrize(
     ("kind", "names"),
     [
-        ("check", ["SIGINT"]),
-        ("check", ["SIGTERM"]),
-        ("check", ["SIGHUP"]),
-        ("check", ["SIGTERM", "SIGTERM"]),
         ("check", ["SIGINT", "SIGTERM"]),
         ("simulate", ["SIGTERM"]),
-        ("sweep", ["SIGTERM"]),
         ("sweep", ["SIGINT"]),
         ("ssp", ["SIGHUP"]),
         ("diagnose", ["SIGTERM"]),
+        # By day each signal and each command once.
+        *(
+            pytest.param("check", names, marks=pytest.mark.night)
+            for names in (["SIGINT"], ["SIGTERM"], ["SIGHUP"], ["SIGTERM", "SIGTERM"])
+        ),
+        pytest.param("sweep", ["SIGTERM"], marks=pytest.mark.night),
     ],
 )
 def test_a_signal_while_an_fmu_runs_ends_the_command_and_leaves_nothing(

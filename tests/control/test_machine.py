@@ -224,7 +224,7 @@ def test_fmus_scenario_and_ssp_have_the_machines_values(taken):
     assert set(file_names("press")) <= {path.name for path in taken.iterdir()}
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.night)])
 def test_the_ssp_file_is_a_step_of_the_loop_for_both_versions_of_fmi(taken, tmp_path, fmi):
     folder, machine = taken, machine_of(read_model(write_model(tmp_path)))
     task = replace(make_task(machine, 1e-3), state_weights=choose_weights(machine, 1e-3).weights, torque_weight=1.0)

@@ -61,7 +61,7 @@ def _steps(slave: BacklashEstimator, record: Record, first: int, last: int) -> l
     return rows
 
 
-@pytest.mark.parametrize("share", [0.5, 0.7, 1.3, 2.0])
+@pytest.mark.parametrize("share", [0.5, 2.0, *(pytest.param(share, marks=pytest.mark.night) for share in (0.7, 1.3))])
 def test_a_half_gap_to_start_from_is_said_and_corrected(share: float) -> None:
     record = record_from_columns(make_record({"alpha": 0.03}, 51, 3.0, excitation="levels")[0], "loop")
     slave = _started(record, alpha_start=0.03 * share, alpha_spread=0.2)
@@ -148,7 +148,9 @@ def test_one_wild_sample_wakes_no_filter_that_was_forgotten(record: Record) -> N
     assert all(before or not now for before, now in zip(kept, run, strict=True))
 
 
-@pytest.mark.parametrize(("alpha", "seed"), [(0.01, 3), (0.02, 1), (0.06, 5)])
+@pytest.mark.parametrize(
+    ("alpha", "seed"), [(0.01, 3), *(pytest.param(*row, marks=pytest.mark.night) for row in ((0.02, 1), (0.06, 5)))]
+)
 def test_a_running_loop_estimates_its_own_gap(alpha: float, seed: int, tmp_path: Path) -> None:
     text = OWN_GAP.read_text(encoding="utf-8")
     changed = text.replace("alpha = 0.02", f"alpha = {alpha}").replace("seed = 1", f"seed = {seed}")

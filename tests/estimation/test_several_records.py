@@ -119,6 +119,7 @@ def test_records_that_the_model_does_not_explain_are_diagnosed_together(rubbing,
     assert len(seen) == 1
 
 
+@pytest.mark.night
 @pytest.mark.usefixtures("unexplained")
 @pytest.mark.slow
 def test_records_with_lost_rows_are_diagnosed_too(rubbing) -> None:

@@ -159,8 +159,8 @@ def test_the_kernel_in_machine_code_has_the_bits_of_plain_python(tmp_path, monke
 
 @pytest.mark.parametrize(
     ("halves", "answer"), [
-        ((0.02, 0.0), "1"),
         # By day the command names stage 2, and the intervals of both are looked at.
+        pytest.param((0.02, 0.0), "1", marks=pytest.mark.night),
         pytest.param((0.0, 0.012), "2", marks=pytest.mark.night),
         pytest.param((0.014, 0.008), "both", marks=pytest.mark.night),
     ],
@@ -340,6 +340,7 @@ def test_a_record_at_rest_is_refused_with_what_it_lacks(tmp_path):
         oc.locate_gap(record_from_columns(columns, "rest"), oc.read_model(model_of(tmp_path, 0.2)))
 
 
+@pytest.mark.night
 def test_of_angles_in_degrees_no_stage_is_named(place, tmp_path):
     """Both are in degrees, so that the slope is right; what fits best is a gap of a radian."""
     columns, _ = make_two_stage_record({"alpha_2": 0.015} | FRICTION, 23, share=0.2)

@@ -36,7 +36,7 @@ def held() -> tuple[Bench, dict[str, np.ndarray]]:
     return _bench(HELD, "held")
 
 
-@pytest.mark.parametrize("seed", [FREE, 7_010, 7_011, 7_012])
+@pytest.mark.parametrize("seed", [FREE, *(pytest.param(n, marks=pytest.mark.night) for n in (7_010, 7_011, 7_012))])
 def test_the_gap_the_ratio_and_the_late_channel_are_found(seed: int) -> None:
     bench, columns = _bench(seed)
     found = _estimate(columns)

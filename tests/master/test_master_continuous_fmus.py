@@ -89,9 +89,8 @@ def test_error_controlled_master_needs_few_steps_in_a_smooth_loop(folder: Path) 
 @pytest.mark.parametrize(
     ("alpha", "tolerance", "bound"),
     [
-        (0.01, 1e-7, 5e-7),
         (0.05, 1e-8, 1e-7),
-        *(pytest.param(alpha, 1e-7, 5e-7, marks=pytest.mark.night) for alpha in (0.02, 0.05)),
+        *(pytest.param(alpha, 1e-7, 5e-7, marks=pytest.mark.night) for alpha in (0.01, 0.02, 0.05)),
     ],
 )
 def test_error_controlled_master_reaches_a_microradian_with_backlash(

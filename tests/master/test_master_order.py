@@ -49,7 +49,7 @@ def test_error_follows_the_tolerance() -> None:
     assert errors[2] < 1e-8
 
 
-@pytest.mark.slow
+@pytest.mark.night  # by day with FMUs in test_master_continuous_fmus.py
 @pytest.mark.parametrize("alpha", [0.03])
 def test_backlash_loop_reaches_a_microradian_within_the_budget(alpha: float) -> None:
     """A fifth of a microradian, that is; other sizes with real FMUs in ``test_master_continuous_fmus.py``."""

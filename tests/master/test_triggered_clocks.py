@@ -69,7 +69,10 @@ def exact(stop: float) -> tuple[np.ndarray, list[float]]:
     return np.array(rows).T, crossings
 
 
-@pytest.mark.parametrize("exchange", [(), ("Plant", "Controller", "Supervisor"), ("Supervisor",)])
+ALL = pytest.param(("Plant", "Controller", "Supervisor"), marks=pytest.mark.night)  # by day with ticks at one instant
+
+
+@pytest.mark.parametrize("exchange", [(), ALL, ("Supervisor",)])
 def test_co_simulation_is_model_exchange_at_every_tick(fmus: dict[str, Path], exchange: tuple[str, ...]) -> None:
     found = run(fmus, Adaptive(0.1, tolerance=1e-9), *exchange)
     rows, crossings = exact(STOP)

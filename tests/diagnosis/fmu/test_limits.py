@@ -51,8 +51,13 @@ def _between(free: CalibrationResult, name: str, share: float) -> float:
     return found.nominal + share * (found.value - found.nominal)
 
 
-@pytest.mark.parametrize("name", ["m", "k", "c"])
-@pytest.mark.parametrize("share", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [
+        ("m", 0.5), ("k", 0.0), ("c", 0.5),
+        *(pytest.param(*row, marks=pytest.mark.night) for row in (("m", 0.0), ("k", 0.5), ("c", 0.0))),
+    ],
+)  # fmt: skip
 def test_a_limit_that_stops_the_fit_is_named(free, tmp_path: Path, name: str, share: float) -> None:
     """Also one that the nominal value stands at already."""
     end = _between(free, name, share)
@@ -88,7 +93,7 @@ def test_limits_that_stop_nothing_change_no_value_and_end_the_interval(free, tmp
         assert other.interval == pytest.approx(before.interval, abs=0.1 * before.standard_error)
 
 
-@pytest.mark.parametrize("nominal", [0.0, 1e-3, -0.05])
+@pytest.mark.parametrize("nominal", [0.0, *(pytest.param(value, marks=pytest.mark.night) for value in (1e-3, -0.05))])
 def test_a_value_near_zero_is_fitted_over_all_records_and_reported(nominal: float, tmp_path: Path) -> None:
     """Damping of 0.8 that the map begins with at zero, next to it, or with the wrong sign; two records share it."""
     cases = [record(SPRING, (), np.random.default_rng(11), rows) for rows in (600, 700)]
