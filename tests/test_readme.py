@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -56,6 +57,11 @@ COMMANDS = list(
         line for lines in LINES.values() for line in lines if line != OWN_CHECK and line not in TO_A_CONTROLLER
     )
 )
+BY_DAY = {"compensate": "--plants 2", "--design": "--duration 1"}
+"""What a command gets besides by day, so that it does less; at night each is run as it stands."""
+WAYS = pytest.mark.parametrize(
+    "more", [BY_DAY, pytest.param({}, marks=pytest.mark.night)], ids=["by day", "as it stands"]
+)
 (DIAGNOSE,) = (line for line in COMMANDS if " diagnose " in line)
 
 
@@ -74,14 +80,14 @@ def test_the_first_command_installs_what_it_needs():
     )
 
 
-def done_in(folder, line, whole):
+def done_in(folder, line, whole, more=MappingProxyType({})):
     """Run a command of the README where the examples are, with whole records or short ones; return what it found."""
     copy_examples(folder / "docs" / "examples", whole)
-    return done_there(folder, line)
+    return done_there(folder, line, more)
 
 
-def done_there(folder, line):
-    words = shlex.split(line)
+def done_there(folder, line, more):
+    words = shlex.split(" ".join([line, *(text for word, text in more.items() if word in line.split())]))
     done = run([sys.executable, *words[1:]], folder)
     assert done.returncode == 0, done.stderr
     return json.loads((folder / "results" / words[3] / f"{words[3]}.json").read_text(encoding="utf-8"))["results"]
@@ -94,9 +100,10 @@ def diagnosed(tmp_path_factory, fmus):
     return folder, done_in(folder, DIAGNOSE, whole=True)
 
 
+@WAYS
 @pytest.mark.parametrize("line", [line for line in COMMANDS if line != DIAGNOSE])
-def test_command_of_the_readme(line, tmp_path, fmus):
-    assert done_in(tmp_path, line, whole=False)
+def test_command_of_the_readme(line, more, tmp_path, fmus):
+    assert done_in(tmp_path, line, False, more)
 
 
 @pytest.mark.slow(shares="diagnosed")
@@ -116,21 +123,23 @@ def test_the_diagnosis_finds_what_the_readme_says(diagnosed):
     assert [row for row in rows if row not in said] == []
 
 
+@WAYS
 @pytest.mark.slow
-def test_the_tutorial_goes_from_a_log_in_amperes_to_an_fmu_of_the_machine(tmp_path):
+def test_the_tutorial_goes_from_a_log_in_amperes_to_an_fmu_of_the_machine(tmp_path, more):
     copy_examples(tmp_path / "docs" / "examples")
-    _, estimated, _, diagnosed, _, _ = (done_there(tmp_path, line) for line in TUTORIAL)
+    _, estimated, _, diagnosed, _, _ = (done_there(tmp_path, line, more) for line in TUTORIAL)
     assert estimated["alpha"] == pytest.approx(SERVO_GAP, rel=5e-3)
     found = {effect["name"]: effect["parameters"] for effect in diagnosed["effects"]}
     assert found["backlash"]["alpha"]["value"] == pytest.approx(SERVO_GAP, rel=5e-3)
     assert found["coulomb_friction"]["torque"]["value"] == pytest.approx(SERVO_FRICTION, rel=0.1)
 
 
+@WAYS
 @pytest.mark.slow
-def test_the_tour_ends_with_a_controller_of_the_machine(tmp_path):
+def test_the_tour_ends_with_a_controller_of_the_machine(tmp_path, more):
     copy_examples(tmp_path / "docs" / "examples", whole=True)
     for line in TO_A_CONTROLLER:
-        assert done_there(tmp_path, line)
+        assert done_there(tmp_path, line, more)
 
 
 def test_the_example_records_are_what_their_simulator_makes():

@@ -18,8 +18,9 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FUNCTIONS = sorted(name for name in oc.__all__ if name.islower() and not name.startswith("_"))
 # Examples that take more than a few seconds.
-SLOW = {"benchmark", "calibrate", "design"}
-AT_NIGHT = {"diagnose", "estimate"}  # the same calls as those of the page
+SLOW = {"benchmark", "calibrate"}
+# The same calls as those of the page; the search of an excitation is in tests/estimation/test_estimate.py by day.
+AT_NIGHT = {"design", "diagnose", "estimate"}
 
 
 @pytest.fixture
@@ -79,9 +80,15 @@ def test_importing_loads_no_workflow(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_page_runs_as_written(place):
+@pytest.mark.parametrize(
+    "more", [", diagnose=False", pytest.param("", marks=pytest.mark.night)], ids=["by day", "whole"]
+)
+def test_the_page_runs_as_written(place, more):
+    """By day without the diagnosis of the estimate, which is the one of the next line."""
     code = "\n".join(BLOCK.findall((ROOT / "docs" / "python.md").read_text(encoding="utf-8")))
     assert "found.build" in code
+    assert code.count("oc.estimate(record, model)") == 1
+    code = code.replace("oc.estimate(record, model)", f"oc.estimate(record, model{more})")
     done = run(code + "\nprint(theta.shape, fmu, len(sweep))", place)
     assert done.returncode == 0, done.stderr
     assert done.stdout.rstrip().endswith("(2001,) out/Drivetrain_machine.fmu 40")
