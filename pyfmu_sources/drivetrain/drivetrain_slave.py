@@ -10,11 +10,12 @@ from ..adapters.fmu_variables import LARGEST, FmuVariable, Terminals
 from ..adapters.plant_slave import KNOWN_STEPS, T_L, PlantSlave, input_variables, parameter_variable, start_variable
 from ..adapters.slave_base import TOO_STIFF, StepRefusedError
 from ..hybrid.event_numbers import NO_EVENT
+from ..laws.backlash_models import GRADUAL, NONE
 from ..laws.parameter_rows import Parameter
 from . import drivetrain
 from .drivetrain import Mode, Parameters, State, Table
 from .drivetrain_modes import QUIET, Indicators, Outputs, output_rates, rates_and_outputs, state_rates
-from .equations import NAMES, PARAMETERS
+from .equations import NAMES, PARAMETERS, is_rigid
 from .hybrid_plant import asked
 from .smooth_mode import after_events, indicators
 
@@ -124,6 +125,7 @@ class Drivetrain(PlantSlave):
         self._p = Parameters._make(
             float(self.integer[n] - 1) if n == MODEL else real[n] for n in range(FIRST_PARAMETER, FIRST_START)
         )
+        self._require_usable()
         theta_l, omega_l = real[FIRST_START + 2], real[FIRST_START + 3]
         x = (real[FIRST_START], real[FIRST_START + 1], theta_l, omega_l, real[FIRST_START + 4], theta_l, omega_l, 0.0)
         self._x = drivetrain.consistent_start(x, self._p)
@@ -133,6 +135,24 @@ class Drivetrain(PlantSlave):
         self._events = 0
         self._event_time = 0.0
         self._write()
+
+    def _require_usable(self) -> None:
+        """Refuse effects that the backlash model would leave out; without a gap, that of the teeth is allowed."""
+        p = self._p
+        model = int(p.backlash_model)
+        elastic = (
+            abs(p.presliding_motor_distance) + abs(p.presliding_load_distance) + abs(p.hardening_stiffness_cubic)
+            + abs(p.load_dependent_friction_motor_coefficient) + abs(p.load_dependent_friction_load_coefficient)
+            + abs(p.varying_stiffness_amplitude) + abs(p.shaft_hysteresis_torque)
+        )  # fmt: skip
+        if is_rigid(p) and elastic > 0.0:
+            raise ValueError(
+                "`effects.presliding`, `effects.load_dependent_friction`, `effects.hardening_stiffness`, "
+                "`effects.varying_stiffness` and `effects.shaft_hysteresis` must be off where `backlash_model` is "
+                "hysteresis or rigid_impact: rigid teeth have no shaft torque; use dead_zone, nordin or elastic_impact"
+            )
+        if p.impact_damping_depth > 0.0 and model != NONE and model not in GRADUAL:
+            raise ValueError("`effects.impact_damping.depth` must be 0 unless `backlash_model` is dead_zone")
 
     def _moved(self, x: State, mode: Mode, u: float, time: float, step: float) -> tuple[State, Mode]:
         number = self._step_number(time, step)

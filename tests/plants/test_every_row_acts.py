@@ -12,6 +12,7 @@ from pyfmu_sources.drivetrain.equations import NAMES, parameters
 from pyfmu_sources.laws.parameter_rows import BIG, Parameter, with_values
 from pyfmu_sources.train import train_equations
 from pyfmu_sources.train.two_stage_train_slave import TwoStageTrain
+from tests.support.native_bits import EFFECTS
 
 # What a row is set to, by its unit; a half of what is usual where that is not zero.
 SIZES = {
@@ -21,6 +22,8 @@ SIZES = {
 STOPS = {"effects.end_stop.lower": 0.15, "effects.end_stop.upper": -0.15}
 # What a row only shapes has another name.
 SHAPED = {"presliding": "coulomb_friction"}
+# Effects that need the torque of an elastic shaft.
+ELASTIC = ("hardening_stiffness", "presliding", "load_dependent_friction", "varying_stiffness", "shaft_hysteresis")
 # Rows that act with teeth that part, and the model that has them.
 MODELS = {"alpha": 1, "restitution": 4, "contact_stiffness": 5, "contact_damping": 5}
 
@@ -49,6 +52,10 @@ def law_of(row: Parameter, rows: tuple[Parameter, ...]) -> dict[str, float]:
     return {other.name: size_of(other) for other in (*of_law, *bends) if site <= set(other.name.split("."))}
 
 
+class RefusedError(Exception):
+    """The values were refused at the start."""
+
+
 def run_of(slave: type, values: dict[str, float]) -> list[tuple[float, ...]]:
     """The outputs of a quarter of a second from a start in motion."""
     numbers = {variable.name: n for n, variable in enumerate(slave.table)}
@@ -65,6 +72,8 @@ def run_of(slave: type, values: dict[str, float]) -> list[tuple[float, ...]]:
     made.setup_experiment(0.0)
     made.enter_initialization_mode()
     made.exit_initialization_mode()
+    if made.log_queue:
+        raise RefusedError(made.log_queue[0].msg)
     outputs = [n for n, v in enumerate(slave.table) if v.causality == "output" and v.type == "Real"]
     found = []
     for n in range(25):
@@ -95,6 +104,25 @@ def test_every_row_changes_a_run(slave: type, rows: tuple[Parameter, ...]) -> No
         if not change > 1e-6:
             idle.append(row.name)
     assert idle == []
+
+
+@pytest.mark.parametrize("model", range(len(equations.MODELS)))
+def test_every_effect_acts_with_a_backlash_model_or_is_refused(model: int) -> None:
+    """Rigid teeth have no shaft torque, and damping of teeth sets in with the dead zone alone."""
+    chosen = {"alpha": 0.01, "backlash_model": float(model)}
+    plain, refused = run_of(Drivetrain, chosen), {}
+    for effect, values in EFFECTS.items():
+        try:
+            found = run_of(Drivetrain, chosen | values)
+        except RefusedError as error:
+            refused[effect] = str(error)
+            continue
+        assert found != plain or (effect, model) == ("impact_damping", 0), effect
+    of_shaft = set(ELASTIC) if model in (3, 4) else set()
+    assert set(refused) == of_shaft | ({"impact_damping"} if model >= 2 else set())
+    for effect, message in refused.items():
+        assert f"effects.{effect}" in message
+        assert "dead_zone" in message
 
 
 @pytest.mark.parametrize("night", [False, pytest.param(True, marks=pytest.mark.night)])

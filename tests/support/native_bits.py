@@ -64,7 +64,10 @@ def drivetrain_values(model: int, effect: dict[str, float]) -> dict[str, float]:
 
 
 class Comparison:
-    """One Python slave and one native instance of a plant in step, with ``values`` of its parameters."""
+    """One Python slave and one native instance of a plant in step, with ``values`` of its parameters.
+
+    ``refused``: these values were refused, by both with the same message.
+    """
 
     def __init__(self, library: Path, values: dict[str, float], seed: int, plant: Any = Drivetrain) -> None:
         self.rng = random.Random(seed)
@@ -80,7 +83,10 @@ class Comparison:
         self.python.exit_initialization_mode()
         self.native.setup(0.0, None)
         self.native.call("fmi2EnterInitializationMode")
-        self.native.call("fmi2ExitInitializationMode")
+        self.refused = bool(self.python.log_queue)
+        status, _, messages = self.native.call("fmi2ExitInitializationMode")
+        assert (status != 0) == self.refused
+        assert [message[-1] for message in messages] == [said.msg for said in self.python.log_queue]
         outputs = {n for n, variable in enumerate(plant.table) if variable.causality == "output"}
         reals = sorted(n for n, real in table.values() if real and n in outputs)
         wholes = sorted(outputs - set(reals))
