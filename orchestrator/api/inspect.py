@@ -96,7 +96,7 @@ class InspectResult(PlottedResult):
         Returns:
             One sentence for each thing that the log shows or lacks.
         """
-        return verdict_of(self.sufficiency, self.reversals, self.two_angles)
+        return verdict_of(self.sufficiency, self.reversals, self.two_angles, self.assumed)
 
     def blocks(self) -> Sequence[Block]:
         """Return what was read, the tables and the verdict."""

@@ -165,7 +165,7 @@ def _torque_score(tokens: set[str], kind: str) -> int:
         return 0
     if tokens & words.ANGLE:
         return 0
-    score = 4 if torque else 1
+    score = 5 if torque else 2
     return score + (3 if tokens & words.ASKED else -1 if tokens & words.FOUND else 1 if torque else 0)
 
 

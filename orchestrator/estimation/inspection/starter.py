@@ -17,6 +17,8 @@ from orchestrator.records.units import parse_unit
 
 ASSUMED_COUNTS = 4096.0
 OF_DEFAULT = "of the thesis's drivetrain, whose gear ratio and inertia the record shows"
+# What says of an assumption that the scale of a signal hangs on it.
+SCALES = ("counts per revolution", "N.m at 100 %", "N.m per ampere", "samples per second")
 # What a number of a column is, and where a data sheet has it.
 SHEET = {
     "counts_per_rev": "counts of a turn; encoder: its resolution, 4 times the lines of a quadrature encoder",
@@ -89,8 +91,9 @@ def _column_title(head: Head, place: int) -> str:
 def starter(
     model: Model, columns: Mapping[str, Column], origin: Mapping[str, str], assumed: Sequence[str], record: str
 ) -> str:
-    """Return the text of a model file."""
+    """Return the text of a model file; values that hang on assumed numbers of the columns are comments."""
     lines = [f"# A model of the machine that made {record}: look at every line that says ASSUMED or ROUGH.", ""]
+    hanging = any(unit in text for unit in SCALES for text in assumed)
     lines += [f'fmu = "{model.fmu}"']
     if model.header is not None:
         lines.append(f"header = {model.header}   # line of the record that holds the names")
@@ -98,21 +101,29 @@ def starter(
     for name in COLUMNS:
         if name in columns:
             lines += [f"[columns.{name}]", *_column_lines(columns[name], assumed, name), ""]
+        elif name == "u":
+            lines += ["# [columns.u]   # the log shows no torque; if it has one, name the column of torque or current"]
+            lines += ['# name = "..."', ""]
     for name in ("theta_m", "theta_l"):
         if name in columns:
             lines += [f"# [encoders.{name}]", "# counts_per_rev = ...   # absent: found from the record"]
             lines += ["# noise = ...            # rad, before rounding; absent: estimated", ""]
+    if hanging:
+        lines += [
+            "# First put in the ASSUMED numbers of the columns, and inspect the log again with this file as its model.",
+            "# That replaces the parameters below, which follow from these numbers and are comments until then.", "",
+        ]  # fmt: skip
     for name, said in origin.items():
+        mark = "# " if hanging and name not in model.stated else ""
         entry = model.parameters[name]
         share = entry.uncertainty / abs(entry.value) if entry.value else 0.0
         meaning = MEANING.get(name) or model.plant.table[list(model.parameters).index(name)].description
-        if name == "i" and any("counts per revolution" in text for text in assumed):
-            meant = f"ASSUMED: follows from the counts_per_rev above, {said}; put in the gearbox's"
-        else:
-            meant = said
-        lines += [f"# {meaning}", f"[parameters.{name}]", f"value = {entry.value:.6g}   # {entry.unit or '1'}; {meant}"]
         says = "off by at most this share; the fit finds the value" if share else "exact: the fit holds the value"
-        lines += [f"relative_uncertainty = {share:.3g}   # {says}", ""]
+        lines += [
+            f"# {meaning}", f"{mark}[parameters.{name}]",
+            f"{mark}value = {entry.value:.6g}   # {entry.unit or '1'}; {said}",
+            f"{mark}relative_uncertainty = {share:.3g}   # {says}", "",
+        ]  # fmt: skip
     lines += ["# Effects such as friction, gravity or a torque limit: `diagnose` finds which of them the machine has."]
     return "\n".join(lines).rstrip() + "\n"
 

@@ -1,6 +1,7 @@
 """What an inspection says of gaps, in sentences that its table bears out."""
 
 import math
+from collections.abc import Sequence
 
 from orchestrator.estimation.inspection.sufficiency import SEEN, SIZES, Sufficiency
 from orchestrator.estimation.protocol import Estimate
@@ -9,13 +10,17 @@ MANY_REVERSALS = 4  # of the speed, in which a torque that drives them changes i
 MUCH_BETTER = 0.9  # share of the record's bound below which another experiment is worth a word
 
 
-def verdict_of(results: Sufficiency, reversals: tuple[int | None, int], two_angles: Estimate | None) -> list[str]:
+def verdict_of(
+    results: Sufficiency, reversals: tuple[int | None, int], two_angles: Estimate | None, assumed: Sequence[str] = ()
+) -> list[str]:
     """Return whether a record suffices to see a gap, what it lacks, and what would do better.
 
     Args:
         two_angles: the half-gap from the two angles alone, where that was looked for.
+        assumed: what was assumed, a sentence each.
     """
-    said = [_of_angles(two_angles)] if two_angles is not None else [_of_sizes(results)]
+    unscaled = any("counts per revolution" in text for text in assumed)
+    said = [_of_angles(two_angles, unscaled)] if two_angles is not None else [_of_sizes(results)]
     torque, speed = reversals
     if torque == 0 and speed >= MANY_REVERSALS:
         said.append(
@@ -28,10 +33,15 @@ def verdict_of(results: Sufficiency, reversals: tuple[int | None, int], two_angl
     return said
 
 
-def _of_angles(estimate: Estimate) -> str:
+def _of_angles(estimate: Estimate, unscaled: bool) -> str:
     low, high = estimate.interval
     if not estimate.visible:
         return f"From the two angles alone, {estimate.message}."
+    if unscaled:
+        return (
+            "The two angles alone show a half-gap. Its size in radians follows from the encoders' counts per "
+            "revolution: write these into the model file, and inspect the log again with that file as its model."
+        )
     return (
         f"The two angles alone show a half-gap of {estimate.alpha:.4g} rad (95 %: {low:.4g} to {high:.4g}); "
         f"{estimate.message}."

@@ -53,7 +53,7 @@ def test_a_record_of_one_flank_shows_no_gap(columns, tmp_path: Path) -> None:
 
 
 def test_from_a_drives_log_to_its_half_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """One look, one edit of the model file that it leaves, one estimate."""
+    """One look, the numbers of the columns, another look, the values of the data sheet, one estimate."""
     log, first, second = tmp_path / "drive.csv", tmp_path / "seen", tmp_path / "gap"
     write_log(log)
     assert main(["inspect", str(log), "--out", str(first)]) == 0
@@ -61,12 +61,18 @@ def test_from_a_drives_log_to_its_half_gap(tmp_path: Path, capsys: pytest.Captur
     assert "100 N.m at 100 % of u" in told
     text = (first / "model.toml").read_text()
     assert text.count("ASSUMED: put in the drive's") == 4
-    assert float(re.search(r"\[parameters.i\]\nvalue = (\S+)", text)[1]) == pytest.approx(
+    assert float(re.search(r"# \[parameters.i\]\n# value = (\S+)", text)[1]) == pytest.approx(
         20.0 * COUNTS[0] / COUNTS[1], rel=1e-3
     )
     model = tmp_path / "model.toml"
     model.write_text(_edited(text))
-    read_model(model)
+    assert not read_model(model).stated
+    assert main(["inspect", str(log), "--model", str(model), "--out", str(first)]) == 0
+    text = (first / "model.toml").read_text()
+    assert "ASSUMED: put in the drive's" not in text
+    assert float(re.search(r"\n\[parameters.i\]\nvalue = (\S+)", text)[1]) == pytest.approx(20.0, rel=1e-3)
+    model.write_text(_edited(text))
+    assert len(read_model(model).stated) == 8
     assert main(["estimate", str(log), "--model", str(model), "--no-diagnose", "--out", str(second)]) == 0
     result = json.loads((second / "estimate.json").read_text())["results"]
     assert result["alpha"] == pytest.approx(HALF_GAP, rel=5e-3)
