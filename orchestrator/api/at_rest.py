@@ -15,22 +15,25 @@ LARGEST_WEIGHT = 1e12
 def rest_text(f: ForecastFound, loop: str) -> str:
     """Say in one line what ``loop`` does at rest by its gains alone."""
     if f.cycles:
-        rest = f"cycles at {f.frequency:.3g} Hz: its load by {f.load:.3g} half-gaps, its twist by {f.twist:.3g}"
+        rest = (
+            f"has a limit cycle at {f.frequency:.3g} Hz, with an amplitude of {f.load:.3g} half-gaps at the load and "
+            f"{f.twist:.3g} half-gaps in the twist"
+        )
     else:
         rest = "comes to rest"
     if not f.settled:
-        rest += f"; this is its motion after {LONGEST:g} s, which still changes: it never settles, or takes longer"
-    return f"Without friction, load and limit of the torque {loop} {rest}."
+        rest += f"; this is the motion after {LONGEST:g} s, when it still changes"
+    return f"Without friction, load torque and torque limit, {loop} {rest}."
 
 
 def margins_text(f: ForecastFound) -> str:
-    """Say in one line which margins the loop has without a gap, and what it cannot move."""
-    late = "any further delay" if f.delay_margin is None else f"{1e3 * f.delay_margin:.3g} ms of further delay"
-    most = "any number of" if f.upper_gain is None else f"{f.upper_gain:.3g}"
+    """Say in one line which margins the loop has without a gap, and how many states are controllable."""
+    delay = "any delay" if f.delay_margin is None else f"{1e3 * f.delay_margin:.3g} ms"
+    upper = "any factor" if f.upper_gain is None else f"{f.upper_gain:.3g}"
     return (
-        f"Without a gap it bears {late}, {math.degrees(f.phase_margin):.3g} degrees of phase, and a gain from "
-        f"{f.lower_gain or 0.0:.3g} to {most} times as large. "
-        f"Its request moves {f.rank} of 6 states: not the load torque."
+        f"Margins of the loop without a gap: phase margin {math.degrees(f.phase_margin):.3g} degrees, delay margin "
+        f"{delay}, gain margins {f.lower_gain or 0.0:.3g} to {upper}. "
+        f"{f.rank} of 6 states are controllable; the load torque is not."
     )
 
 

@@ -53,10 +53,10 @@ RANGES = {
 BENCHMARK = {"alpha": 0.02, "tau": 5e-3, "impact_speed": 0.1, "friction": 2.0, "plants": 5}
 PLANTS = 100  # that a machine's controller is judged on
 NOTABLE = 0.8  # standard deviations, by which the mean of wrong plants lies off in what makes them so
-CURE = "Record again so that the machine is known better (`estimate` with `design` proposes how)"
+CURE = "Log a record that determines the machine better (`estimate` with `design` proposes one)"
 CYCLES = (
-    "No weights were found whose loop rests without friction: these cycle least. Friction stops it where the "
-    "table says so; `state_weights` takes others."
+    "No weights were found with which the loop comes to rest without friction: the chosen ones have the smallest limit "
+    "cycle. The table states whether friction stops it; `state_weights` sets other weights."
 )
 HARD, HARD_SHARE = 1.5, 0.05  # of the impact speed that is asked for; of the plants that may land harder
 LAWS = (LQR, SHIFTED, COMPENSATOR)
@@ -95,9 +95,9 @@ class CompensateResult(PlottedResult):
         task = self.task
         title = f"A move of {task.height:.4g} rad in {task.duration:g} s, half-gap {task.machine.alpha:.4g} rad"
         speed = f"{task.impact_speed:.3g} rad/s"
-        bound = f"No traversal from rest that lands at {speed} takes less than {self.bound:.4f} s."
+        bound = f"Shortest possible traversal from rest with an impact speed of {speed}: {self.bound:.4f} s."
         weights = ", ".join(f"{weight:.4g}" for weight in task.state_weights)
-        chosen = f"Weights of the states {weights}, of the request {task.torque_weight:g}: gains "
+        chosen = f"Weights of the LQR: states {weights}; torque request {task.torque_weight:g}. Gains: "
         chosen += ", ".join(f"{gain:.6g}" for gain in task.gains)
         return [
             *laws_tables(f"{title}: medians over {self.arguments['plants']} plants", self.laws),
@@ -250,7 +250,7 @@ def compensate(
     if bound == 0.0:
         most = 0.99 * quickest_landing(task)  # so that the number that is told is possible
         text = f"`impact_speed` must be at most {most:.3g} rad/s, but is {task.impact_speed:g} rad/s"
-        raise ScenarioError(f"{text}: no traversal of this gap from rest ends quicker", "impact_speed")
+        raise ScenarioError(f"{text}: no traversal of this gap from rest is faster", "impact_speed")
     laws, measured = _run_laws(task, int(given["plants"]), seed, progress)
     forecast = forecast_rest(task.nominal, task.gains, task.sample_time)
     unstable, more = _judge(task, measured[COMPENSATOR], seed)
@@ -313,12 +313,12 @@ def _judge(task: ControlTask, measured: Sequence[LoopMeasures], seed: int) -> tu
     hard = [one.stable and one.impacts.max(initial=0.0) > HARD * task.impact_speed for one in measured]
     text = ""
     if any(unstable):
-        text = "no plant that the record allows may be unstable under the compensator, but so are "
+        text = "the compensator must be stable on every plant that the record allows, but is unstable on "
         text += _describe_difference(task, unstable, seed)
     if sum(hard) <= HARD_SHARE * len(hard):
         return text, []
     told = (
-        f"Teeth meet at more than {HARD:g} times the impact speed on plants, {_describe_difference(task, hard, seed)}."
+        f"The impact speed is exceeded by a factor of more than {HARD:g} on {_describe_difference(task, hard, seed)}."
     )
     return text, [f"{told} {CURE}."]
 
@@ -332,4 +332,4 @@ def _describe_difference(task: ControlTask, wrong: Sequence[bool], seed: int) ->
     spread = values.std(axis=0)
     off = np.abs(values[bad].mean(axis=0) - values.mean(axis=0)) / np.where(spread > 0.0, spread, np.inf)
     named = f"these differ in `{names[int(off.argmax())]}`" if off.size and off.max() > NOTABLE else ""
-    return f"{int(bad.sum())} of {len(wrong)}: {named or 'no single parameter tells them from the others'}"
+    return f"{int(bad.sum())} of {len(wrong)} plants: {named or 'no single parameter distinguishes them'}"

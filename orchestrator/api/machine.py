@@ -44,20 +44,20 @@ def require_machine(
     assert record is not None
     doubts = []
     if record.trust == "red" or record.verdict == "unknown":
-        why = "; ".join(record.reasons) or "what the model lacks is not known"
+        why = "; ".join(record.reasons) or "the cause of the remaining misfit is unknown"
         doubts.append(f"the diagnosis of {model.source} must be neither red nor unknown, but is {record.trust}: {why}")
     for n, name in enumerate(record.unknowns):
         value = machine.alpha if name == "alpha" else machine.value(name)
         off, deviation = abs(value - record.values[n]), record.covariance[n][n] ** 0.5
         if off > FAR * deviation + 1e-9 * abs(value):
             doubts.append(
-                f"`{name}` must be what the record says, {record.values[n]:.4g} with a standard error of "
+                f"`{name}` must agree with the record, {record.values[n]:.4g} with a standard error of "
                 f"{deviation:.2g}, but is {value:.4g}"
             )
     if doubts and not force:
         raise ScenarioError(
-            f"{'; '.join(doubts)}. A controller of it may hit its flanks or not be stable: record again "
-            "(`estimate` with `design` proposes how), or give `force`",
+            f"{'; '.join(doubts)}. The controller may cause hard impacts or be unstable: log a better "
+            "record (`estimate` with `design` proposes one), or give `force`",
             "model",
             "force",
         )

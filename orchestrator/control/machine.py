@@ -27,7 +27,7 @@ DELAY, LIMIT, FILTER = (
 OFFSETS = tuple(f"effects.sensor_offset.{body}.offset" for body in ("motor", "load"))
 OTHER_PLANTS = {
     "ServoAxis": ": a single axis has no gap to cross",
-    "TwoStageTrain": ": its two gaps are crossed one after the other, which no controller here knows",
+    "TwoStageTrain": ": no controller here crosses two gaps one after the other",
 }
 LARGEST_CHANGE = 3.0  # of the logarithm of a drawn parameter
 

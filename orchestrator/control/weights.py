@@ -71,8 +71,8 @@ def choose_weights(machine: Machine, sample_time: float) -> ChosenWeights:
                 return found[-1]
     if not found:
         raise DesignError(
-            f"{machine.source}: no LQR has the margins that a compensator needs at `sample_time` = {sample_time:g} s: "
-            "give a shorter one, or `state_weights`",
+            f"{machine.source}: no LQR has the stability margins that the compensator needs at `sample_time` = "
+            f"{sample_time:g} s: give a shorter sample time, or `state_weights`",
             "sample_time",
             "state_weights",
         )

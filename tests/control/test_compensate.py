@@ -97,7 +97,7 @@ def test_the_compensator_lands_softest_and_near_the_bound(tmp_path, capsys):
     rows = (tmp_path / "out" / "traversals.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == 1 + sum(len(law["times"]) for law in found["laws"])
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "Laws across the gap" in page
+    assert "Control laws across the gap" in page
 
 
 @pytest.mark.parametrize(("option", "value"), [("--alpha", "0"), ("--plants", "0"), ("--tau", "3"), ("--seed", "-1")])

@@ -17,16 +17,16 @@ def build(source: ResultDocument) -> Report:
     paths = tuple(Series(law.law, law.path_times, law.path) for law in results.laws if law.path)
     quickest = Series("bound from rest", results.path_times, results.path)
     last = results.laws[-1]
-    time = f"takes {median(last.times):.3f} s" if last.times else "is not made"
+    time = f"takes {median(last.times):.3f} s (median)" if last.times else "does not occur"
     impact, plain = (
         "not known" if law.impact is None else f"{law.impact:.3g} rad/s" for law in (last, results.laws[0])
     )
     return Report(
-        title="Laws across the gap",
+        title="Control laws across the gap",
         summary=(
-            f"A traversal of the {last.law} {time}; none from rest that lands at {results.impact_speed:g} rad/s takes "
-            f"less than {results.bound:.4f} s. Its largest impact is {impact}, "
-            f"that of the {results.laws[0].law} {plain}."
+            f"With the {last.law}, a traversal {time}. The shortest possible traversal from rest with an impact speed "
+            f"of {results.impact_speed:g} rad/s takes {results.bound:.4f} s. The largest impact is {impact} with the "
+            f"{last.law} and {plain} with the {results.laws[0].law}."
         ),
         sections=(
             *laws_tables("Medians over plants", results.laws),
@@ -39,12 +39,12 @@ def build(source: ResultDocument) -> Report:
                 (bound, *clouds),
                 log_x=True,
                 log_y=True,
-                note="A traversal that begins with speed, or out of a wound shaft, may be quicker than one from rest.",
+                note="Traversals that start in motion or from a twisted shaft may be faster than the bound from rest.",
             ),
             Plot(
                 "The first traversal of each law",
                 "time [s]",
-                "twist from the flank that is left [rad]",
+                "twist, from the flank at the start [rad]",
                 (quickest, *paths),
             ),
         ),

@@ -12,15 +12,15 @@ def build(source: ResultDocument) -> Report:
     """Return the page."""
     results = read(source.results, RegulatorFound)
     f = results.forecast
-    rest = f"cycles at {f.frequency:.3g} Hz, its load by {f.load:.3g} half-gaps" if f.cycles else "comes to rest"
+    cycle = f"has a limit cycle at {f.frequency:.3g} Hz, with an amplitude of {f.load:.3g} half-gaps at the load"
     return Report(
         title="Regulator of a drivetrain with a gap",
-        summary=f"Without friction, load and limit of the torque the loop {rest}, by its gains alone.",
+        summary=f"Without friction, load torque and torque limit, the loop {cycle if f.cycles else 'comes to rest'}.",
         sections=(
             gains_table(results.gains, REGULATOR_STATES, GAIN_UNITS),
             *rest_facts(f, "The loop"),
             Plot(
-                "The loop without a gap, cut at the request",
+                "Open-loop gain without a gap, cut at the torque request",
                 "frequency [Hz]",
                 "gain",
                 (Series("gain", results.frequencies, results.response),),
@@ -28,7 +28,7 @@ def build(source: ResultDocument) -> Report:
                 log_y=True,
             ),
             Plot(
-                "Its phase",
+                "Open-loop phase",
                 "frequency [Hz]",
                 "phase [rad]",
                 (Series("phase", results.frequencies, results.phases),),
@@ -44,4 +44,4 @@ def rest_facts(f: ForecastFound | None, loop: str) -> tuple[Facts, ...]:
     """Return what a loop does by its gains alone; nothing where the file does not say it."""
     if f is None:
         return ()
-    return (Facts(f"{loop} at rest, by its gains", fields_facts(f)),)
+    return (Facts(f"{loop} at rest", fields_facts(f)),)

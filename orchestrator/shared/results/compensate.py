@@ -34,20 +34,20 @@ class LawFound(msgspec.Struct, frozen=True):
 
 
 UPPER = {
-    "time": TableColumn("traversal", "s", 3), "landing": TableColumn("its impact", "rad/s", 3),
+    "time": TableColumn("traversal", "s", 3), "landing": TableColumn("impact of a traversal", "rad/s", 3),
     "impact": TableColumn("largest impact", "rad/s", 3), "error": TableColumn("rms error", "rad", 3),
     "rest": TableColumn("rest, peak to peak", "counts", 3),
 }  # fmt: skip
 
 
 def laws_tables(title: str, laws: Sequence[LawFound]) -> tuple[ReportTable, ReportTable]:
-    """Return medians over plants, and what 95 % of the plants stay below."""
+    """Return medians and 95 % quantiles over plants."""
     medians = fields_table(title, laws)
     for name, values in (("time", "times"), ("landing", "impacts")):
         found = [median(every) if (every := getattr(law, values)) else None for law in laws]
         medians = medians.with_column(UPPER[name], found)
     rows = tuple((law.law, *map(law.upper.get, UPPER)) for law in laws)
-    return medians, ReportTable("Below which 95 % of the plants are", (TableColumn("law"), *UPPER.values()), rows)
+    return medians, ReportTable("95 % quantiles over the plants", (TableColumn("law"), *UPPER.values()), rows)
 
 
 class CompensateFound(ResultData, frozen=True, kw_only=True):

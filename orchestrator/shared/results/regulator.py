@@ -16,16 +16,16 @@ class ForecastFound(msgspec.Struct, frozen=True):
     it is still. None: there is no such margin.
     """
 
-    cycles: Annotated[bool, Display("cycles without friction and load")]
+    cycles: Annotated[bool, Display("limit cycle without friction and load")]
     twist: Annotated[float, Display("amplitude of the twist", "half-gaps")]
     load: Annotated[float, Display("amplitude of the load", "half-gaps")]
     frequency: Annotated[float, Display("frequency", "Hz")]
     phase_margin: Annotated[float, Display("phase margin without a gap", "rad")]
     delay_margin: Annotated[float | None, Display("delay margin without a gap", "s")]
-    rank: Annotated[int, Display("states of six that the request moves")]
+    rank: Annotated[int, Display("controllable states, of six")]
     settled: bool = True
-    lower_gain: Annotated[float | None, Display("smallest factor of the gain without a gap")] = None
-    upper_gain: Annotated[float | None, Display("largest factor of the gain without a gap")] = None
+    lower_gain: Annotated[float | None, Display("lower gain margin without a gap, as a factor")] = None
+    upper_gain: Annotated[float | None, Display("upper gain margin without a gap, as a factor")] = None
 
 
 class RegulatorFound(ResultData, frozen=True, kw_only=True):
