@@ -2,8 +2,9 @@
 
 Run as ``python -m benchmarks.native_bits [STEPS_PER_MODEL [STEPS_PER_EFFECT [EFFECT, MODEL or CASE ...]]]`` (defaults
 20000 and 300; all effects, models and cases of two stages).
-Inputs and step sizes are random; nine of ten steps must be taken, unless the values were refused; on the way states are saved and restored in both. It
-prints how many steps agreed in all outputs, to the last bit, and stops with exit code 1 at the first that do not.
+Inputs and step sizes are random; nine of ten steps must be taken, unless the values were refused; on the way states
+are saved and restored in both. It prints how many steps agreed in all outputs, to the last bit, and stops with exit
+code 1 at the first that do not.
 """
 
 import sys

@@ -105,9 +105,7 @@ def diagnose(
         'coulomb_friction'
     """
     if effects is not None and not search:
-        raise ScenarioError(
-            "`effects` must be left out without a search: the model is then judged as it stands", "effects"
-        )
+        raise ScenarioError("`effects` must be left out without a search: the given model is then judged", "effects")
     if map is None and isinstance(model, (Path, str)) and Path(model).suffix == ".toml":
         model = read_model(Path(model))
     if map is not None or isinstance(model, (Path, str)):

@@ -144,7 +144,7 @@ class EstimateResult(PlottedResult):
         those = "records" if self.more else "record"
         missing: list[str] = []
         if self.diagnosis is not None:
-            missing = [f"The model does not explain the {those}; what it lacks:", *self.diagnosis.summary()]
+            missing = [f"The model does not explain the {those}; the diagnosis:", *self.diagnosis.summary()]
         elif self.undiagnosed:
             missing = [f"The model does not explain the {those}; no diagnosis: {self.undiagnosed}"]
         methods = methods_table(title, {m.method: method_entry(m) for m in self.methods})

@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     print_blocks([*what_was_read(records if other is None else [*records, other]), *found.blocks()])
     use = "for any FMI 2.0 tool: variables as before, corrected values as start values"
     if found.diagnosis.trust.level is Level.RED:
-        use = "which must not be used as it stands"
+        use = "which must not be used"
     print_blocks(
         [
             f"Corrected FMU: {fmu}, {use}",

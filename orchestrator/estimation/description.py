@@ -196,8 +196,8 @@ def friction_note(fit: GapFit, reach: float) -> str:
     if share < settings.open_friction or reach < settings.worth_a_record:
         return ""
     return (
-        f"{100.0 * share:.0f} % of the half-gap's variance is dry friction, which the record hardly tells from the "
-        "gap: record a crawl in both directions too, and fit both records together"
+        f"{100.0 * share:.0f} % of the half-gap's variance comes from dry friction, which the record hardly "
+        "distinguishes from the gap: also log a slow motion in both directions, and fit both records together"
     )
 
 

@@ -44,7 +44,7 @@ def solve_fixed_point(
         del points[: -MEMORY - 1], residuals[: -MEMORY - 1]
         point = _accelerate(points, residuals)
     raise ConvergenceError(
-        f"{what}: {iterations} passes left a change of {gap:.2g} where {tolerance:.2g} is asked for; "
+        f"{what}: the change after {iterations} iterations must be at most {tolerance:.2g}, but is {gap:.2g}; "
         "take a smaller step, a larger tolerance or more iterations"
     )
 

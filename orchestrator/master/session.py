@@ -138,7 +138,7 @@ class Session:
                     raise SlaveError(f"{error}: it wants the run to end, but the whole run is needed") from None
                 steps = math.floor((error.time - self.start) / self.algorithm.step + 1e-6)
                 if steps == 0 and error.how != AT_EVENT:
-                    raise SlaveError(f"{error}: it asks for the end of the run before a step is done") from None
+                    raise SlaveError(f"{error}: it ends the run before the first step is complete") from None
                 text = f"ended the run at t = {error.time:g} s of {self.stop:g} s ({error.how})"
                 calls = dict.fromkeys((block.name for block in self.layout.blocks), steps)
                 events = EventStatistics() if self._events is None else self._events.statistics()

@@ -41,8 +41,8 @@ def join_clocks(record: Record) -> Record:
     word = "slow" if total < 0.0 else "fast"
     said = (
         f"`theta_l` was logged by a clock that is {1e6 * abs(total):.3g} ppm (standard error {1e6 * error:.2g}) too "
-        f"{word} against that of `theta_m`, {1e3 * abs(total) * record.duration:.3g} ms over the record: it is brought "
-        "to the motor's clock, which it is taken to begin with"
+        f"{word} against that of `theta_m`, {1e3 * abs(total) * record.duration:.3g} ms over the record: it is "
+        "converted to the motor's clock; both clocks are assumed to start together"
     )
     return replace(record, theta_l=joined, doubts=(*record.doubts, said))
 

@@ -44,7 +44,7 @@ def bring_to_motor(
             continue
         if how not in INTERPOLATION:
             raise RecordError(
-                f"{path}: column `{label}` has time stamps of its own: say how to bring it to those of "
+                f"{path}: column `{label}` has its own time stamps: state how to interpolate it to those of "
                 f"`{labels['theta_m']}`: `resample` linear or cubic"
             )
         cost = interpolation_cost(stamps, table[name], how)

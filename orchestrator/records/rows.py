@@ -59,7 +59,7 @@ class StaleReadings:
     def describe(self, names: Sequence[str], step: float) -> str:
         """Return what was found in words, for rows of a ``step`` [s]."""
         return (
-            f"each reading of {' and '.join(f'`{name}`' for name in names)} stands in {self.every} rows: read at "
+            f"each reading of {' and '.join(f'`{name}`' for name in names)} is repeated in {self.every} rows: read at "
             f"{1.0 / (self.every * step):.6g} Hz, written at {1.0 / step:.6g} Hz"
         )
 

@@ -7,9 +7,9 @@ from orchestrator.shared.results import TrustFound
 
 BADGES: Mapping[str, Badge] = {"green": "good", "amber": "warn", "red": "bad"}
 MEANINGS = {
-    "green": "Green: the answer may be used as it stands.",
-    "amber": "Amber: the answer may be right, but this was not shown:",
-    "red": "Red: the answer must not be used as it stands:",
+    "green": "Green: the answer may be used.",
+    "amber": "Amber: the answer may be right, but a check is not satisfied:",
+    "red": "Red: the answer must not be used:",
 }
 
 

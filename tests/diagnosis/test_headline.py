@@ -69,8 +69,8 @@ def test_an_inertia_that_is_not_shown_is_no_number_to_ask_for() -> None:
         (only,) = judge_trust("effects", (), True, record, (), {}, (), DiagnosisSettings()).reasons
         return only
 
-    assert "asks for at most 0.28 times" in reason(0.04, 0.12)
-    assert "asks for 0.15 times" in reason(0.15, 0.02)
+    assert "fits at most 0.28 times" in reason(0.04, 0.12)
+    assert "fits 0.15 times" in reason(0.15, 0.02)
 
 
 def test_a_value_far_below_what_is_stated_is_outside_as_one_above_is() -> None:

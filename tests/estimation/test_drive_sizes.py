@@ -113,5 +113,5 @@ def test_friction_that_makes_up_the_interval_asks_for_a_crawl() -> None:
             covariance[gap, gap] * covariance[dry, dry]
         )
         fit = Fit(likelihood.at(problem.start), free, inverse(covariance), 1, True, likelihood)
-        assert ("record a crawl in both directions" in friction_note(fit, 0.02)) == advised
+        assert ("also log a slow motion in both directions" in friction_note(fit, 0.02)) == advised
         assert not friction_note(fit, 0.001)

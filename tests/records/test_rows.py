@@ -121,7 +121,9 @@ def test_rows_of_new_readings_are_taken(log: Columns, every: int, names: tuple[s
     np.testing.assert_allclose(record.u[5], log["u"][kept[5] : kept[6]].mean())
     (said,) = record.doubts
     shown = " and ".join(f"`{name}`" for name in names)
-    assert said.startswith(f"each reading of {shown} stands in {every} rows: read at {500 / every:.6g} Hz, written at")
+    assert said.startswith(
+        f"each reading of {shown} is repeated in {every} rows: read at {500 / every:.6g} Hz, written at"
+    )
 
 
 # --- two clocks ----------------------------------------------------------------------------------------------
@@ -166,7 +168,7 @@ def test_records_of_any_fmu_are_looked_at_too(spring, tmp_path: Path) -> None:
     clean = calibrate(written(tmp_path / "clean.csv", log), fmu, given).results(tmp_path)
     failed, rows = log["x"].copy(), np.arange(log["x"].size)
     failed[[300, 600]] = 10.0 * np.ptp(failed)
-    said = {"failed": "rows 301, 601 of `x` jump away", "stale": "each reading of `x` stands in 3 rows: read at"}
+    said = {"failed": "rows 301, 601 of `x` jump away", "stale": "each reading of `x` is repeated in 3 rows: read at"}
     for name, x in (("failed", failed), ("stale", log["x"][rows // 3 * 3])):
         found = calibrate(written(tmp_path / f"{name}.csv", log | {"x": x}), fmu, given).results(tmp_path)
         assert any(note.startswith(said[name]) for note in found.notes)

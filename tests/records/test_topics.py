@@ -73,7 +73,7 @@ def test_a_part_of_merged_topics(tmp_path: Path) -> None:
 def test_each_encoder_as_a_topic_needs_an_interpolation(tmp_path: Path) -> None:
     columns = _merged([(("u",), 0.0), (("theta_m",), 0.0017), (("theta_l",), 0.0033)])
     path = _write(tmp_path, columns, "csv")
-    with pytest.raises(RecordError, match="has time stamps of its own: say how to bring it to those of `theta_m`"):
+    with pytest.raises(RecordError, match="has its own time stamps: state how to interpolate it to those of `theta_m`"):
         read_record(path)
     record = read_record(path, None, (), Reading(resample="linear"))
     _check(record, 0.0017)

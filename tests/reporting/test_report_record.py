@@ -123,9 +123,7 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     assert first == ["What is missing", worth.title, "What to do next"]
     assert "for any FMI 2.0 tool" in next_step(report)
     write_result(tmp_path, "diagnose", {}, None, results | {"trust": {"level": "red", "reasons": ["it is worse"]}})
-    assert next_step(report_from_directory(tmp_path)) == (
-        "The corrected model, Corrected.fmu, must not be used as it stands."
-    )
+    assert next_step(report_from_directory(tmp_path)) == ("The corrected model, Corrected.fmu, must not be used.")
     missing, law = plots["Missing torque: Coulomb friction at the motor"].series
     assert (missing.kind, law.kind) == ("points", "line")
     np.testing.assert_allclose(missing.low, [-1.6, np.nan, 1.4])

@@ -121,7 +121,7 @@ def test_steps_are_not_shortened_for_ever(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("algorithm", ["gauss_seidel", "jacobi"])
 def test_an_end_before_the_first_step_is_an_error_and_a_later_one_a_remark(tmp_path: Path, algorithm: str) -> None:
-    with pytest.raises(SlaveError, match=r"t = 0 s returned Discard .*asks for the end of the run before a step"):
+    with pytest.raises(SlaveError, match=r"t = 0 s returned Discard .*ends the run before the first step"):
         simulate(scenario(tmp_path, "ENDS_AT=0.0", algorithm=algorithm))
     result = simulate(scenario(tmp_path, "ENDS_AT=0.01", algorithm=algorithm))
     assert [r.text for r in result.run.remarks] == ["ended the run at t = 0.01 s of 1 s (fmi2Discard, terminated)"]

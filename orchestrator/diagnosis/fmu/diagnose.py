@@ -209,7 +209,7 @@ def calibrate_fmu(
     stopped = {name: _stopping_limit(problem.parameters[k], fitted.point.parameters[k]) for name, k in places.items()}
     notes += [f"{text}: a value beyond it may fit better" for text in stopped.values() if text]
     notes += [
-        f"the record hardly determines `{name}`: excite what it acts on"
+        f"the record hardly determines `{name}`: excite the motion on which it acts"
         for name, share in learned.items()
         if share < LEARNED and not stopped[name]
     ]

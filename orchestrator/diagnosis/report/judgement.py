@@ -58,12 +58,12 @@ def judge_trust(
     """Return how far the corrected model can be trusted."""
     red, amber = [], []
     if verdict == "unknown":
-        why = "no effect of the library is likely" if searched else "no search was made"
-        red.append(f"something is missing in the model, and {why}")
+        why = "no effect of the library is likely" if searched else "no search was done"
+        red.append(f"the model lacks something, and {why}")
     if record.inertia_is_off(settings.selection.prior_deviations):
         asked = f"{record.inertia:.2g}" if record.shows_inertia else f"at most {record.highest_inertia:.2g}"
         red.append(
-            f"without the ranges of the model file, the record asks for {asked} times its inertia: check the "
+            f"without the ranges of the model file, the record fits {asked} times its inertia: check the "
             "inertias, the units and the scale of the torque"
         )
     for one in test:
@@ -79,7 +79,7 @@ def judge_trust(
         amber.append(f"likely, not certain: {list_effects(likely)}")
     if record.left > UNEXPLAINED:
         left = number_words(100.0 * float(np.sqrt(record.left)), 2)
-        amber.append(f"{left} % (rms) is left unexplained where the model was fitted")
+        amber.append(f"{left} % (rms) of the torque remains unexplained in the fitted data")
     for known in uncertain:
         if known.name in parameters and _is_far(parameters[known.name], known.uncertainty):
             amber.append(

@@ -170,15 +170,15 @@ def nuisance_words(nuisance: Nuisance) -> str:
     if name == "gain":
         return (
             f"the drive delivers {e.value:.3f} (95 %: {e.interval[0]:.3f} to {e.interval[1]:.3f}) times `u`, or all "
-            "values that carry a torque are off by as much; sizes are in units of `u`"
+            "inertias, stiffnesses and torques of the model are off by this factor; sizes are in units of `u`"
         )
     width = 0.5 * (e.interval[1] - e.interval[0])
     size = f"{1e3 * abs(e.value):.3g} ms (95 %: within {1e3 * width:.2g} ms)"
     sure = "" if nuisance.grade is Grade.CERTAIN else f" ({nuisance.grade.word})"
     if name == "share":
         return (
-            f"`u` is no request that is held from its own row to the next, but a signal that was sampled{sure}: what "
-            "lies between its rows is interpolated"
+            f"`u` is a sampled signal, not a request that is held from row to row{sure}: it is interpolated between "
+            "its rows"
         )
     if name == "lead":
         return f"`u` acts {size} before its time stamp{sure}"
@@ -196,7 +196,7 @@ def _values(diagnosis: Diagnosis) -> Iterator[str]:
             sign = "+" if change > 0.0 else ""
             changed.append(f"{name} {e.value:.4g}{unit} ({sign}{number_words(change)} %{outside})")
     if changed:
-        yield f"Values of the model that were re-fitted: {', '.join(changed)}."
+        yield f"Re-fitted values of the model: {', '.join(changed)}."
 
 
 def _remainder_text(diagnosis: DiagnosisOutcome, of: str) -> str:

@@ -74,8 +74,8 @@ class Heading:
             if 2 < len(cells) < self.width <= 2 * len(cells) and all(map(is_word, cells)):
                 raise RecordError(
                     f"{self.path}: the rows must have the {len(cells)} fields of the header, but have {self.width}: "
-                    "decimal commas cannot be told from separating commas; export with `;` between the columns, or "
-                    "with decimal points"
+                    "decimal commas cannot be distinguished from separating commas; export with `;` between "
+                    "the columns, or with decimal points"
                 )
 
     def _fit_cells(self, line: str) -> list[str] | None:

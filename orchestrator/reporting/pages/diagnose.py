@@ -98,11 +98,11 @@ def _on_the_corrected_model(results: DiagnoseFound) -> str:
         return ""
     name = Path(results.model).name
     if results.trust is not None and results.trust.level == "red":
-        return f"The corrected model, {name}, must not be used as it stands."
+        return f"The corrected model, {name}, must not be used."
     return (
         f"The corrected model is {name}: for any FMI 2.0 tool, variables as in the given model, "
-        "corrected values as start values. corrected.toml beside it is its model file: a diagnosis with it, without "
-        "search, judges a new record."
+        "corrected values as start values. Its model file is corrected.toml: `diagnose --no-search` with this file "
+        "judges a new record."
     )
 
 

@@ -29,9 +29,10 @@ def evidence_table(effects: Sequence[EffectFound], of: str = "missing torque") -
     )  # fmt: skip
     titles = (
         "effect", "grade", f"{TAKES} [%]", "over its uncertainty", f"explains of the {of} [%]",
-        "of the misfit on test data [%]", "in the corrected model", "not told from", "rules that lower the grade",
+        "of the misfit on test data [%]", "in the corrected model", "not distinguished from",
+        "rules that lower the grade",
     )  # fmt: skip
-    note = "The corrected model has the effects that are certain or likely, and those that were asked for."
+    note = "The corrected model has the effects that are certain or likely, and those chosen by `--effects`."
     return [ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons, note)]
 
 

@@ -60,7 +60,7 @@ def _diagnosis_sections(results: EstimateFound) -> list[Section]:
     """Return what the model lacks, or why no diagnosis tells, where it does not explain the records."""
     diagnosis, why = results.diagnosis, results.undiagnosed
     if diagnosis is None:
-        return [Text(UNEXPLAINED, (f"No diagnosis says what it lacks: {why}.",))] if why else []
+        return [Text(UNEXPLAINED, (f"No diagnosis was possible: {why}.",))] if why else []
     named = [place_words(e.name, e.site) for e in diagnosis.effects]
     said = f"It lacks {list_words(named)}." if named else f"The diagnosis says: {diagnosis.verdict}."
     place = "The folder diagnosis beside this page has its report and the corrected FMU."
