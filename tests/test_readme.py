@@ -67,7 +67,7 @@ WAYS = pytest.mark.parametrize(
 
 def test_there_are_commands_to_test():
     assert len(COMMANDS) >= 6
-    words = ["inspect", "estimate", "estimate", "diagnose", "check", "compensate"]
+    words = ["inspect", "inspect", "estimate", "estimate", "diagnose", "check", "compensate"]
     assert [line.split()[3] for line in TUTORIAL] == words
     assert [line.split()[3] for line in TO_A_CONTROLLER] == ["estimate", "compensate", "simulate"]
     assert "-m orchestrator check --out" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
@@ -127,7 +127,7 @@ def test_the_diagnosis_finds_what_the_readme_says(diagnosed):
 @pytest.mark.slow
 def test_the_tutorial_goes_from_a_log_in_amperes_to_an_fmu_of_the_machine(tmp_path, more):
     copy_examples(tmp_path / "docs" / "examples")
-    _, estimated, _, diagnosed, _, _ = (done_there(tmp_path, line, more) for line in TUTORIAL)
+    _, _, estimated, _, diagnosed, _, _ = (done_there(tmp_path, line, more) for line in TUTORIAL)
     assert estimated["alpha"] == pytest.approx(SERVO_GAP, rel=5e-3)
     found = {effect["name"]: effect["parameters"] for effect in diagnosed["effects"]}
     assert found["backlash"]["alpha"]["value"] == pytest.approx(SERVO_GAP, rel=5e-3)
