@@ -35,7 +35,7 @@ class BodyLaw:
 LAWS = (
     BodyLaw(
         "quadratic_drag", "speed", "coefficient", "effort.s2/flow2", lambda torque, speed: 0.01 * torque / speed**2,
-        body.QUADRATIC, "a brake that grows with the square of the speed",
+        body.QUADRATIC, "a braking torque in proportion to the square of the speed",
     ),
 )  # fmt: skip
 

@@ -74,7 +74,7 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         lambda s: {"torque": small(s), "presliding": SMALL_LOGARITHM}, lambda s: {"presliding": (distance(s),)},
         ("torque",), signed=False, priors=build_up, unreported=unreported,
         possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed",
-        motion="a torque of one size against every motion; at a reversal the axis sticks", plants=_PLANTS[site],
+        motion="a constant torque against the direction of motion; at a reversal the axis sticks", plants=_PLANTS[site],
     )  # fmt: skip
     stribeck = Effect(
         "stribeck_friction", site, "friction",
@@ -88,7 +88,7 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         and v["coulomb"] > LEAST_COULOMB * v["breakaway"]
         and v["stribeck_speed"] > 0.01 * s.rms_speed(site),
         contains="coulomb_friction", against="speed",
-        motion="a torque against every motion that is largest at a crawl: stick-slip at low speed",
+        motion="a torque against the direction of motion, largest at very low speed: stick-slip",
         plants=_PLANTS[site],
     )  # fmt: skip
     loaded = Effect(
@@ -97,7 +97,7 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         lambda s: {"presliding": (distance(s),)}, ("coefficient",), signed=False,
         bounds=lambda s: {"coefficient": (0.0, 0.9)}, priors=build_up, unreported=unreported,
         possible=lambda v, s: v["coefficient"] < 0.5, against="speed",
-        motion="a torque against every motion that grows with what the gear transmits: lost efficiency",
+        motion="a torque against the direction of motion, in proportion to the transmitted torque: lower efficiency",
     )  # fmt: skip
     return coulomb, stribeck, loaded
 
@@ -208,7 +208,7 @@ def _end_stop(side: str) -> Effect:
     )  # fmt: skip
 
 
-_OFFSET = "the encoders' zeros are not where the model has them: no motion, but a biased twist"
+_OFFSET = "the encoders' zeros differ from the model's: no influence on the motion, but a biased twist"
 PLANT_BANK: tuple[Effect, ...] = (
     Effect(
         "backlash", "shaft", "gap", {"alpha": "alpha"}, "alpha", lambda s: {"alpha": _small_twist(s)},
@@ -219,9 +219,10 @@ PLANT_BANK: tuple[Effect, ...] = (
     *_dry_friction("load"),
     _end_stop("lower"),
     _end_stop("upper"),
-    _timing("input_delay", "delay", longest_time, "the torque comes late, which takes phase from every control loop"),
+    _timing("input_delay", "delay", longest_time,
+            "the torque is delayed, which reduces the phase margin of every control loop"),
     _timing("drive_filter", "time_constant", longest_lag,
-            "the torque comes late and smoothed, which takes phase from every control loop"),
+            "the torque is delayed and smoothed, which reduces the phase margin of every control loop"),
     Effect(
         "torque_saturation", "actuator", "limit", group("torque_saturation", "limit"), "limit",
         lambda s: {"limit": 0.02 * _largest_request(s)}, lambda s: {"limit": _limits(s)},
@@ -235,7 +236,7 @@ PLANT_BANK: tuple[Effect, ...] = (
         lambda s: {"rate": 0.02 * float(np.max(np.abs(np.diff(s.requests)))) / s.step}, lambda s: {"rate": _rates(s)},
         bounds=lambda s: {"rate": (1e-3 * float(np.max(_changes(s), initial=1.0)), BIG)},
         possible=lambda v, s: _is_reached(v["rate"], s) and not s.torque_raster, takes_drive=True,
-        motion="the torque cannot follow fast requests: steps become ramps, and the axis answers late",
+        motion="the torque cannot follow fast requests: steps become ramps, and the axis responds late",
         plants=BOTH_PLANTS,
     ),
     Effect(
@@ -243,12 +244,12 @@ PLANT_BANK: tuple[Effect, ...] = (
         lambda s: {"cubic": 0.05 * s.stiffness / s.typical_twist**2, "sharpness": 0.3},
         lambda s: {"sharpness": (0.0, 0.6, 1.2)}, ("cubic",), signed=False,
         bounds=lambda s: {"sharpness": (0.0, 5.0)}, priors=lambda s: {"sharpness": (0.6, 0.6)},
-        motion="the shaft is soft for small twists and stiff for large ones: its resonance moves with load",
+        motion="the shaft is soft for small twists and stiff for large ones: its resonance depends on the torque",
     ),
     _wave("torque_ripple", "motor", "torque",
-          "a torque that repeats with the motor's angle: speed ripple at constant request", BOTH_PLANTS),
+          "a torque that is periodic in the motor's angle: speed ripple at a constant request", BOTH_PLANTS),
     _wave("gear_eccentricity", "shaft", "twist",
-          "the load's angle wanders about the motor's once in each cycle of the gear"),
+          "the load's angle deviates periodically from the motor's, once in each cycle of the gear"),
     Effect(
         "load_torque", "load", "constant", group("load_torque", "torque"), "torque",
         lambda s: {"torque": 0.01 * s.torque_at("load")}, amplitudes=("torque",),
@@ -258,7 +259,7 @@ PLANT_BANK: tuple[Effect, ...] = (
         "gravity_load", "load", "position", group("gravity_load", "amplitude", "phase"), "amplitude",
         lambda s: {"amplitude": 0.01 * s.torque_at("load")}, amplitudes=("amplitude",), phase="phase", angular=True,
         against="angle",
-        motion="a torque that turns with the load's angle: it helps on one side and hinders on the other",
+        motion="a torque that is periodic in the load's angle: it drives on one side and brakes on the other",
         plants=BOTH_PLANTS,
     ),
     Effect(
@@ -270,7 +271,7 @@ PLANT_BANK: tuple[Effect, ...] = (
         ("inertia",), signed=False, bounds=lambda s: {"frequency": (0.1, 2.0 * np.pi * s.cutoff),
                                                       "damping_ratio": (0.0, 1.0)},
         priors=lambda s: {"damping_ratio": (0.03, 0.03)}, memory=True,
-        motion="a part of the load swings on its own: a further resonance and its notch",
+        motion="a part of the load oscillates separately: a further resonance and its antiresonance",
     ),
     *of_bodies.AT_LOAD,
     Effect(
@@ -292,12 +293,12 @@ PLANT_BANK: tuple[Effect, ...] = (
         lambda s: {"stiffness": 0.01 * s.torque_at("load") / rms(s.angles["load"] - s.angles["load"].mean()),
                    "angle": 0.05},
         lambda s: {"angle": (float(s.angles["load"].mean()),)}, ("stiffness",), signed=False, against="position",
-        motion="the load is pulled back to one position, the more the farther it is from it",
+        motion="a torque that pulls the load to one position, in proportion to the distance from it",
     ),
     Effect(
         "varying_inertia", "load", "position", group("varying_inertia", "amplitude", "phase"), "amplitude",
         lambda s: {"amplitude": 0.02 * s.inertia}, amplitudes=("amplitude",), phase="phase", angular=True,
-        motion="the load is heavier at some angles than at others",
+        motion="the load's inertia depends on its angle",
     ),
     Effect(
         "shaft_hysteresis", "shaft", "gap", group("shaft_hysteresis", "torque", "twist"), "torque",
@@ -305,7 +306,7 @@ PLANT_BANK: tuple[Effect, ...] = (
         lambda s: {"twist": tuple(f * s.typical_twist for f in (0.1, 0.4, 1.2))}, ("torque",), signed=False,
         bounds=lambda s: {"twist": (0.02 * s.typical_twist, 5.0 * s.typical_twist)},
         possible=lambda v, s: v["twist"] < 4.75 * s.typical_twist, memory=True,
-        motion="the twist depends on where the torque came from: lost motion without a free gap",
+        motion="the twist depends on the history of the torque: lost motion without a gap",
     ),
     of_logs.EARLY_TORQUE,
     of_logs.LATE_LOAD,
