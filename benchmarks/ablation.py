@@ -78,8 +78,9 @@ def ablation_table(counts: Sequence[RuleCount], rules: Sequence[GradeRule], reco
     """
     known = {rule.name: rule for rule in rules}
     lines = [
-        f"Of {records} records: those in which a grade would rise without the rule, and how many wrong and right names",
-        "these are. A rule lowers right names too: what a record leaves open is not certain, though it may be true.",
+        f"For each rule, the table counts the records (of {records}) in which a grade would rise without the rule, and how",
+        "many of the names concerned are wrong and right. A rule also lowers right names, because a record may leave a true",
+        "effect undecided.",
         "",
         "| rule | statistic | threshold | why | records | wrong names | right names |", 7 * "|---" + "|",
     ]  # fmt: skip
