@@ -78,9 +78,9 @@ def ablation_table(counts: Sequence[RuleCount], rules: Sequence[GradeRule], reco
     """
     known = {rule.name: rule for rule in rules}
     lines = [
-        f"For each rule, the table counts the records (of {records}) in which a grade would rise without the rule, and how",
-        "many of the names concerned are wrong and right. A rule also lowers right names, because a record may leave a true",
-        "effect undecided.",
+        f"For each rule, the table counts the records (of {records}) in which a grade would rise without the rule, and",
+        "how many of the names concerned are wrong and right. A rule also lowers right names, because a record may",
+        "leave a true effect undecided.",
         "",
         "| rule | statistic | threshold | why | records | wrong names | right names |", 7 * "|---" + "|",
     ]  # fmt: skip

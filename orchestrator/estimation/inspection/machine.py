@@ -71,8 +71,8 @@ def rough_machine(record: Record) -> RoughMachine:
     reduced = 1.0 / (1.0 / values["J_l"] + 1.0 / (values["J_m"] * ratio**2))
     values["k"] = reduced * (2.0 * math.pi * frequency) ** 2
     origin["k"] = f"ROUGH: a shaft that oscillates at {frequency:.3g} Hz; put in the data sheet's"
-    values["c"] = 0.02 * math.sqrt(values["k"] * reduced)
-    origin["c"] = "ASSUMED: 1 % of critical damping"
+    values["c"] = 0.06 * math.sqrt(values["k"] * reduced)
+    origin["c"] = "ASSUMED: 3 % of critical damping"
     return RoughMachine(values, origin)
 
 

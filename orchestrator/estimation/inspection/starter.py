@@ -36,7 +36,7 @@ MEANING = {
     "J_m": "inertia of the motor; motor: rotor inertia, and that of gearbox and coupling at the motor's shaft",
     "J_l": "inertia of the load; mass times radius squared, or the machine's CAD",
     "k": "stiffness of the shaft, at the load; gearbox: torsional rigidity, N.m/arcmin times 3438",
-    "c": "damping of the shaft, at the load; in no data sheet: 1 % of critical damping is usual",
+    "c": "damping of the shaft, at the load; in no data sheet: 1 to 5 % of critical damping is usual",
     "b_m": "viscous friction of the motor; motor: no-load torque over speed",
     "b_l": "viscous friction of the load; in no data sheet",
     "i": "gear ratio: motor angle over load angle; gearbox: ratio",
