@@ -101,8 +101,8 @@ def _on_the_corrected_model(results: DiagnoseFound) -> str:
         return f"The corrected model, {name}, must not be used."
     return (
         f"The corrected model is {name}: for any FMI 2.0 tool, variables as in the given model, "
-        "corrected values as start values. Its model file is corrected.toml: `diagnose --no-search` with this file "
-        "judges a new record."
+        "corrected values as start values. Its model file is corrected.toml: a diagnosis with this file and "
+        "without a search judges a new record."
     )
 
 

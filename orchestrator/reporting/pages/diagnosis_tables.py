@@ -32,7 +32,7 @@ def evidence_table(effects: Sequence[EffectFound], of: str = "missing torque") -
         "of the misfit on test data [%]", "in the corrected model", "not distinguished from",
         "rules that lower the grade",
     )  # fmt: skip
-    note = "The corrected model has the effects that are certain or likely, and those chosen by `--effects`."
+    note = "The corrected model has the effects that are certain or likely, and those that you chose."
     return [ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons, note)]
 
 
