@@ -33,7 +33,7 @@ from orchestrator.records.model_file import Model, read_model
 from orchestrator.scenarios.scenario import simulate
 from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns
-from orchestrator.shared.results.compensate import CompensateFound, LawFound, laws_tables
+from orchestrator.shared.results.compensate import UPPER, CompensateFound, LawFound, laws_tables
 from orchestrator.shared.results.regulator import ForecastFound
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ CYCLES = (
 )
 HARD, HARD_SHARE = 1.5, 0.05  # of the impact speed that is asked for; of the plants that may land harder
 LAWS = (LQR, SHIFTED, COMPENSATOR)
-MEDIANS = (("impact", "largest_impact"), *((name, name) for name in ("error", "rest", "contacts")))
+MEDIANS = ("impact", "error", "rest", "contacts")
 _BOUND_SPEEDS = np.geomspace(0.02, 2.0, 30)  # of the curve beside the traversals [rad/s]
 
 
@@ -245,7 +245,7 @@ def compensate(
     if state_weights is not None:
         task = replace(task, state_weights=five("state_weights", state_weights, 0.0), torque_weight=1.0)
     elif said is not None:
-        task = replace(task, state_weights=choose_weights(machine, sample_time).weights, torque_weight=1.0)
+        task = replace(task, state_weights=choose_weights(machine, sample_time), torque_weight=1.0)
     bound = bound_time(task, task.impact_speed)
     if bound == 0.0:
         most = 0.99 * quickest_landing(task)  # so that the number that is told is possible
@@ -289,17 +289,14 @@ def summarise_law(law: str, measured: Sequence[LoopMeasures], path: tuple[Array,
         "time": np.concatenate([np.zeros(0), *(m.times for m in stable)]),
         "landing": np.concatenate([np.zeros(0), *(m.impacts for m in stable)]),
         "impact": np.array([m.largest_impact for m in stable]),
-        "error": np.array([m.error for m in stable]),
-        "rest": np.array([m.rest for m in stable]),
+        **{name: np.array([getattr(m, name) for m in stable]) for name in ("error", "rest", "contacts")},
     }
-    medians = {
-        name: float(np.median([getattr(m, field) for m in stable])) if stable else None for name, field in MEDIANS
-    }
+    medians = {name: float(np.median(every[name])) if stable else None for name in MEDIANS}
     return LawFound(
         law,
         **medians,
         unstable=len(measured) - len(stable),
-        upper={name: float(np.quantile(values, 0.95)) for name, values in every.items() if values.size},
+        upper={name: float(np.quantile(every[name], 0.95)) for name in UPPER if every[name].size},
         times=tuple(every["time"].tolist()),
         impacts=tuple(every["landing"].tolist()),
         path_times=tuple(path[0].tolist()),

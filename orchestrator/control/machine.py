@@ -25,10 +25,6 @@ DELAY, LIMIT, FILTER = (
     f"effects.{name}" for name in ("input_delay.delay", "torque_saturation.limit", "drive_filter.time_constant")
 )
 OFFSETS = tuple(f"effects.sensor_offset.{body}.offset" for body in ("motor", "load"))
-OTHER_PLANTS = {
-    "ServoAxis": ": a single axis has no gap to cross",
-    "TwoStageTrain": ": no controller here crosses two gaps one after the other",
-}
 LARGEST_CHANGE = 3.0  # of the logarithm of a drawn parameter
 
 
@@ -162,9 +158,7 @@ def machine_of(model: Model, *, alpha: float | None = None, torque_limit: float 
     record, parameters, source = model.record, model.parameters, model.source
     if model.fmu != "Drivetrain":
         raise ScenarioError(
-            f"{source}: `fmu` must be Drivetrain, one gap between motor and load, but is {model.fmu}"
-            f"{OTHER_PLANTS.get(model.fmu, '')}",
-            "model",
+            f"{source}: `fmu` must be Drivetrain, one gap between motor and load, but is {model.fmu}", "model"
         )
     if record is None:
         raise ScenarioError(

@@ -1,4 +1,4 @@
-"""Weights of an LQR for a machine, searched so that its loop rests in spite of the gap and bears what is not known.
+"""Weights of an LQR for a machine, searched so that its loop comes to rest in spite of the gap, with margins.
 
 A weight is given by a bandwidth and a damping of the load: with ``M = J_m i + J_l/i`` the request that moves it by
 ``M (w^2 angle + 2 z w speed)`` costs as much as its error. Motor angle and speed have the shares that damp the
@@ -6,15 +6,12 @@ thesis's load best. Bandwidths go down from twice the load's own frequency again
 that rests, with margins, is the quickest one.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from orchestrator.control.machine import Machine
 from orchestrator.control.standstill import forecast_rest, loop_margins
 from orchestrator.errors import DesignError, ScenarioError
 from orchestrator.plants.design import design_regulator, five_state_model
-from orchestrator.shared.results.regulator import ForecastFound
 
 BANDWIDTHS = 2.0 * 0.7 ** np.arange(9)  # over the load's own frequency
 DAMPINGS = (5.0, 3.0, 1.5)
@@ -24,23 +21,10 @@ LEAST_GAIN = 1.5  # and its inverse
 LEAST_DELAY = 2.0  # samples, beyond those that are told
 
 
-@dataclass(frozen=True)
-class ChosenWeights:
-    """Weights for ``REGULATOR_STATES``, for a price of the request of 1 per (N.m)2.
+def choose_weights(machine: Machine, sample_time: float) -> tuple[float, ...]:
+    """Return weights of ``REGULATOR_STATES``, for a weight of 1 of the request, whose loop comes to rest.
 
-    Attributes:
-        weights: one for each state, in that order.
-        forecast: what the loop does at rest, without friction.
-        tried: how many weights were tried.
-    """
-
-    weights: tuple[float, ...]
-    forecast: ForecastFound
-    tried: int
-
-
-def choose_weights(machine: Machine, sample_time: float) -> ChosenWeights:
-    """Return weights whose loop rests; where none does, those whose load cycles least.
+    If none does, return those with the smallest limit cycle of the load.
 
     Raises:
         DesignError: no loop has margins.
@@ -48,11 +32,9 @@ def choose_weights(machine: Machine, sample_time: float) -> ChosenWeights:
     v = machine.nominal
     model = five_state_model(v)
     inertia, own = v.J_m * v.i + v.J_l / v.i, float(np.sqrt(v.k / v.J_l))
-    found: list[ChosenWeights] = []
-    tried = 0
+    found: list[tuple[float, tuple[float, ...]]] = []
     for bandwidth in BANDWIDTHS * own:
         for damping in DAMPINGS:
-            tried += 1
             angle, speed = (inertia * bandwidth**2) ** 2, (2.0 * damping * inertia * bandwidth) ** 2
             shares = (SHARE_OF_ANGLE * angle / v.i**2, SHARE_OF_SPEED * speed / v.i**2, angle, speed, OF_TORQUE)
             weights = tuple(map(float, shares))
@@ -66,9 +48,9 @@ def choose_weights(machine: Machine, sample_time: float) -> ChosenWeights:
                 forecast = forecast_rest(v, gains, sample_time)
             except (DesignError, ScenarioError):
                 continue
-            found.append(ChosenWeights(weights, forecast, tried))
             if not forecast.cycles:
-                return found[-1]
+                return weights
+            found.append((forecast.load, weights))
     if not found:
         raise DesignError(
             f"{machine.source}: no LQR has the stability margins that the compensator needs at `sample_time` = "
@@ -76,4 +58,4 @@ def choose_weights(machine: Machine, sample_time: float) -> ChosenWeights:
             "sample_time",
             "state_weights",
         )
-    return min(found, key=lambda choice: choice.forecast.load)
+    return min(found)[1]

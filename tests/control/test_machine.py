@@ -16,6 +16,7 @@ from orchestrator.cli import main
 from orchestrator.control.loops import FMUS, make_task
 from orchestrator.control.machine import machine_of, thesis_machine
 from orchestrator.control.measures import measure_loop
+from orchestrator.control.standstill import forecast_rest
 from orchestrator.control.take_away import c_files, file_names, write_loop
 from orchestrator.control.weights import choose_weights
 from orchestrator.errors import ScenarioError
@@ -75,10 +76,12 @@ def test_the_chosen_weights_rest_and_have_margins(machine, tau, scale):
     units = {name: scale if name in ("J_m", "J_l", "k", "c", "b_m", "b_l") else 1.0 for name in machine.parameters}
     parameters = {name: replace(p, value=p.value * units[name]) for name, p in machine.parameters.items()}
     parameters["tau"] = replace(parameters["tau"], value=tau)
-    found = choose_weights(replace(machine, parameters=parameters, torque_limit=scale * 250.0), 1e-3)
-    assert not found.forecast.cycles
-    assert found.forecast.phase_margin > 0.6
-    assert found.forecast.delay_margin > 2e-3
+    scaled = replace(machine, parameters=parameters, torque_limit=scale * 250.0)
+    task = replace(make_task(scaled, 1e-3), state_weights=choose_weights(scaled, 1e-3), torque_weight=1.0)
+    forecast = forecast_rest(scaled.nominal, task.gains, 1e-3)
+    assert not forecast.cycles
+    assert forecast.phase_margin > 0.6
+    assert forecast.delay_margin > 2e-3
 
 
 def test_a_model_without_a_gap_a_record_or_an_encoder_is_refused(tmp_path):
@@ -112,17 +115,17 @@ def test_a_model_that_cannot_be_trusted_is_refused_with_the_reason(tmp_path, cap
     error = capsys.readouterr().err
     assert told in error
     assert "--force" in error
-    assert "`estimate` with `design` proposes how" in error
+    assert "`estimate` with `design` proposes one" in error
     assert not (tmp_path / "out").exists()
 
 
 def test_a_half_gap_that_the_record_excludes_is_refused(tmp_path, capsys):
     by_hand = write_model(tmp_path, alpha=1.3 * VALUES["alpha"])
     assert main(["compensate", "--model", str(by_hand), "--out", str(tmp_path / "out")]) == 2
-    assert "`alpha` must be what the record says, 0.0137 with a standard error of 2e-05" in capsys.readouterr().err
+    assert "`alpha` must agree with the record, 0.0137 with a standard error of 2e-05" in capsys.readouterr().err
     words = ["compensate", "--model", str(write_model(tmp_path)), "--alpha", "0.0178", "--out", str(tmp_path / "out")]
     assert main(words) == 2
-    assert "must be what the record says" in capsys.readouterr().err
+    assert "must agree with the record" in capsys.readouterr().err
 
 
 def test_a_given_half_gap_is_no_better_known_than_the_record_knows_it(tmp_path):
@@ -141,7 +144,6 @@ def test_plants_without_one_gap_between_motor_and_load_are_refused_by_name(tmp_p
     assert main(["compensate", "--model", str(path), "--out", str(tmp_path / "out")]) == 2
     told = capsys.readouterr().err
     assert f"`fmu` must be Drivetrain, one gap between motor and load, but is {fmu}" in told
-    assert ("has no gap to cross" if fmu == "ServoAxis" else "two gaps") in told
 
 
 @pytest.mark.skipif(not have_compiler(), reason="Python FMUs take half a minute")
@@ -152,7 +154,7 @@ def test_unstable_plants_are_refused_with_what_makes_them_so_and_no_file_is_writ
     told = capsys.readouterr().err
     assert "must be stable on every plant that the record allows, but is unstable on 2 of 12 plants" in told
     assert "these differ in `J_l`" in told
-    assert "`estimate` with `design` proposes how" in told
+    assert "`estimate` with `design` proposes one" in told
     assert not (tmp_path / "out").exists()
     found = oc.compensate(model=write_model(tmp_path, doubtful), plants=12, force=True)
     assert found.laws[-1].unstable == 2
@@ -229,7 +231,7 @@ def test_fmus_scenario_and_ssp_have_the_machines_values(taken):
 @pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.night)])
 def test_the_ssp_file_is_a_step_of_the_loop_for_both_versions_of_fmi(taken, tmp_path, fmi):
     folder, machine = taken, machine_of(read_model(write_model(tmp_path)))
-    task = replace(make_task(machine, 1e-3), state_weights=choose_weights(machine, 1e-3).weights, torque_weight=1.0)
+    task = replace(make_task(machine, 1e-3), state_weights=choose_weights(machine, 1e-3), torque_weight=1.0)
     if fmi == 3:
         folder = tmp_path
         write_loop(folder, "press", task, native=True, fmi=3)
