@@ -27,7 +27,7 @@ EXPERIMENTS = {
 }
 SLIGHT = 0.02  # share of the misfit on test data, a hundredth in rms, that is not worth a number
 NOTABLE_CHANGE = 0.005  # of a value that is worth a word
-REPEAT = "the same torque twice: what comes again is the machine, what does not is a disturbance"
+REPEAT = "the same torque twice: what repeats is due to the machine, the rest is a disturbance"
 
 
 def summarise(diagnosis: DiagnosisOutcome) -> Iterator[str]:
@@ -40,7 +40,7 @@ def summarise(diagnosis: DiagnosisOutcome) -> Iterator[str]:
         for nuisance in ours.nuisances:
             yield f"  In the log: {nuisance_words(nuisance)}"
         yield from _values(ours)
-    yield _remainder_text(diagnosis, "{}" if ours is None else "what the torque at {} varies by")
+    yield _remainder_text(diagnosis, "{}" if ours is None else "the variation of the torque at {}")
     yield from _motion(diagnosis)
     yield from next_steps(diagnosis)
 
@@ -61,7 +61,7 @@ def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
             said = f"The {compared} explains the record{refitted}"
         else:
             said = f"Nothing is missing: the {compared} explains the record{refitted}"
-        hint = f" A hint, too weak to be an answer: {list_effects(near)}." if near else ""
+        hint = f" A hint, not an answer: {list_effects(near)}." if near else ""
         return f"Verdict: {diagnosis.verdict}. {said}.{hint}"
     if diagnosis.verdict == "effects":
         named = [_name_with_others(effect) for effect in diagnosis.graded(Grade.LIKELY)]
@@ -70,8 +70,8 @@ def headline(diagnosis: DiagnosisOutcome, compared: str = "model") -> str:
             if named
             else "Verdict: effects, in the log alone."
         )
-    why = "no effect of the library is likely" if diagnosis.searched else "no search was made"
-    text = f"Verdict: unknown. The {compared} misses something, and {why}."
+    why = "no effect of the library is likely" if diagnosis.searched else "no search was done"
+    text = f"Verdict: unknown. The {compared} lacks something, and {why}."
     return text + (f" Possible: {list_effects(near)}." if near else "")
 
 
@@ -128,7 +128,7 @@ def words_on_test_data(effect: GradedEffect) -> str:
     if foretold:
         assert torque is not None
         times = f", {number_words(torque.t)} times its uncertainty" if math.isfinite(torque.t) else ""
-        return f"; on test data it takes {percent(torque.gain)} of the torque that is left without it{times}"
+        return f"; on test data it removes {percent(torque.gain)} of the torque that remains without it{times}"
     if share < 0.0:
         return "; without it the test data are predicted better"
     if share < SLIGHT:
@@ -151,14 +151,14 @@ def sureness(effect: GradedEffect) -> str:
     text = f"{effect.grade.word.capitalize()}: its size is {number_words(evidence.size_t)} times its error"
     if math.isfinite(evidence.gain):
         text = (
-            f"{effect.grade.word.capitalize()}: it removes {percent(evidence.gain)} of the error on blocks left out, "
+            f"{effect.grade.word.capitalize()}: in cross-validation it removes {percent(evidence.gain)} of the error, "
         )
         text += f"{number_words(evidence.t)} times its uncertainty"
     reasons = [rule.reason for rule in GRADE_RULES if rule.name in effect.lowered_by and rule.highest == effect.grade]
     if reasons:
-        text += f"; not surer, for {reasons[0]}"
+        text += f"; no higher grade, because {reasons[0]}"
     if evidence.family:
-        text += f"; the record does not tell it from {list_effects(evidence.family)}"
+        text += f"; the record does not distinguish it from {list_effects(evidence.family)}"
     if not effect.in_model:
         text += "; it is not in the corrected model"
     return f"{text}."
@@ -202,10 +202,10 @@ def _values(diagnosis: Diagnosis) -> Iterator[str]:
 def _remainder_text(diagnosis: DiagnosisOutcome, of: str) -> str:
     """Return what is left in words; ``of`` what it is a share, with the name of the body or output in it."""
     if not diagnosis.left:
-        return "What is left is noise."
+        return "The rest is noise."
     named = [(of.format(BODIES.get(name, name)), share) for name, share in diagnosis.left.items()]
     parts = [f"{remainder_percent(share)} of {name}" for name, share in named]
-    text = f"What is left (rms, where the model was fitted): {' and '.join(parts)}"
+    text = f"Unexplained (rms, fitted data): {' and '.join(parts)}"
     strongest = [f"{SITES.get(one.site, f'at {one.site}')} {one.words}" for one in diagnosis.remaining[:2]]
     return f"{text}; {'; '.join(strongest)}." if strongest else f"{text}; it follows no signal."
 
@@ -222,7 +222,7 @@ def _motion(diagnosis: DiagnosisOutcome) -> Iterator[str]:
             + f" (noise {one.noise:.2g})"
             for one in test.signals
         ]
-        rows = f"{test.rows} rows that nothing was fitted to"
+        rows = f"{test.rows} rows, used by no fit"
         yield f"Test data of {test.source} ({rows}), rms of free runs: {'; '.join(parts)}."
 
 

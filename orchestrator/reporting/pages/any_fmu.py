@@ -41,7 +41,7 @@ def build(source: ResultDocument) -> Report:
             one.without_empty_columns() for one in evidence_table(found.effects, "outputs' misfit")
         ],
         "Test data": [*misfit_tables(found.test, found.validation), *_output_plots(found, table)],
-        "What is left": _residual_sections(found.remaining),
+        "What remains unexplained": _residual_sections(found.remaining),
         "Values and search": [
             *([parameter_table(found.parameters)] if found.parameters else []),
             *candidate_table(found.candidates),
@@ -98,4 +98,4 @@ def _residual_sections(remaining: FmuRemainingFound) -> list[Section]:
         (f"follows the {one.argument} [%]", None if one.share is None else 100.0 * one.share)
         for one in remaining.follows
     ]
-    return [Facts("What is left", tuple(facts))] if facts else []
+    return [Facts("What remains unexplained", tuple(facts))] if facts else []

@@ -72,7 +72,7 @@ def build(source: ResultDocument) -> Report:
             *_block_plots(results.effects),
         ],
         "Test data": [*_tests(results), *signal_plots(table, restarts, metric)],
-        "What is left": [*_residual_sections(results.remaining), *_law_sections(results.learned_law)],
+        "What remains unexplained": [*_residual_sections(results.remaining), *_law_sections(results.learned_law)],
         "Values, search and analysis": [
             parameter_table(results.parameters),
             *candidate_table(results.candidates),
@@ -168,7 +168,7 @@ def _residual_sections(remaining: RemainingFound) -> list[Section]:
         (f"torque at the {site}, rms, where the model was fitted [%]", share and 100.0 * math.sqrt(share))
         for site, share in remaining.torque.items()
     )
-    made: list[Section] = [Facts("What is left", facts)] if facts else []
+    made: list[Section] = [Facts("What remains unexplained", facts)] if facts else []
     if remaining.follows:
         note = "Curves over one signal, x. They are no effects and no part of the corrected model."
         made.append(fields_table("What the rest follows", remaining.follows, note))
