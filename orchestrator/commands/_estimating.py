@@ -122,7 +122,7 @@ def _tell_cost(records: list[Record], model: Model, args: argparse.Namespace, se
     if rate > LOW_RATE and seconds > CHEAP:
         said += f" (with --rate {LOW_RATE:g} {seconds * LOW_RATE / rate:.0f} s)"
     if not args.no_diagnose:
-        said += f"; a diagnosis, where the model does not explain the record, {diagnosis_seconds(rows):.0f} s more"
+        said += f"; a diagnosis takes about {diagnosis_seconds(rows):.0f} s more if the model explains too little"
     sys.stderr.write(said + "\n")
     return seconds
 

@@ -112,7 +112,7 @@ def _reason_for_none(record: Record, model: Model) -> str:
     if model.fmu != "Drivetrain":
         return f"the model is {model.fmu}, an axis without teeth, which has no gap"
     if not record.has_torque:
-        return "without a torque nothing tells what it would show; `estimate` looks for one in the two angles"
+        return "without a torque no bound can be computed; `estimate` searches the two angles for a gap"
     try:
         check_plausible(record, model)
     except RecordError as error:

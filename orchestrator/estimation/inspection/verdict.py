@@ -53,7 +53,7 @@ def _of_sizes(results: Sufficiency) -> str:
         return results.why
     runs = results.ranges()
     if not runs:
-        return "The record shows no gap of any size that was tried: its torque does not move the teeth through one."
+        return "The record can show none of the half-gaps that were tried: its torque moves no teeth through them."
     words = []
     for low, high in runs:
         about = "about " if low not in SIZES else ""
@@ -62,15 +62,16 @@ def _of_sizes(results: Sufficiency) -> str:
         else:
             words.append(f"{about}{low:.2g} to {high:.2g} rad" if high > low else f"{low:.2g} rad")
     smaller = ", and perhaps smaller ones" if runs[0][0] <= SIZES[0] else ""
-    return f"The record shows half-gaps of {', and of '.join(words)}{smaller} (bound below {SEEN:g} of the size)."
+    sizes = ", and of ".join(words) + smaller
+    return f"The record can show half-gaps of {sizes} (Cramer-Rao bound below {SEEN:g} of the size)."
 
 
 def _of_experiments(results: Sufficiency) -> str:
     best = results.better[0] if results.better else None
     if best is None or not best.bound < MUCH_BETTER * results.own:
-        return "No simple excitation of the same length, torque and speed would show the gap clearly better."
+        return "No simple excitation of the same length, torque and speed has a clearly smaller bound."
     own = f"instead of {results.own:.2g} " if math.isfinite(results.own) else ""
     return (
-        f"Better, of the same length and within the same torque and speed: {best.name}, bound {best.bound:.2g} {own}"
+        f"A better excitation of the same length, torque and speed: {best.name}, bound {best.bound:.2g} {own}"
         f"rad for a half-gap of {results.design_size:g} rad; `estimate` with `design` searches further."
     )

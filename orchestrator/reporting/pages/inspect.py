@@ -15,7 +15,7 @@ RECORD = "inspect_record.npz"
 def build(source: ResultDocument) -> Report:
     """Return the page."""
     results = read(source.results, InspectFound)
-    sections: list[Section] = [Text("What the record would show", results.verdict)]
+    sections: list[Section] = [Text("What the record can show", results.verdict)]
     if results.assumed:
         sections.append(Text("Assumed: put right in the model file", results.assumed))
     sections.append(Text("How the file was read", results.record.notes))

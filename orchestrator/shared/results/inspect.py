@@ -22,7 +22,7 @@ class ChannelFound(msgspec.Struct, frozen=True):
     most: Annotated[float | None, Display("most", digits=5)]
     count: Annotated[float | None, Display("rounded to")]
     noise: Annotated[float | None, Display("noise", digits=2)]
-    saturated: Annotated[float, Display("at an end", "%", 2, factor=100.0)]
+    saturated: Annotated[float, Display("at a limit", "%", 2, factor=100.0)]
     missing: Annotated[int, Display("missing")]
 
 
@@ -55,14 +55,14 @@ class GapShown(msgspec.Struct, frozen=True):
 
     half_gap: Annotated[float, Display("half-gap", "rad")]
     bound: Annotated[float | None, Display("bound", "rad", 3)]
-    seen: Annotated[bool, Display("seen")]
+    seen: Annotated[bool, Display("detectable")]
 
 
 class EffectShown(msgspec.Struct, frozen=True):
     """The smallest size of an effect that the record would show."""
 
     name: Annotated[str, Display("effect")]
-    smallest: Annotated[float | None, Display("clearly from", digits=2)]
+    smallest: Annotated[float | None, Display("detectable from", digits=2)]
     unit: Annotated[str, Display("unit")]
 
 
@@ -85,12 +85,12 @@ class InspectFound(ResultData, frozen=True, kw_only=True):
 
 def inspect_tables(results: InspectFound) -> list[ReportTable]:
     """Return the tables of an inspection, the channels first; none that is empty but that."""
-    coherence = "Coherence: how far the motor's motion follows the torque in the band."
+    coherence = "Coherence of the motor's motion with the torque in the band."
     bound = "Bound: the least standard error of any estimator."
     tables = [
         fields_table("Channels", results.channels, of=ChannelFound),
         fields_table("Excitation", results.excitation, coherence, of=BandFound),
-        fields_table("Half-gaps that would show", results.gaps, bound, of=GapShown),
-        fields_table("Effects that would show", results.effects, of=EffectShown),
+        fields_table("Detectable half-gaps", results.gaps, bound, of=GapShown),
+        fields_table("Detectable effects", results.effects, of=EffectShown),
     ]
     return [shown for n, shown in enumerate(tables) if n == 0 or shown.rows]
