@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.records import as_record
+from orchestrator.api.records import record_to_fit
 from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.data.records import check_record
 from orchestrator.diagnosis.report.misfit_on_test_data import misfit_on_record
@@ -156,7 +156,7 @@ def _of_an_fmu(
 
 def comparable_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
     """Return a record that the model can be compared with."""
-    record = set_zeros(as_record(given, model, holes=True, **reading), model)
+    record = set_zeros(record_to_fit(given, model, holes=True, **reading), model)
     check_record(record)
     check_plausible(max(record.parts_between_holes(), key=lambda part: part.size), model)
     return record

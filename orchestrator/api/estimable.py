@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.records import as_record
+from orchestrator.api.records import record_to_fit
 from orchestrator.errors import ScenarioError
 from orchestrator.estimation.zeros import set_zeros
 from orchestrator.plants.known.two_stage_train import TRAIN
@@ -14,7 +14,7 @@ from orchestrator.records.record import Record
 
 def plausible_record(record: Record | Path | str, model: Model, motor_only: bool, **reading: Any) -> Record:
     """Return a record that fits the model at all."""
-    measured = as_record(record, model, torque_needed=motor_only, **reading)
+    measured = record_to_fit(record, model, torque_needed=motor_only, **reading)
     measured = measured.without_load_encoder() if motor_only else measured
     if measured.has_torque:  # without one the plant plays no part
         check_plausible(measured, model)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from orchestrator.api.estimate import EstimateResult
 from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.records import as_record
+from orchestrator.api.records import record_to_fit
 from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, doubts_of
 from orchestrator.errors import RecordError, ScenarioError
@@ -191,7 +191,7 @@ def locate_gap(
 
 def complete_record(record: Record | Path | str, model: Model, **reading: Any) -> Record:
     """Return a record that has all that a train needs and can be one of it."""
-    measured = as_record(record, model, **reading)
+    measured = record_to_fit(record, model, **reading)
     if measured.theta_l is None:
         raise RecordError(
             f"{measured.source}: column `theta_l` must be there to tell in which stage the gap is, but is not: log the "

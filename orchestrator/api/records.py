@@ -7,9 +7,13 @@ from typing import Any
 from orchestrator.errors import RecordError
 from orchestrator.records import model_file, record
 from orchestrator.records.columns import Column
+from orchestrator.records.filters import follow_motion
 from orchestrator.records.loading import Reading
 from orchestrator.records.model_file import Model
+from orchestrator.records.plausibility import natural_frequency
 from orchestrator.records.record import Record
+
+ROWS_PER_RADIAN = 2.0  # of the shaft's oscillation: at twelve rows a period no contact is blurred
 
 
 def read_record(
@@ -86,3 +90,11 @@ def as_record(given: Record | Path | str, model: Model, torque_needed: bool = Tr
     if torque_needed and not given.has_torque:
         raise RecordError(f"{given.source}: `u` must hold numbers, but the record has no torque")
     return given
+
+
+def record_to_fit(given: Record | Path | str, model: Model, rate: float | None = None, **reading: Any) -> Record:
+    """Return a record to be fitted: where a path is given without a ``rate``, at the rate that the motion asks for."""
+    record = as_record(given, model, rate=rate, **reading)
+    if rate is not None or isinstance(given, Record):
+        return record
+    return follow_motion(record, ROWS_PER_RADIAN * natural_frequency(model))

@@ -18,7 +18,7 @@ from orchestrator.api.shown import Block, write_page
 from orchestrator.commands._budget import Budget
 from orchestrator.commands._console import next_step, print_blocks
 from orchestrator.commands._parser import options_for
-from orchestrator.commands._reading import what_was_read
+from orchestrator.commands._reading import tell_rates, what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.errors import ScenarioError
 from orchestrator.estimation.apply import default_method
@@ -46,6 +46,7 @@ def estimate_or_design(
     """Estimate the gap from records, design an experiment that would show it, or both."""
     require_linear(model)
     records = [plausible_record(path, model, args.motor_only, **reading) for path in args.records]
+    tell_rates(records, args.rate)
     if args.cost:
         _tell_cost(records, model, args, settings)
         return 0
@@ -97,6 +98,7 @@ def locate(args: argparse.Namespace, model: Model, settings: EstimationSettings,
         raise ScenarioError(f"`DATA` must be one record with a {TRAIN}, but is {len(args.records)}")
     require_train(model)
     record = complete_record(args.records[0], model, **reading)
+    tell_rates([record], args.rate)
     with Stages() as stages:
         stages.begin("trying sizes", 0.0)
         found = locate_gap(

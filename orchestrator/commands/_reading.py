@@ -1,6 +1,7 @@
 """The options with which every command reads measured records."""
 
 import argparse
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,6 +54,15 @@ def reading_of(args: argparse.Namespace) -> dict[str, Any]:
 def what_was_read(records: "Iterable[Record]") -> list[str]:
     """Return one line for each record that says what was detected and assumed."""
     return [f"{record.source}: {'; '.join(record.notes)}" for record in records if record.notes]
+
+
+def tell_rates(records: "Iterable[Record]", asked: float | None) -> None:
+    """Say before a fit which records come down to the rate of their motion, where no rate was asked for."""
+    for record in records:
+        if asked is None and record.averaged > 1:
+            rate, whole = 1.0 / record.step, record.averaged / record.step
+            said = f"{record.source}: {record.size} rows at {rate:.6g} Hz of {whole:.6g} Hz are fitted: the motion"
+            sys.stderr.write(f"{said} shows no more; `--rate {whole:.6g}` takes all\n")
 
 
 def _part(text: str | None) -> tuple[float, float] | None:

@@ -13,6 +13,7 @@ from orchestrator.commands._reading import (
     add_reading_arguments,
     add_settings_argument,
     reading_of,
+    tell_rates,
     what_was_read,
 )
 from orchestrator.commands._stages import Stages, diagnosis_seconds
@@ -85,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from orchestrator.api.diagnosed import DiagnosisResult
 
     records = [comparable_record(path, model, **reading) for path in args.records]
+    tell_rates(records, args.rate)
     other = None if args.validate is None else comparable_record(args.validate, model, **reading)
     tested = None if args.test is None else comparable_record(args.test, model, **reading)
     files = {"record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.arrays import MINIMUM_ROWS, Record, interpolate_missing
+from orchestrator.shared.inference.band import content_band
+from orchestrator.shared.inference.noise import robust_noise
 
 Array = NDArray[np.float64]
 
@@ -15,6 +17,29 @@ TAPS_PER_STEP = 5.0  # half length of the filter in new samples; with the next t
 KAISER = 6.0  # of the window: 60 dB
 CUT_OFF = 0.5  # of the new rate
 LARGEST_MISSING = 0.1  # weight of missing samples in a new one, beyond which it is missing too
+ENOUGH_ROWS = 20_000  # above which rows beyond those that the motion needs add time only
+PER_BAND = 20.0  # rows per period of the fastest motion that shows
+SHOWS = 4.0  # power over that of the noise from which motion shows
+MOST_ABOVE = 0.01  # share of the squared speed above that frequency
+PANE = 4096  # rows of a spectrum's pane at most
+
+
+def follow_motion(record: Record, least: float) -> Record:
+    """Return a long record at the rate that its motion asks for; a short one as it is.
+
+    Args:
+        least: samples per second that the result has at least [1/s].
+    """
+    if record.size < 2 * ENOUGH_ROWS:
+        return record
+    angles = [interpolate_missing(angle) for angle in (record.theta_m, record.theta_l) if angle is not None]
+    bands = [content_band(y, record.step, robust_noise(y), SHOWS, MOST_ABOVE, PANE) for y in angles]
+    enough = ENOUGH_ROWS / (record.size * record.step)
+    fewer = decimate(record, max(PER_BAND * max(bands), least, enough))
+    if fewer is record:
+        return record
+    note = f"the motion shows up to {max(bands):.3g} Hz, for which this rate is enough; `rate` chooses another"
+    return replace(fewer, notes=(*fewer.notes, note))
 
 
 def decimate(record: Record, rate: float) -> Record:

@@ -17,6 +17,7 @@ from orchestrator.records.record import Record
 
 Array = NDArray[np.float64]
 
+WITH_SHAFT = ("Drivetrain", "TwoStageTrain")
 DEGREES = 180.0 / math.pi
 LARGE_TRAVEL = 0.5  # rad of the load, beyond which twist no longer disturbs the slope
 LONGEST_STEP = 1.5  # rad of the shaft's oscillation
@@ -30,7 +31,7 @@ NEAR_DEGREES = 0.3  # of a logarithm: an inertia this near to 1/57 of the model'
 
 def check_plausible(record: Record, model: Model) -> None:
     """Refuse a record of one stage or two whose units, signs or columns cannot be what the format demands."""
-    if model.fmu not in ("Drivetrain", "TwoStageTrain"):
+    if model.fmu not in WITH_SHAFT:
         return
     record = record.fill_missing()
     parameters = _of_one_stage({name: entry.value for name, entry in model.parameters.items()})
@@ -44,8 +45,10 @@ def check_plausible(record: Record, model: Model) -> None:
 
 
 def natural_frequency(model: Model) -> float:
-    """Return how fast [rad/s] the shaft of a ``Drivetrain`` oscillates, its motor free to turn."""
-    return _frequency({name: entry.value for name, entry in model.parameters.items()})
+    """Return how fast [rad/s] the shaft of a machine oscillates, its motor free to turn; 0.0 where there is none."""
+    if model.fmu not in WITH_SHAFT:
+        return 0.0
+    return _frequency(_of_one_stage({name: entry.value for name, entry in model.parameters.items()}))
 
 
 def _of_one_stage(p: Mapping[str, float]) -> Mapping[str, float]:

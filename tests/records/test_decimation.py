@@ -5,7 +5,7 @@ import pytest
 
 from orchestrator.errors import RecordError
 from orchestrator.records.arrays import Record
-from orchestrator.records.filters import decimate
+from orchestrator.records.filters import decimate, follow_motion
 
 STEP = 1e-3
 TIME = STEP * np.arange(3000)
@@ -75,3 +75,22 @@ def test_missing_samples_are_bridged_where_they_weigh_little() -> None:
 def test_a_rate_that_leaves_too_few_rows_is_refused() -> None:
     with pytest.raises(RecordError, match="`rate` must leave at least 200 rows, but 20 Hz leaves 49: ask for a higher"):
         decimate(record(), 20.0)
+
+
+def test_a_long_record_comes_to_the_rate_of_its_motion_and_a_short_one_stays() -> None:
+    rng, step, rows = np.random.default_rng(2), 2e-4, 200_000
+    time = step * np.arange(rows)
+    slow = np.sin(2.0 * np.pi * 1.3 * time)
+
+    def of(angle: np.ndarray) -> Record:
+        return Record(time, np.zeros(rows), angle + rng.normal(0.0, 1e-4, rows))
+
+    found = follow_motion(of(slow), 0.0)
+    assert 20_000 * 0.9 < found.size <= 20_000  # the motion alone would do with less
+    assert found.averaged == 10
+    assert "the motion shows up to" in found.notes[-1]
+    assert follow_motion(of(slow), 2000.0).averaged == 2  # of a stiff shaft
+    quick = of(slow + 0.3 * np.sin(2.0 * np.pi * 60.0 * time))
+    assert follow_motion(quick, 0.0).averaged in (3, 4)  # twenty rows a period
+    short = quick.part(0, 39_000)
+    assert follow_motion(short, 0.0) is short
