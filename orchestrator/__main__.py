@@ -10,6 +10,8 @@ from orchestrator.shared.stopping import end_on_signals, stop_in_words, stop_on_
 def run(module: str = "orchestrator.cli") -> None:
     """Run a command line and end the process with its exit code."""
     stop_on_signals()
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # of small matrices threads are no help
+        os.environ.setdefault(name, "1")
     for name, number in (("stdout", 1), ("stderr", 2)):
         if getattr(sys, name) is None:  # closed by the caller: what is written then goes nowhere
             null = os.open(os.devnull, os.O_WRONLY)
