@@ -22,7 +22,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.long_log import write_log
+from tests.support.independent_plant import make_record
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORD, MODEL = "docs/examples/machine.csv", "docs/examples/machine.toml"
@@ -39,6 +39,7 @@ COMMANDS = {
     "long-estimate": ["estimate", "{log}", "--no-diagnose"],
     "long-diagnose": ["diagnose", "{log}", "--model", MODEL],
 }
+RATE = 5000.0  # Hz, of the long log
 USUAL = ("diagnose", "estimate", "inspect", "simulate", "sweep")
 _RUN = """
 import json, resource, subprocess, sys
@@ -70,6 +71,15 @@ def run(root: Path, command: list[str], home: Path) -> Cost:
     if code:
         raise SystemExit(f"{root}: {' '.join(command)} ended with {code}: {text}")
     return Cost(seconds, memory)
+
+
+def write_log(path: Path, rows: int) -> None:
+    """Write a record of a drivetrain with a half-gap of 0.01 rad."""
+    columns, _ = make_record({"alpha": 0.01}, 77, rows / RATE, RATE)
+    names = ("u", "theta_m", "theta_l")
+    values = zip(*(columns[name].tolist() for name in names), strict=True)
+    lines = (f"{n / RATE:.4f}," + ",".join(format(value, ".9g") for value in row) for n, row in enumerate(values))
+    path.write_text("\n".join([",".join(("time", *names)), *lines]) + "\n")
 
 
 def checkout(name: str, folder: Path) -> Path:
