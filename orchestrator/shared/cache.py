@@ -10,10 +10,11 @@ import logging
 import os
 import shutil
 import tempfile
-import threading
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
+
+from orchestrator.shared.publishing import part_of, remove_abandoned
 
 MOST_FILES = 1000
 """Files that a folder of the cache keeps: some hundred kernels and libraries of a few versions, about 20 MB."""
@@ -39,6 +40,7 @@ def cache_directory(name: str) -> Path:
         require_room(folder)
     except (OSError, RuntimeError):  # the latter where the user has no home
         return _temporary()
+    remove_abandoned(folder)
     forget_oldest(folder)
     return folder
 
@@ -89,9 +91,9 @@ def remember(name: str, key: Iterable[str | bytes], make: Callable[[], bytes]) -
         tell_damage(path)
     content = make()
     with contextlib.suppress(OSError):  # a full cache costs time, no result
-        part_of_it = path.with_name(f".{path.name}-{os.getpid()}-{threading.get_ident()}")
-        part_of_it.write_bytes(content)
-        part_of_it.replace(path)
+        part = part_of(path)
+        part.write_bytes(content)
+        part.replace(path)
         note_hash(path)
     return content
 

@@ -12,7 +12,6 @@ import os
 import platform
 import shutil
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -20,6 +19,7 @@ from pathlib import Path
 
 from orchestrator.errors import OutputError
 from orchestrator.shared.cache import cache_directory, is_intact, note_hash, tell_damage
+from orchestrator.shared.publishing import part_of
 from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.tool_runs import run_tool
 
@@ -121,7 +121,7 @@ def _link_library(folder: Path, name: str, text: str, headers: Sequence[Path]) -
         make_library(made, text, headers)
     for source, target in ((made, folder / name), *((p.with_suffix(".sha256") for p in (made, folder / name)),)):
         if source.exists():
-            part = target.with_name(f".{target.name}-{os.getpid()}-{threading.get_ident()}")
+            part = part_of(target)
             os.link(source, part)
             part.replace(target)
             part.unlink(missing_ok=True)  # where it is the same file already, nothing was replaced

@@ -5,7 +5,6 @@ import errno
 import json
 import math
 import os
-import secrets
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,12 +14,11 @@ from typing import Any
 
 from orchestrator.errors import OutputError
 from orchestrator.shared.cache import require_room
-from orchestrator.shared.operating_system import PLAIN_FILE, alive
-from orchestrator.shared.publishing import STAGING, make_staging, publish
+from orchestrator.shared.operating_system import PLAIN_FILE
+from orchestrator.shared.publishing import make_staging, part_of, publish, remove_abandoned
 from orchestrator.shared.results import as_plain
 from orchestrator.shared.version import __version__
 
-_LONGEST_PREFIX = 32  # letters: the name beside a file must fit where the file's own does
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by writes, which name no file
 
 
@@ -36,7 +34,7 @@ def stage_output(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path
     place = directory.resolve()
     try:
         for folder in (place, place.parent):
-            _remove_abandoned(folder)
+            remove_abandoned(folder)
         staging = make_staging(place)
     except OSError as error:
         remove_empty(made)
@@ -66,12 +64,10 @@ def _full(folder: Path) -> bool:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file, text in UTF-8, so that no reader ever sees a part of it, and through no link that lies there.
-
-    What is written first lies beside it under a name that nobody can know before.
-    """
+    """Write a file, text in UTF-8, so that no reader ever sees a part of it, and through no link that lies there."""
     data = content.encode() if isinstance(content, str) else content
-    part = path.with_name(f".{path.name[:_LONGEST_PREFIX]}-{secrets.token_hex(8)}")
+    remove_abandoned(path.parent)
+    part = part_of(path)
     handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | PLAIN_FILE, 0o666)  # what others may is the umask's
     try:
         with os.fdopen(handle, "wb") as stream:
@@ -105,14 +101,6 @@ def write_arrays(path: Path, columns: Mapping[str, Any]) -> None:
         np.savez(path, **columns)
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror}") from None
-
-
-def _remove_abandoned(folder: Path) -> None:
-    """Remove the staging directories of processes that were killed."""
-    for path in folder.glob(f"{STAGING}*-*"):
-        owner = path.name.removeprefix(STAGING).partition("-")[0]
-        if owner.isdigit() and not alive(int(owner)):
-            shutil.rmtree(path, ignore_errors=True)
 
 
 def make_directories(directory: Path) -> list[Path]:

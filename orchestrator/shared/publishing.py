@@ -10,6 +10,7 @@ that is done, but a process that is killed in between leaves files of both resul
 
 import contextlib
 import os
+import secrets
 import shutil
 import stat
 import tempfile
@@ -17,11 +18,25 @@ from collections.abc import Collection, Iterator
 from itertools import islice
 from pathlib import Path
 
-from orchestrator.shared.operating_system import exchange, hold_folder, is_own
+from orchestrator.shared.operating_system import alive, exchange, hold_folder, is_own
 from orchestrator.shared.stopping import signals_held
 
 STAGING = ".partial-"
 _MOST_KEPT = 64  # entries beside the result: a folder that holds more is more than a result, and stays where it is
+
+
+def part_of(path: Path) -> Path:
+    """Return where to write first what is then moved to ``path``: beside it, under a name that nobody can know."""
+    return path.with_name(f"{STAGING}{os.getpid()}-{secrets.token_hex(8)}")
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove what processes that were killed had staged in a folder, or begun to write there."""
+    for path in folder.glob(f"{STAGING}*-*"):
+        owner = path.name.removeprefix(STAGING).partition("-")[0]
+        if owner.isdigit() and not alive(int(owner)):
+            with contextlib.suppress(OSError):
+                shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink()
 
 
 def make_staging(directory: Path) -> Path:

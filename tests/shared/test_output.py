@@ -57,6 +57,18 @@ def test_a_full_disk_elsewhere_is_not_blamed_on_the_results(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_file_that_a_killed_process_had_begun_is_cleared_away(tmp_path):
+    code = (
+        "import os, signal; from pathlib import Path; from orchestrator.shared.output import write_whole\n"
+        "os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        f"write_whole(Path({str(tmp_path / 'a.txt')!r}), 'new')"
+    )
+    subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False)
+    assert len(list(tmp_path.iterdir())) == 1
+    write_whole(tmp_path / "b.txt", "new")
+    assert [path.name for path in tmp_path.iterdir()] == ["b.txt"]
+
+
 def test_what_a_killed_process_left_is_cleared_away(tmp_path):
     code = (
         "import os, signal, sys; from pathlib import Path; from orchestrator.shared.output import stage_output\n"
@@ -242,11 +254,11 @@ def test_neither_links_nor_long_names_lead_elsewhere(tmp_path, monkeypatch):
     victim = tmp_path / "victim"
     victim.write_text("precious")
     # Also where somebody could know what is taken by chance.
-    monkeypatch.setattr("orchestrator.shared.output.secrets.token_hex", lambda count: "0" * 2 * count)
-    for name in (".a.txt.partial", ".a.txt-0000000000000000", ".a.txt.part"):
-        (tmp_path / name).symlink_to(victim)
+    monkeypatch.setattr("orchestrator.shared.publishing.secrets.token_hex", lambda count: "0" * 2 * count)
+    (tmp_path / f".partial-{os.getpid()}-0000000000000000").symlink_to(victim)
     with pytest.raises(FileExistsError):
         write_whole(tmp_path / "a.txt", "new")
+    (tmp_path / f".partial-{os.getpid()}-0000000000000000").unlink()
     (tmp_path / "b.txt").symlink_to(victim)
     write_whole(tmp_path / "b.txt", "new")
     assert (tmp_path / "b.txt").read_text() == "new"
