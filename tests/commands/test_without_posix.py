@@ -15,6 +15,7 @@ from orchestrator.cli import COMMANDS as KNOWN
 from orchestrator.shared import operating_system
 from tests.support.example_record import copy_examples
 from tests.support.sources import nodes_of
+from tests.support.workbench import drive_log, workbench
 
 ROOT = Path(__file__).resolve().parents[2]
 OF_ONE_SYSTEM = {
@@ -109,6 +110,18 @@ def test_the_commands_give_the_same_numbers(tmp_path: Path, commands: tuple[str,
 def test_every_command_that_ends_by_itself_is_run() -> None:
     run_here = {words.split()[0] for words in (*COMMANDS, *AT_NIGHT)} - {"--help"}
     assert run_here == set(KNOWN) - {"workbench"}
+
+
+def test_the_workbench_runs_a_job(tmp_path: Path) -> None:
+    pytest.importorskip("starlette")
+    with workbench(tmp_path / "session", module="tests.support.without_posix") as served:
+        log = served.upload(drive_log(tmp_path / "log.csv", rows=400, unknown="Load position [deg]"))
+        assert b"<html" in served.ask("GET", "")[1]
+        job = served.wait(served.start("inspect", [log]))
+        assert job["state"] == "done", served.ask("GET", f"results/{job['name']}/output.txt")
+        stopped = served.start("estimate", [log], no_diagnose=True)
+        assert served.ask("POST", f"jobs/{stopped}/stop", {})[0] < 300
+        assert served.wait(stopped)["state"] != "running"
 
 
 def test_a_child_without_a_group_is_ended_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -81,9 +81,16 @@ class Served:
 
 
 @contextmanager
-def workbench(folder: Path, *words: str, environment: Mapping[str, str] | None = None) -> Iterator[Served]:
-    """Serve a directory; the server ends with the ``with`` statement. ``environment``: further variables."""
-    command = [sys.executable, "-m", "orchestrator", "workbench", "--no-browser", "--out", str(folder), *words]
+def workbench(
+    folder: Path, *words: str, environment: Mapping[str, str] | None = None, module: str = "orchestrator"
+) -> Iterator[Served]:
+    """Serve a directory; the server ends with the ``with`` statement.
+
+    Args:
+        environment: further variables.
+        module: that runs the command line.
+    """
+    command = [sys.executable, "-m", module, "workbench", "--no-browser", "--out", str(folder), *words]
     paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     variables = {**os.environ, **(environment or {}), "PYTHONPATH": paths}
     process = subprocess.Popen(
