@@ -59,13 +59,16 @@ def test_the_last_rows_are_split_off():
 
 
 @pytest.mark.slow
-def test_what_test_data_hold_changes_no_name_and_no_size():
+@pytest.mark.parametrize("effects", [["coulomb_friction@motor"], pytest.param(None, marks=pytest.mark.night)])
+def test_what_test_data_hold_changes_no_name_and_no_size(effects):
     columns, _ = make_record({"Fc_m": 0.8}, 5, 12.0, substeps=50)
     size = columns["time"].size
     changed = {name: values.copy() for name, values in columns.items()}
     rows = slice(round(0.86 * size), size)
     changed["theta_m"][rows] += 0.3 * np.sin(np.arange(size)[rows] / 7.0)
-    found, other = (diagnose(record_from_columns(c, "record"), default_model()) for c in (columns, changed))
+    found, other = (
+        diagnose(record_from_columns(c, "record"), default_model(), effects=effects) for c in (columns, changed)
+    )
     assert [e.label for e in found.effects] == [e.label for e in other.effects]
     assert all(spoilt.grade <= whole.grade for whole, spoilt in zip(found.effects, other.effects, strict=True))
     assert found.effects[0].parameters == other.effects[0].parameters

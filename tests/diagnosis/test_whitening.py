@@ -1,5 +1,7 @@
 """Whitening: noise of a known spectrum comes out white and of unit size, and the back filter is the adjoint."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from tests.support.independent_plant import NOMINAL, make_record
 SETTINGS = DiagnosisSettings()
 
 
+@cache
 def exact_balance(seed=1, duration=20.0, **options):
     """The balances of a record whose model is exact, but for the encoders' noise."""
     columns, truth = make_record({}, seed, duration, mismatch=0.0, substeps=50, **options)

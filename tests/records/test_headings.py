@@ -15,7 +15,7 @@ from tests.support.independent_plant import make_record
 
 @pytest.fixture(scope="module")
 def columns() -> dict[str, np.ndarray]:
-    return make_record({"alpha": 0.01}, seed=3, duration=4.0)[0]
+    return make_record({"alpha": 0.01}, seed=3, duration=1.5)[0]
 
 
 def _rows(columns: dict[str, np.ndarray], separator: str = "\t", end: str = "", comma: bool = False) -> str:

@@ -81,7 +81,7 @@ def test_an_empty_time_is_refused_in_words_where_its_counter_is_said_to_overflow
 
 
 def _servo(torque: np.ndarray) -> Record:
-    time = 0.01 * np.arange(1500)
+    time = 0.01 * np.arange(torque.size)
     speed = np.sin(2.0 * time)
     return record_from_columns(
         {"time": time, "u": torque, "theta_m": -0.5 * np.cos(2.0 * time) + 1e-3 * speed}, "servo"
@@ -89,7 +89,7 @@ def _servo(torque: np.ndarray) -> Record:
 
 
 def test_a_torque_without_a_sign_gets_a_hint() -> None:
-    time = 0.01 * np.arange(1500)
+    time = 0.01 * np.arange(800)
     signed = np.cos(2.0 * time) + 0.3 * np.sign(np.sin(2.0 * time))
     counts = np.abs(signed) * 500.0
     for torque in (counts, np.where(signed < 0.0, 1024.0 + counts, counts)):
