@@ -12,8 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from orchestrator.building.build import ensure_built
+from orchestrator.estimation.design import plant_of
 from orchestrator.estimation.filter.innovations import simulate
-from orchestrator.estimation.filter.model import Array, affine_model
+from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.fmi.instances import fmu_instance
@@ -24,7 +25,7 @@ from orchestrator.master.system import SignalSource, System
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import interval_95
-from pyfmu_sources.drivetrain.equations import PARAMETERS, DrivetrainParameters
+from pyfmu_sources.drivetrain.equations import PARAMETERS
 
 SIZES = (0.0, *(3e-4 * 1.25**n for n in range(34)))  # to half a radian
 
@@ -38,8 +39,7 @@ def estimate(record: Record, model: Model) -> Estimate:
     x0 = np.array([record.theta_m[0], 0.0, record.theta_l[0], 0.0, 0.0])
     runs = [without]
     for alpha in SIZES[1:]:
-        p = DrivetrainParameters._make(model.values)._replace(alpha=alpha)
-        runs.append(simulate(affine_model(p), record.u, record.step, x0)[:, 2])
+        runs.append(simulate(plant_of(model, alpha), record.u, record.step, x0)[:, 2])
     sums = np.array([float(np.mean(np.abs(run - without))) for run in runs])
     monotone = np.maximum.accumulate(sums)
     measured = float(np.mean(np.abs(record.theta_l - without)))

@@ -9,7 +9,7 @@ import numpy as np
 from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
-from orchestrator.estimation.likelihood import Fit, GapFit
+from orchestrator.estimation.likelihood import Fit
 from orchestrator.estimation.problem import DRY, IMPULSE, LEAST_TORQUE_NOISE, OFFSET
 from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate
@@ -18,7 +18,7 @@ from orchestrator.estimation.torque_reading import torque_words
 from orchestrator.shared.inference.normal import NORMAL_95
 
 
-def describe(fit: GapFit) -> Estimate:
+def describe(fit: Fit) -> Estimate:
     """Return the estimate of a fit: interval, visibility, and what else the fit says."""
     wider = _widening(fit)
     fit, curve = profile(fit, NORMAL_95**2 * wider)
@@ -30,7 +30,7 @@ def describe(fit: GapFit) -> Estimate:
     return _describe(fit, curve, wider, (max(fit.size - below, 0.0), fit.size + above), shift)
 
 
-def _widening(fit: GapFit) -> float:
+def _widening(fit: Fit) -> float:
     """Return the variance of the half-gap over that of white one-step errors: the level of its profile is so much more.
 
     Kent (Biometrika 69(1), 1982): twice the drop of the log likelihood is chi-squared times that ratio.
@@ -38,23 +38,23 @@ def _widening(fit: GapFit) -> float:
     return max(_misfit_variance(fit), block_variance(fit, fit.column, fit.likelihood.settings.verdict.blocks))
 
 
-def contact_shift(fit: GapFit) -> float:
+def contact_shift(fit: Fit) -> float:
     """Return by how much [rad] the half-gap depends on where in a contact its impulse acts, which no record tells.
 
     In the law of Hunt and Crossley damping sets in over a depth ``d``, and the impulse is ``J = c d / 2`` with its
     centre at ``d / 3``. Until the teeth are there, the twist moves on by what the impulse will take of its speed.
     """
-    p, impulse = fit.likelihood.parameters(fit.point.theta), fit.likelihood.value(fit.point.theta, IMPULSE)
+    p = fit.likelihood.parameters(fit.point.theta)
     kept = fit.likelihood.run(fit.point.theta, keep=True)
     touches = np.flatnonzero((kept.contacts[:-1, 0] == 0) & (kept.contacts[1:, 0] != 0))
     if not touches.size:
         return 0.0
-    speed = float(np.median(np.abs(kept.states[touches, 1] / p.i - kept.states[touches, 3])))
-    depth = 2.0 * abs(impulse) / max(p.c, 1e-300)
-    return abs(impulse) * (1.0 / (p.J_m * p.i**2) + 1.0 / p.J_l) * depth / (3.0 * max(speed, 1e-300))
+    speed = float(np.median(np.abs(kept.states[touches, 1] / p["i"] - kept.states[touches, 3])))
+    depth = 2.0 * abs(p[IMPULSE]) / max(p["c"], 1e-300)
+    return abs(p[IMPULSE]) * (1.0 / (p["J_m"] * p["i"] ** 2) + 1.0 / p["J_l"]) * depth / (3.0 * max(speed, 1e-300))
 
 
-def describe_unfinished(fit: GapFit, why: str) -> Estimate:
+def describe_unfinished(fit: Fit, why: str) -> Estimate:
     """Return the estimate of a fit that was ended before it was done, its interval by the curvature alone."""
     alpha, error = fit.size, fit.size_deviation
     wider = fit.likelihood.settings.verdict.misfit_widening**2
@@ -67,15 +67,15 @@ def describe_unfinished(fit: GapFit, why: str) -> Estimate:
     return replace(found, message="; ".join(text for text in (said, found.message) if text), diagnostics=diagnostics)
 
 
-def _misfit_variance(fit: GapFit) -> float:
+def _misfit_variance(fit: Fit) -> float:
     """Return by what torque noise multiplies the variance: the model is not exact, and what it lacks is not white."""
     problem = fit.likelihood.problem
-    noise = zip(fit.likelihood.noise(fit.point.theta).torque, problem.torque_units, strict=True)
+    noise = zip(fit.likelihood.noise(fit.point.theta).torque, problem.units, strict=True)
     inexact = any(w > 10.0 * LEAST_TORQUE_NOISE * unit for w, unit in noise)
     return fit.likelihood.settings.verdict.misfit_widening**2 if inexact else 1.0
 
 
-def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, float], shift: float = 0.0) -> Estimate:
+def _describe(fit: Fit, curve: Profile, wider: float, interval: tuple[float, float], shift: float = 0.0) -> Estimate:
     """Return the estimate of a fit with this interval [rad], whose variance is ``wider`` times that of white errors.
 
     ``shift`` is what contacts add to the standard error [rad].
@@ -106,27 +106,26 @@ def _describe(fit: GapFit, curve: Profile, wider: float, interval: tuple[float, 
     if "cannot be seen" in message:  # then no number is an answer
         visible, alpha, error, low, high = False, math.nan, math.inf, 0.0, math.inf
     drive = float(np.sqrt(np.mean(kept.states[:, 4] ** 2)))
-    lacking = _model_warning(
-        diagnostics, drive, likelihood.parameters(fit.point.theta).i, problem.record.size, settings
-    )
+    p = likelihood.parameters(fit.point.theta)
+    lacking = _model_warning(diagnostics, drive, p["i"], problem.record.size, settings)
     diagnostics["lacking"] = lacking
     crawl = friction_note(fit, (high - low) / (2.0 * alpha)) if visible else ""
     message = "; ".join(text for text in (message, lacking, torque_words(problem), crawl) if text)
     curves = {"states": kept.states, "contacts": contacts, "errors": kept.errors, "profile": curve}
-    curves["offset"] = float(fit.point.theta[problem.index(OFFSET)]) if OFFSET in problem.names else 0.0
-    curves["model"] = likelihood.parameters(fit.point.theta)
+    curves["offset"] = p[OFFSET]
+    curves["model"] = tuple(problem.base[name] if name == OFFSET else p[name] for name in problem.base)
     covariance = wider * fit.covariance  # of diagnostics["parameters"], in their order
     covariance[fit.column, fit.column] += shift**2
     curves["covariance"] = covariance
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
 
 
-def block_variance(fit: Fit[Any], column: int, blocks: int) -> float:
+def block_variance(fit: Fit, column: int, blocks: int) -> float:
     """Return :func:`block_variance_along` of one unknown."""
     return block_variance_along(fit, np.eye(fit.free.size)[column], blocks)
 
 
-def block_variance_along(fit: Fit[Any], slope: Array, blocks: int) -> float:
+def block_variance_along(fit: Fit, slope: Array, blocks: int) -> float:
     """Return the variance of a value that blocks of the record show, over that of white one-step errors.
 
     ``slope`` (k,) is the derivative of the value by the free unknowns. The result is one where it is no more than
@@ -183,7 +182,7 @@ def stillness_note(outputs: Array, noise: tuple[float, ...], settings: GapVerdic
     return ""
 
 
-def friction_note(fit: GapFit, reach: float) -> str:
+def friction_note(fit: Fit, reach: float) -> str:
     """Return the advice where much of the half-gap's variance is that of dry friction, or nothing.
 
     Args:

@@ -19,11 +19,10 @@ import numpy as np
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.filter.innovations import simulate
-from orchestrator.estimation.filter.model import Array, affine_model
-from orchestrator.estimation.problem import make_problem
+from orchestrator.estimation.filter.model import AffineModel, Array, affine_model
+from orchestrator.estimation.problem import ALPHA, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import MINIMUM_ROWS, Record
-from pyfmu_sources.drivetrain.equations import DrivetrainParameters
 
 TORQUE_NOISE = 1e-2  # N.m.s^0.5
 DEFAULT_NOISE = (3.5e-4, 1.75e-4)  # rad
@@ -183,7 +182,7 @@ def _multisine(time: Array, top: float) -> Array:
 
 
 def _judge(name: str, shape: Array, task: _Task) -> Excitation:
-    plant = affine_model(DrivetrainParameters._make(task.model.values)._replace(alpha=task.alpha))
+    plant = plant_of(task.model, task.alpha)
     step = float(task.time[1] - task.time[0])
     scale = task.limits.torque / float(np.max(np.abs(shape)))
     states = simulate(plant, scale * shape, step, np.zeros(5))
@@ -201,6 +200,11 @@ def _judge(name: str, shape: Array, task: _Task) -> Excitation:
     return Excitation(name, u, bound, float(np.max(np.abs(u))), fastest)
 
 
+def plant_of(model: Model, alpha: float) -> AffineModel:
+    """Return the model's plant with a half-gap ``alpha`` [rad]."""
+    return affine_model({**{name: one.value for name, one in model.parameters.items()}, ALPHA: alpha})
+
+
 def error_bound_of_excitation(
     model: Model, time: Array, u: Array, alpha: float, noise: tuple[float, float], motor_only: bool
 ) -> float:
@@ -212,7 +216,7 @@ def error_bound_of_excitation(
         alpha: half-gap [rad].
         noise: standard deviation of each encoder [rad].
     """
-    plant = affine_model(DrivetrainParameters._make(model.values)._replace(alpha=alpha))
+    plant = plant_of(model, alpha)
     states = simulate(plant, u, float(time[1] - time[0]), np.zeros(5))
     if not np.all(np.isfinite(states)):
         return math.inf

@@ -8,13 +8,12 @@ In all functions: ``theta``: (unknowns,); ``free``: (k,) indices of the free unk
 """
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,30 +21,14 @@ from numpy.typing import NDArray
 from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.filter.held_torque import delay, smooth_torque
 from orchestrator.estimation.filter.innovations import Innovations, innovations
-from orchestrator.estimation.filter.model import AffineModel, Array, NoiseLevels, affine_model
+from orchestrator.estimation.filter.model import Array, NoiseLevels, affine_model
 from orchestrator.estimation.information import covariance_factor, inverse
-from orchestrator.estimation.problem import (
-    ALPHA,
-    DRY,
-    IMPULSE,
-    LATE,
-    OFFSET,
-    SAMPLED,
-    SCALE,
-    SMOOTH,
-    STATE_NAMES,
-    TORQUE_OFFSET,
-    GapProblem,
-    UnknownProblem,
-)
+from orchestrator.estimation.problem import DRY, LATE, OFFSET, SAMPLED, SCALE, SMOOTH, TORQUE_OFFSET, GapProblem
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
-from pyfmu_sources.drivetrain.equations import NAMES, DrivetrainParameters
 
 JUMP = 100.0
 START_DAMPING = 1e-6
-DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
 NEAR = 2.0  # steps from a bound, within which a difference quotient looks inward
-PLACES = {name: n for n, name in enumerate(NAMES) if name != OFFSET}  # of a plant's parameters that are fitted
 LEAST_LOG_NOISE, LARGEST_LOG_NOISE = -40.0, 20.0  # beyond all bounds, where a difference quotient may look
 
 
@@ -62,10 +45,7 @@ class Point:
     result: Innovations = field(repr=False)
 
 
-P = TypeVar("P", bound=UnknownProblem)
-
-
-class FilterLikelihood(ABC, Generic[P]):
+class Likelihood:
     """Evaluates a problem at vectors of unknowns; two threads share the runs of one derivative.
 
     ``soft`` blurs the flanks by the uncertainty of the twist, which smooths the likelihood for the start of a fit.
@@ -73,17 +53,14 @@ class FilterLikelihood(ABC, Generic[P]):
     Nothing of it changes once it is made: a fit returns another one with what it has learnt.
 
     Attributes:
-        gap: name of the gap's size.
-        size: its place among the unknowns.
+        size: place of the gap's size among the unknowns.
         torque_places: places of the levels of torque noise.
         others: places of all other unknowns.
     """
 
-    gap: ClassVar[str]
-
     def __init__(
         self,
-        problem: P,
+        problem: GapProblem,
         threads: int = 1,
         settings: EstimationSettings = DEFAULT_SETTINGS,
         effort: Effort | None = None,
@@ -91,7 +68,7 @@ class FilterLikelihood(ABC, Generic[P]):
         self.problem = problem
         self.settings = settings
         self.soft = False
-        self.size = problem.index(self.gap)
+        self.size = problem.index(problem.gap)
         self._place = {name: n for n, name in enumerate(problem.names)}
         self._noise = [n for name, n in self._place.items() if name.startswith("log_noise_")]
         self.torque_places = [n for name, n in self._place.items() if name.startswith("log_torque_")]
@@ -106,43 +83,33 @@ class FilterLikelihood(ABC, Generic[P]):
     def run(self, theta: Array, keep: bool = False) -> Innovations:
         """Return the innovations at ``theta``."""
         self.effort.check()
-        record = self.problem.record
-        outputs, (x0, spread) = self.problem.outputs, self.first(theta)
+        problem, record, p, noise = self.problem, self.problem.record, self.parameters(theta), self.noise(theta)
+        outputs, (x0, spread) = problem.outputs, problem.first(p, noise)
         if OFFSET in self._place:
-            shift = theta[self._place[OFFSET]]
-            outputs = outputs - np.array([0.0, shift])
-            x0[-3] -= shift
+            outputs = outputs - np.array([0.0, p[OFFSET]])
+            x0[-3] -= p[OFFSET]
+        model = affine_model(p, problem.row, np.column_stack([[p[name] for name in DRY], problem.sliding]))
         return innovations(
-            self.model(theta), self.torque(theta), outputs, record.step, x0, self.noise(theta), keep, self.soft,
-            record.u_deviation, spread,
-        )  # fmt: skip
+            model, self._torque(p), outputs, record.step, x0, noise, keep, self.soft, record.u_deviation, spread
+        )
 
-    @abstractmethod
-    def model(self, theta: Array) -> AffineModel:
-        """Return the modes of the plant at a vector."""
-
-    @abstractmethod
-    def first(self, theta: Array) -> tuple[Array, Array]:
-        """Return state and standard deviations at the first row, (n,) each; the load's angle as its encoder has it."""
+    def parameters(self, theta: Array) -> Mapping[str, float]:
+        """Return parameters of the plant, and all other values of a vector, by name."""
+        return self.problem.parameters(dict(zip(self._place, theta.tolist(), strict=True)))
 
     def value(self, theta: Array, name: str) -> float:
         """Return a value of a vector by its name."""
         return float(theta[self._place[name]])
 
-    def dry(self, theta: Array) -> Array:
-        """Return dry friction of motor and load, and the speeds at which it has set in: (2, 2)."""
-        return np.column_stack([[self.value(theta, name) for name in DRY], self.problem.sliding])
-
-    def torque(self, theta: Array) -> Array:
+    def _torque(self, p: Mapping[str, float]) -> Array:
         """Return the torque (n,) that the drive is asked for [N.m]: late, with its gain and offset."""
         record = self.problem.record
         u = record.u
-        if SAMPLED in self._place and record.u_sampled is not None:
-            u = u + self.value(theta, SAMPLED) * (record.u_sampled - u)
-        if SMOOTH in self._place:
-            u = u + self.value(theta, SMOOTH) * (smooth_torque(u) - u)
-        u = delay(u, record.step, self.value(theta, LATE))
-        return self.value(theta, SCALE) * u + self.value(theta, TORQUE_OFFSET)
+        if SAMPLED in p and record.u_sampled is not None:
+            u = u + p[SAMPLED] * (record.u_sampled - u)
+        if SMOOTH in p:
+            u = u + p[SMOOTH] * (smooth_torque(u) - u)
+        return p[SCALE] * delay(u, record.step, p[LATE]) + p[TORQUE_OFFSET]
 
     def noise(self, theta: Array) -> NoiseLevels:
         """Return the noise levels of a vector."""
@@ -157,7 +124,7 @@ class FilterLikelihood(ABC, Generic[P]):
         *,
         soft: bool | None = None,
         information: Array | None = None,
-        problem: P | None = None,
+        problem: GapProblem | None = None,
         effort: Effort | None = None,
     ) -> Self:
         """Return the likelihood with other flanks, information, bounds of the unknowns, or leave to go on.
@@ -175,7 +142,7 @@ class FilterLikelihood(ABC, Generic[P]):
     @property
     def difference(self) -> float:
         """Return the step of a difference quotient in standard deviations: long while the flanks are blurred."""
-        return 1.0 if self.soft else DIFFERENCE
+        return 1.0 if self.soft else self.problem.difference
 
     @property
     def first_damping(self) -> float:
@@ -270,11 +237,8 @@ class FilterLikelihood(ABC, Generic[P]):
         return basis
 
 
-L = TypeVar("L", bound=FilterLikelihood[Any])
-
-
 @dataclass(frozen=True)
-class Fit(Generic[L]):
+class Fit:
     """A maximum of the likelihood.
 
     Attributes:
@@ -289,7 +253,7 @@ class Fit(Generic[L]):
     information: Array
     iterations: int
     converged: bool
-    likelihood: L = field(repr=False)
+    likelihood: Likelihood = field(repr=False)
 
     @cached_property
     def covariance(self) -> Array:
@@ -321,31 +285,9 @@ class Fit(Generic[L]):
         }
 
 
-class Likelihood(FilterLikelihood[GapProblem]):
-    """The likelihood of a record of the drivetrain."""
-
-    gap = ALPHA
-
-    def parameters(self, theta: Array) -> DrivetrainParameters:
-        """Return the parameters ``p`` of a vector."""
-        p = list(self.problem.base)
-        for name in self._place.keys() & PLACES.keys():
-            p[PLACES[name]] = self.value(theta, name)
-        return DrivetrainParameters._make(p)
-
-    def model(self, theta: Array) -> AffineModel:
-        """Return the modes of the drivetrain at a vector."""
-        return affine_model(self.parameters(theta), self.value(theta, IMPULSE), self.dry(theta))
-
-    def first(self, theta: Array) -> tuple[Array, Array]:
-        """Return the state at the first row, which is unknown, and so exact for the filter: (5,) each."""
-        return np.array([self.value(theta, name) for name in STATE_NAMES]), np.zeros(len(STATE_NAMES))
-
-
-GapFit = Fit[Likelihood]
-
-
-def maximise(likelihood: L, start: Array, free: Sequence[int], iterations: int = 30, tolerance: float = 1e-2) -> Fit[L]:
+def maximise(
+    likelihood: Likelihood, start: Array, free: Sequence[int], iterations: int = 30, tolerance: float = 1e-2
+) -> Fit:
     """Return the maximum of the likelihood reached from ``start`` over the ``free`` unknowns.
 
     Steps are damped until the objective falls; an unknown at its bound stays there while the score points outward.
@@ -380,7 +322,7 @@ def maximise(likelihood: L, start: Array, free: Sequence[int], iterations: int =
 
 
 def _step(
-    likelihood: L,
+    likelihood: Likelihood,
     point: Point,
     places: NDArray[np.int64],
     gradient: Array,

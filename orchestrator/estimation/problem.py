@@ -1,13 +1,13 @@
 """What is unknown about a record under a model: parameters, gap, initial state, noise; and where each is looked for."""
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import Array
+from orchestrator.estimation.filter.model import DRIVETRAIN, IMPULSE, LOAD_TORQUE, Array, BodyNames, NoiseLevels
 from orchestrator.estimation.zeros import held_twist, play_of
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
@@ -19,7 +19,6 @@ SCALE = "u_scale"
 TORQUE_OFFSET = "torque_offset"
 LATE = "torque_late"
 DRY = tuple(f"effects.coulomb_friction.{side}.torque" for side in ("motor", "load"))
-LOAD_TORQUE = "effects.load_torque.torque"  # constant; of a prior as wide as the drive's torque at the load
 # Prior standard deviations: of the torque's gain where the record states none, of its offset and of dry friction over
 # the rms of the drive's torque, and of how late it acts [s].
 SCALE_SPREAD, OFFSET_SHARE, FRICTION_SHARE, LATE_SPREAD = 0.03, 0.03, 0.1, 3e-3
@@ -27,7 +26,6 @@ SLIDING = 5e-3  # of a body's rms speed, at which its dry friction has set in by
 SAMPLED = "u_sampled"  # way from a torque that is held between its own rows to a smooth one: 0 to 1
 SMOOTH = "u_smooth"  # the same of a torque that has a row for each of the record's
 OFFSET = "effects.sensor_offset.load.offset"
-IMPULSE = "contact_impulse"
 # Depth within which a contact's damping sets in, prior standard deviation: an angle [rad], or, where that is more, a
 # share of the shaft's twist under the drive's torque.
 IMPULSE_DEPTH, IMPULSE_SHARE = 2e-3, 0.1
@@ -55,19 +53,29 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class UnknownProblem:
-    """A record, and a vector of unknowns.
+class GapProblem:
+    """What is unknown about a record of a drivetrain.
 
     Attributes:
         unknowns: every unknown, in the order of the vector; free or not is decided per fit.
         outputs: (n, 1 or 2) measured angles [rad].
         sliding: speeds at which dry friction of motor and load has set in [rad/s].
+        base: parameters of the model by name.
+        units: by what levels of torque noise at each body are to be multiplied for a drive as weak, or as strong, as
+            this one.
+        gap: name of the gap's size.
+        difference: step of a difference quotient, in standard deviations.
     """
 
+    row: ClassVar[BodyNames] = DRIVETRAIN
+    gap: ClassVar[str] = ALPHA
+    difference: ClassVar[float] = 0.01
     record: Record
     unknowns: tuple[Unknown, ...]
     outputs: Array
     sliding: tuple[float, float]
+    base: Mapping[str, float]
+    units: tuple[float, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,24 +102,16 @@ class UnknownProblem:
         unknowns[place] = replace(unknowns[place], **changes)
         return replace(self, unknowns=tuple(unknowns))
 
+    def parameters(self, values: Mapping[str, float]) -> Mapping[str, float]:
+        """Return all parameters of the plant by name, of the values of the unknowns."""
+        return {**self.base, **values}
 
-@dataclass(frozen=True)
-class GapProblem(UnknownProblem):
-    """What is unknown about a record of the drivetrain.
+    def first(self, p: Mapping[str, float], noise: NoiseLevels) -> tuple[Array, Array]:
+        """Return state and standard deviations at the first row, (n,) each; the load's angle as its encoder has it.
 
-    Attributes:
-        base: parameter tuple of the model.
-        torque_units: by what levels of torque noise at motor and load are to be multiplied for a drive as weak, or as
-            strong, as this one.
-    """
-
-    base: tuple[float, ...]
-    torque_units: tuple[float, float] = (1.0, 1.0)
-
-    @property
-    def least_where_inexact(self) -> tuple[float, float]:
-        """Return the least torque noise at motor and load [N.m.s^0.5] that keeps an inexact model honest."""
-        return scale_noise(LEAST_WHERE_INEXACT, self.torque_units)
+        The state of a drivetrain is unknown, and so exact for the filter.
+        """
+        return np.array([p[name] for name in STATE_NAMES]), np.zeros(len(STATE_NAMES))
 
 
 def make_problem(record: Record, model: Model) -> GapProblem:
@@ -120,26 +120,26 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     With the motor encoder alone only alpha times the gear ratio can be seen, so the ratio then counts as exact.
     """
     both = record.theta_l is not None
+    base = {name: parameter.value for name, parameter in model.parameters.items()}
     outputs = record.theta_m[:, None] if record.theta_l is None else np.column_stack([record.theta_m, record.theta_l])
     unknowns = parameter_unknowns(model, {ALPHA, OFFSET, *DRY} if both else {ALPHA, OFFSET, *DRY, "i"})
-    ratio = model.parameters["i"].value
-    unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
+    ratio, lag = base["i"], base["tau"]
+    unknowns.append(Unknown(ALPHA, 0.0, math.inf, 1e-3, 0.0, 3.0))
     if both:
         filled = record.fill_missing()
         low, high = play_of(filled, model)
         # Where a torque such as a weight's holds one flank throughout, the middle of the play is not in the record.
         held = held_twist(filled, model) > 0.5 * (high - low)
         unknowns.append(Unknown(OFFSET, 0.0 if held else -0.5 * (low + high), OFFSET_SPREAD, 1e-3))
-    pull = abs(ratio) * rms_behind_lag(record.u, record.step, model.parameters["tau"].value)
-    depth = max(IMPULSE_DEPTH, IMPULSE_SHARE * pull / model.parameters["k"].value)
-    impulse = 0.5 * depth * model.parameters["c"].value
+    pull = abs(ratio) * rms_behind_lag(record.u, record.step, lag)
+    depth = max(IMPULSE_DEPTH, IMPULSE_SHARE * pull / base["k"])
+    impulse = 0.5 * depth * base["c"]
     unknowns.append(Unknown(IMPULSE, 0.0, impulse, impulse))
-    unknowns += torque_unknowns(record, model, model.parameters["tau"].value, ratio)
+    unknowns += torque_unknowns(record, model, lag, ratio)
     if LOAD_TORQUE not in (unknown.name for unknown in unknowns):
-        own = model.parameters.get(LOAD_TORQUE)
-        unknowns.append(Unknown(LOAD_TORQUE, own.value if own is not None else 0.0, pull, 1e-3 * pull))
+        unknowns.append(Unknown(LOAD_TORQUE, base[LOAD_TORQUE], pull, 1e-3 * pull))
     unknowns.append(Unknown(SMOOTH if record.u_sampled is None else SAMPLED, 0.0, math.inf, 0.1, 0.0, 1.0))
-    units = _torque_units(record, model.parameters["tau"].value, ratio)
+    units = _torque_units(record, lag, ratio)
     unknowns += _initial_state(record, ratio, units[0])
     for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
         unknowns.append(encoder_unknown(record, model, column))
@@ -148,7 +148,7 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     highs = scale_noise((LARGEST_TORQUE_NOISE, LARGEST_TORQUE_NOISE), units)
     for side, low, high in zip(("motor", "load"), lows, highs, strict=True):
         unknowns.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(high)))
-    return GapProblem(record, tuple(unknowns), outputs, sliding_speeds(record, ratio), model.values, units)
+    return GapProblem(record, tuple(unknowns), outputs, sliding_speeds(record, ratio), base, units)
 
 
 def parameter_unknowns(model: Model, without: Collection[str]) -> list[Unknown]:
@@ -202,7 +202,7 @@ def encoder_unknown(record: Record, model: Model, column: str) -> Unknown:
     return Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, least, math.log(level) + 6.0)
 
 
-def scale_noise(level: tuple[float, float], units: tuple[float, float]) -> tuple[float, float]:
+def scale_noise(level: Sequence[float], units: Sequence[float]) -> tuple[float, float]:
     """Return a level of torque noise at motor and load [N.m.s^0.5] as the strength of a drive asks for."""
     return units[0] * level[0], units[1] * level[1]
 

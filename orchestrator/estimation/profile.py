@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.estimation.filter.model import Array
-from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
+from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
 
 MOST_PLACES = 30  # on one side, until the profile passes its level
 MOST_STARTS = 3  # of the fit anew, from a place of the profile that is better than it
@@ -36,7 +36,7 @@ class Profile:
         return low, high
 
 
-def profile(fit: GapFit, limit: float) -> tuple[GapFit, Profile]:
+def profile(fit: Fit, limit: float) -> tuple[Fit, Profile]:
     """Return the profile likelihood of alpha until it passes ``limit`` on both sides (or is at alpha = 0), and the fit.
 
     Where a place of it is better than the fit, that was no maximum: it goes on from there, and is returned.
@@ -49,7 +49,7 @@ def profile(fit: GapFit, limit: float) -> tuple[GapFit, Profile]:
     return fit, curve
 
 
-def _follow(fit: GapFit, limit: float, most: float) -> tuple[Profile, GapFit | None]:
+def _follow(fit: Fit, limit: float, most: float) -> tuple[Profile, Fit | None]:
     """Return the profile, and the place that is better than the fit by ``most``, at which it stops."""
     likelihood, place, best, edge = fit.likelihood, fit.likelihood.size, fit.size, math.sqrt(limit)
     slope = fit.covariance[:, fit.column] / fit.size_deviation**2
@@ -75,7 +75,7 @@ def _curve(entries: dict[float, float]) -> Profile:
     return Profile(np.array(places), np.array([entries[alpha] for alpha in places]))
 
 
-def _fit_at_size(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
+def _fit_at_size(likelihood: Likelihood, fit: Fit, place: int, alpha: float, slope: Array) -> Fit:
     """Return the best fit found with alpha held: the linear prediction, then some scoring steps."""
     theta = fit.point.theta.copy()
     theta[fit.free] += slope * (alpha - fit.point.theta[place])

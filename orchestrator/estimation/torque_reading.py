@@ -1,12 +1,12 @@
 """Whether a torque with rows of its own is held from one to the next, or sampled from a signal that never rests."""
 
-from orchestrator.estimation.likelihood import GapFit, maximise
+from orchestrator.estimation.likelihood import Fit, maximise
 from orchestrator.estimation.problem import SAMPLED, GapProblem
 
 HELD, SMOOTH = 0.0, 1.0
 
 
-def settle_torque(fit: GapFit) -> GapFit:
+def settle_torque(fit: Fit) -> Fit:
     """Return the fit under the one reading of each record's torque that explains it, where only one does."""
     names = fit.likelihood.problem.names
     for place in [n for n, name in enumerate(names) if name.partition("@")[0] == SAMPLED and n in fit.free]:
@@ -17,7 +17,7 @@ def settle_torque(fit: GapFit) -> GapFit:
     return fit
 
 
-def _refit(fit: GapFit, place: int, reading: float) -> GapFit:
+def _refit(fit: Fit, place: int, reading: float) -> Fit:
     """Return the fit, its values moved, with a reading of the torque at ``place`` of the unknowns."""
     problem = fit.likelihood.problem.with_unknown(place, mean=reading, lower=reading, upper=reading)
     likelihood = fit.likelihood.with_options(problem=problem)

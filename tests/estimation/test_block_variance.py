@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.estimation.description import block_variance
-from orchestrator.estimation.problem import Unknown, UnknownProblem
+from orchestrator.estimation.problem import GapProblem, Unknown
 
 ROWS, BLOCKS = 2000, 20
 
@@ -14,7 +14,7 @@ ROWS, BLOCKS = 2000, 20
 def fit_at(theta: list[float], information: np.ndarray, scores: np.ndarray) -> SimpleNamespace:
     """A fit of two unknowns, the second of which lies between 0 and 1."""
     unknowns = (Unknown("alpha", 0.0, np.inf, 1.0, 0.0, 3.0), Unknown("level", 0.0, np.inf, 1.0, 0.0, 1.0))
-    problem = UnknownProblem(record=None, unknowns=unknowns, outputs=np.zeros((ROWS, 1)), sliding=(1.0, 1.0))
+    problem = GapProblem(None, unknowns, np.zeros((ROWS, 1)), (1.0, 1.0), {}, ())
     likelihood = SimpleNamespace(problem=problem, scores=lambda point, free: scores)
     point = SimpleNamespace(theta=np.array(theta))
     return SimpleNamespace(likelihood=likelihood, point=point, free=np.arange(2), information=information)

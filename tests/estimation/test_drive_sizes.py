@@ -62,7 +62,7 @@ def test_a_stiff_shaft_is_found_wherever_the_zeros_of_the_encoders_lie(tmp_path:
 def test_levels_of_noise_at_the_load_follow_the_gear() -> None:
     record, model = _weak(1.0)
     geared = replace(model, parameters=model.parameters | {"i": replace(model.parameters["i"], value=100.0)})
-    plain, high = (make_problem(record, one).torque_units for one in (model, geared))
+    plain, high = (make_problem(record, one).units for one in (model, geared))
     assert plain[0] == high[0] < 1.0
     assert plain[1] == pytest.approx(plain[0], rel=0.01)
     assert high[1] == pytest.approx(100.0 * 3.0 * high[0] / 80.0, rel=0.01)  # of 80 N.m, which is much for the thesis's

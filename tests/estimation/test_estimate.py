@@ -12,7 +12,7 @@ from benchmarks.simulated import model_of
 from orchestrator.cli import main
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao
-from orchestrator.estimation.design import SEARCHED, MachineLimits, design
+from orchestrator.estimation.design import SEARCHED, MachineLimits, design, plant_of
 from orchestrator.estimation.filter.innovations import innovations, simulate
 from orchestrator.estimation.filter.model import NoiseLevels, affine_model
 from orchestrator.estimation.likelihood import Likelihood, maximise
@@ -25,7 +25,6 @@ from orchestrator.records.record import Record, record_from_columns
 from orchestrator.shared.results import as_plain, read
 from orchestrator.shared.results.estimate import EstimateFound
 from pyfmu_sources.drivetrain.equations import DEFAULTS
-from pyfmu_sources.laws.parameter_rows import with_values
 from tests.support.hidden_effects import one_encoder_case
 from tests.support.independent_plant import make_record, write_csv
 from tests.support.online_loop import run_case
@@ -52,7 +51,7 @@ def fitted(exact: tuple[Record, dict]):
 def test_the_filter_without_noise_is_the_plant() -> None:
     record, truth = _record(0.01, 4, contact="dead_zone", noise=(0.0, 0.0), counts=None)
     assert record.theta_l is not None
-    plant = affine_model(with_values(DEFAULTS, {**truth["linear"], "alpha": 0.01}))
+    plant = affine_model({**DEFAULTS._asdict(), **truth["linear"], "alpha": 0.01})
     states = simulate(plant, record.u, record.step, np.zeros(5))
     np.testing.assert_allclose(states, truth["states"][:, :5], atol=1e-8)
     outputs = np.column_stack([record.theta_m, record.theta_l])
@@ -134,7 +133,7 @@ def test_the_motor_encoder_of_a_weak_drive_is_enough(whole: bool) -> None:
     """A loop that asks for 0.3 N.m: torque noise that a strong drive hardly feels would hide all of the motion."""
     case = one_encoder_case(715003, 8.0)
     problem = make_problem(case.record, model_of(case))
-    assert problem.torque_units[0] == pytest.approx(0.1, rel=0.5)
+    assert problem.units[0] == pytest.approx(0.1, rel=0.5)
     if not whole:
         return
     fit = fit_record(Likelihood(problem))
@@ -192,7 +191,7 @@ def test_the_twin_is_the_fmu(tmp_path: Path) -> None:
     file.write_text('[parameters]\nJ_l.value = 5.0\nalpha.value = 0.01\n"effects.load_torque.torque".value = 3.0\n')
     model = read_model(file)
     angle = paired_sum.twin(record, model, {"theta_m_start": 0.04, "theta_l_start": 0.01})
-    plant = affine_model(type(DEFAULTS)._make(model.values)._replace(alpha=0.0))
+    plant = plant_of(model, 0.0)
     expected = simulate(plant, record.u, record.step, np.array([0.04, 0.0, 0.01, 0.0, 0.0]))
     np.testing.assert_allclose(angle, expected[:, 2], atol=1e-9)
 

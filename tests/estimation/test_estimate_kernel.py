@@ -26,7 +26,7 @@ def advanced(model, x):
     [(0.0, 0.5, 0.1, 0), (0.9, 4.0, -0.5, 1), (-0.9, -4.0, 0.5, 1), (1.05, -4.0, 0.5, 1), (0.5, 60.0, 0.0, 1)],
 )
 def test_the_jacobian_is_the_derivative_also_across_contact_events(twist, omega_m, omega_l, events):
-    model = affine_model(parameters(alpha=0.01, c=20.0))
+    model = affine_model(parameters(alpha=0.01, c=20.0)._asdict())
     load = 0.3
     motor = 3.984 * (load + twist * 0.01)
     x = np.array([motor, omega_m, load, omega_l, 25.0])
@@ -42,7 +42,7 @@ def test_the_jacobian_is_the_derivative_also_across_contact_events(twist, omega_
 
 @pytest.mark.parametrize("twist", [-0.016, -0.004, 0.0, 0.007, 0.012])
 def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
-    model = affine_model(parameters(alpha=0.01, c=0.0))
+    model = affine_model(parameters(alpha=0.01, c=0.0)._asdict())
     x = np.array([3.984 * (0.3 + twist), 0.0, 0.3, 0.0, 25.0])
     covariance = np.diag([1e-4, 0.0, 3e-5, 0.0, 0.0])
     deviation = np.sqrt(model.normals[0] ** 2 @ np.diag(covariance) + BLUR**2)
@@ -64,7 +64,7 @@ def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
 @pytest.mark.parametrize("lag", [1.0, 5e-3, 2e-4, 6e-5, 5e-6])
 def test_the_transition_is_exact_for_a_drive_of_any_lag(lag):
     """A lag of a thousandth of a sample too: the series of the whole sample would have lost every digit."""
-    model = affine_model(parameters(J_m=0.002, J_l=0.3, k=900.0, c=1.0, b_m=0.003, b_l=0.1, i=12.0, tau=lag))
+    model = affine_model(parameters(J_m=0.002, J_l=0.3, k=900.0, c=1.0, b_m=0.003, b_l=0.1, i=12.0, tau=lag)._asdict())
     *_, phi, gain, gain_1 = _arrays(model, STEP)
     for mode in range(3):
         whole = np.zeros((7, 7))

@@ -6,7 +6,7 @@ from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
 from orchestrator.estimation.filter.innovations import Innovations, innovations, simulate
-from orchestrator.estimation.filter.model import FADING, NoiseLevels, affine_model, row_model
+from orchestrator.estimation.filter.model import FADING, IMPULSE, LOAD_TORQUE, NoiseLevels, affine_model
 from pyfmu_sources.drivetrain import contact, drivetrain
 from pyfmu_sources.drivetrain import equations as dt
 
@@ -18,7 +18,7 @@ START = np.array([0.1, 0.5, 0.02, 0.1, 2.0])
 
 def joint(y: np.ndarray, p: tuple[float, ...]) -> float:
     """Return twice the negative log density of a record, without 2 pi, from its mean and covariance as a whole."""
-    model = affine_model(p)
+    model = affine_model(p._asdict())
     A, b, outputs = model.matrices[2], model.inputs[0], y.shape[1]
     block = np.zeros((6, 6))
     block[:5, :5], block[:5, 5] = A * H, b * H
@@ -51,7 +51,7 @@ def joint(y: np.ndarray, p: tuple[float, ...]) -> float:
 @pytest.mark.parametrize("outputs", [1, 2])
 def test_the_deviance_is_that_of_the_whole_record(outputs: int) -> None:
     p = dt.parameters(alpha=0.0)
-    model = affine_model(p)
+    model = affine_model(p._asdict())
     rng = np.random.default_rng(1)
     exact = simulate(model, U, H, START)[: len(U), [0, 2][:outputs]]
     y = exact + 1e-3 * rng.standard_normal(exact.shape)
@@ -76,7 +76,8 @@ def test_without_noise_in_the_torque_errors_are_those_of_the_exact_plant() -> No
         x, mode = drivetrain.advance(x, mode, p, float(u), 0.0, H, whole)
     exact = np.array(states)
     y = exact[:, [0, 2]] + [[1e-4, -2e-4]]
-    found = innovations(affine_model(p), torque, y, H, np.zeros(5), NoiseLevels((1e-3, 1e-3), (0.0, 0.0)), keep=True)
+    model, noise = affine_model(p._asdict()), NoiseLevels((1e-3, 1e-3), (0.0, 0.0))
+    found = innovations(model, torque, y, H, np.zeros(5), noise, keep=True)
     assert np.allclose(found.errors, [[1e-4, -2e-4]], atol=1e-9)
     assert np.allclose(found.variances, 1e-6, atol=1e-15)
     assert np.allclose(found.states, exact[:, :5], atol=1e-7)
@@ -85,11 +86,11 @@ def test_without_noise_in_the_torque_errors_are_those_of_the_exact_plant() -> No
     flank = np.where(twist > 0.004, 1, np.where(twist < -0.004, -1, 0))
     assert np.array_equal(found.contacts[clear, 0], flank[clear])
     assert {-1, 0, 1} <= set(found.contacts[:, 0].tolist())
-    assert np.allclose(simulate(affine_model(p), torque, H, np.zeros(5))[: len(y)], exact[:, :5], atol=1e-9)
+    assert np.allclose(simulate(model, torque, H, np.zeros(5))[: len(y)], exact[:, :5], atol=1e-9)
 
 
 def test_nothing_is_kept_unless_asked_for() -> None:
-    found = innovations(affine_model(dt.parameters()), U, np.zeros((30, 1)), H, START, NOISE)
+    found = innovations(affine_model(dt.parameters()._asdict()), U, np.zeros((30, 1)), H, START, NOISE)
     assert found.states.shape == (0, 5)
     assert found.contacts.shape == (0, 1)
     assert found.errors.shape == (30, 1)
@@ -97,7 +98,7 @@ def test_nothing_is_kept_unless_asked_for() -> None:
 
 def test_modes_by_hand() -> None:
     p = dt.parameters(alpha=0.01, J_m=0.5, J_l=5.0, k=3000.0, c=2.0, b_m=0.1, b_l=1.0, i=4.0, tau=0.5)
-    model = affine_model(p)
+    model = affine_model(p._asdict())
     assert np.allclose(model.matrices[2][1], [-3000 / (0.5 * 16), -(2 / 16 + 0.1) / 0.5, 3000 / (0.5 * 4), 1.0, 2.0])
     assert np.allclose(model.matrices[2][3], [3000 / (5 * 4), 2 / (5 * 4), -600.0, -0.6, 0.0])
     assert np.allclose(model.matrices[1][1], [0.0, -0.2, 0.0, 0.0, 2.0])
@@ -109,15 +110,14 @@ def test_modes_by_hand() -> None:
     assert np.allclose(model.normals, [[0.25, 0, -1, 0, 0]])
     assert np.allclose(model.mobility, [2.0, 0.2])
     assert model.halves == 0.01
-    row = row_model(*map(np.array, ([0.5, 5.0], [0.1, 1.0], [4.0], [3000.0], [2.0])), 0.5, np.array([0.01]), model.dry)
-    for name in ("matrices", "inputs", "constants", "normals", "halves", "mobility", "jumps"):
-        assert np.allclose(getattr(row, name), getattr(model, name)), name
+    pulled = affine_model(p._asdict() | {LOAD_TORQUE: 10.0})
+    assert np.allclose(pulled.constants - model.constants, [0.0, 0.0, 0.0, -2.0, 0.0])
 
 
 def test_dry_friction_stops_a_body_and_takes_what_it_takes() -> None:
     """Two free bodies (a gap never closed): each is slowed by F / J, then rests; a torque below friction moves none."""
     p = dt.parameters(alpha=10.0, b_m=0.0, b_l=0.0)
-    model = affine_model(p, dry=np.array([[2.0, 1e-4], [7.0, 1e-4]]))
+    model = affine_model(p._asdict(), dry=np.array([[2.0, 1e-4], [7.0, 1e-4]]))
     start = np.array([0.0, 1.0, 0.0, -1.0, 0.0])
     states = simulate(model, np.zeros(400), H, start)
     times = H * np.arange(400)
@@ -135,21 +135,22 @@ def test_dry_friction_is_not_seen() -> None:
     rough = dt.with_values(
         dt.parameters(alpha=0.01), {f"effects.coulomb_friction.{s}.torque": 2.0 for s in ("motor", "load")}
     )
-    smooth, seen = affine_model(dt.parameters(alpha=0.01)), affine_model(rough)
+    smooth, seen = (affine_model(p._asdict()) for p in (dt.parameters(alpha=0.01), rough))
     assert np.array_equal(seen.constants, smooth.constants)
     assert np.array_equal(seen.matrices, smooth.matrices)
     assert np.array_equal(seen.inputs, smooth.inputs)
 
 
 def test_the_impulse_of_a_contact_fades_with_the_gap() -> None:
-    wide = affine_model(dt.parameters(alpha=1.0), 3.0).jumps[0]
+    pushed = {IMPULSE: 3.0}
+    wide = affine_model(dt.parameters(alpha=1.0)._asdict() | pushed).jumps[0]
     assert wide == pytest.approx([0.0, 3.0 / 0.4 / 3.984, 0.0, -3.0 / 5.6, 0.0], rel=1e-5)
-    narrow = affine_model(dt.parameters(alpha=FADING), 3.0).jumps[0]
+    narrow = affine_model(dt.parameters(alpha=FADING)._asdict() | pushed).jumps[0]
     assert narrow == pytest.approx(wide / np.sqrt(2.0), rel=1e-5)
-    assert not affine_model(dt.parameters(alpha=0.0), 3.0).jumps.any()
+    assert not affine_model(dt.parameters(alpha=0.0)._asdict() | pushed).jumps.any()
 
 
 def test_blurred_flanks_change_what_is_expected() -> None:
     p, y = dt.parameters(alpha=0.004), np.zeros((30, 2))
-    sharp, soft = (innovations(affine_model(p), U, y, H, START, NOISE, soft=soft) for soft in (False, True))
+    sharp, soft = (innovations(affine_model(p._asdict()), U, y, H, START, NOISE, soft=soft) for soft in (False, True))
     assert not np.allclose(sharp.errors, soft.errors, atol=1e-6)

@@ -13,11 +13,11 @@ from orchestrator.building.translation.kernel_arrays import plain_array
 from orchestrator.cli import main
 from orchestrator.estimation.filter.held_torque import delay
 from orchestrator.estimation.filter.innovations import KERNELS, _arrays
-from orchestrator.estimation.filter.model import row_model
+from orchestrator.estimation.filter.model import TRAIN, affine_model
+from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.problem import OFFSET
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.estimation.stages.fit import fit_stages, look_nearby, move_share
-from orchestrator.estimation.stages.likelihood import StagesLikelihood
 from orchestrator.estimation.stages.location import locate
 from orchestrator.estimation.stages.problem import SHARE, TOTAL, make_problem
 from orchestrator.records.record import record_from_columns
@@ -36,10 +36,8 @@ def model_of(folder, share, more=""):
 
 def train():
     """Return the arrays that ``propagate`` takes, of the nominal train with a gap in both stages."""
-    inertias, drags = (np.array([NOMINAL[f"{n}_{body}"] for body in "msl"]) for n in "Jb")
-    ratios, stiffnesses, dampings = (np.array([NOMINAL[f"{n}_{stage}"] for stage in (1, 2)]) for n in "ikc")
-    model = row_model(inertias, drags, ratios, stiffnesses, dampings, LAG, np.array(HALVES), np.zeros((2, 2)))
-    return _arrays(model, STEP)
+    halves = {f"alpha_{stage}": half for stage, half in enumerate(HALVES, start=1)}
+    return _arrays(affine_model(NOMINAL | halves | {"tau": LAG}, TRAIN), STEP)
 
 
 def advanced(arrays, x):
@@ -106,7 +104,7 @@ def test_a_late_torque_is_the_held_one_moved():
 def likelihood_of(folder, effects, seed, share, **given):
     columns, truth = make_two_stage_record(effects, seed, share=share, **given)
     model = oc.read_model(model_of(folder, share))
-    return StagesLikelihood(make_problem(record_from_columns(columns, "record"), model)), truth
+    return Likelihood(make_problem(record_from_columns(columns, "record"), model)), truth
 
 
 def test_at_the_truth_the_innovations_are_white(tmp_path):

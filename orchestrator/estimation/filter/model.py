@@ -1,18 +1,15 @@
 """Drivetrains as the filter takes them: affine modes, dry friction, noise levels."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pyfmu_sources.drivetrain.equations import DrivetrainParameters, State, rates
-from pyfmu_sources.laws.backlash_models import DEAD_ZONE
-from pyfmu_sources.laws.parameter_rows import BIG
-
 Array = NDArray[np.float64]
-STATES = 5
+LOAD_TORQUE = "effects.load_torque.torque"
+IMPULSE = "contact_impulse"
 FADING = 1e-3  # rad, half-gap below which the impulse of a contact fades
 
 
@@ -46,59 +43,45 @@ class AffineModel:
         return self.halves.size
 
 
+@dataclass(frozen=True)
+class BodyNames:
+    """How the parameters of bodies in a row are named: inertia ``J_`` and drag ``b_`` of each body, ``i``, ``k``, ``c``
+    and ``alpha`` of each stage, at its output."""
+
+    bodies: str
+    stages: tuple[str, ...]
+
+
+DRIVETRAIN, TRAIN = BodyNames("ml", ("",)), BodyNames("msl", ("_1", "_2"))
 NO_FRICTION = np.zeros((2, 2))
 
 
-def affine_model(values: Sequence[float], impulse: float = 0.0, dry: Array = NO_FRICTION) -> AffineModel:
-    """Return the smooth modes of the dead-zone drivetrain with parameters ``values``; its effects are not seen.
-
-    ``impulse`` [N.m.s] is what the shaft lacks at the load when the teeth touch, and has too much when they part,
-    beside a damper ``c`` that acts from the first moment of contact on: half of ``c`` times the depth within which a
-    real contact's damping sets in (Hunt and Crossley 1975). It fades with the gap: without one, nothing touches.
-    """
-    p = DrivetrainParameters._make(values)._replace(
-        backlash_model=float(DEAD_ZONE), drive_filter_time_constant=0.0, rate_limit_rate=BIG
-    )
-    matrices, constants = np.zeros((3, STATES, STATES)), np.zeros((3, STATES))
-    zero = _unit(STATES)
-    for flank in (-1, 0, 1):
-        constants[flank + 1] = rates(zero, flank, 0.0, 0.0, p, 0.0, 0.0)[:STATES]
-    for mode in (1, 2):
-        for n in range(STATES):
-            matrices[mode, :, n] = rates(_unit(n), mode - 1, 0.0, 0.0, p, 0.0, 0.0)[:STATES] - constants[mode]
-    matrices[0] = matrices[2]
-    asked = rates(zero, 1, 0.0, 0.0, p, 1.0, 0.0)
-    mobility = np.array([1.0 / p.J_m, 1.0 / p.J_l])
-    inputs = _friction_inputs(np.array(asked[:STATES]) - constants[2], mobility)
-    normals = np.array([[1.0 / p.i, 0.0, -1.0, 0.0, 0.0]])
-    faded = impulse * p.alpha / math.hypot(p.alpha, FADING)
-    jumps = faded * np.array([[0.0, mobility[0] / p.i, 0.0, -mobility[1], 0.0]])
-    return AffineModel(matrices, inputs, constants, normals, np.array([p.alpha]), mobility, jumps, dry)
-
-
-def row_model(
-    inertias: Array, drags: Array, ratios: Array, stiffnesses: Array, dampings: Array, lag: float, halves: Array,
-    dry: Array,
-) -> AffineModel:  # fmt: skip
+def affine_model(p: Mapping[str, float], row: BodyNames = DRIVETRAIN, dry: Array = NO_FRICTION) -> AffineModel:
     """Return the smooth modes of bodies in a row, of which each gear drives the next through a shaft with a gap.
 
     Args:
-        inertias: (bodies,) [kg.m2], drags: (bodies,) [N.m.s/rad].
-        ratios: (stages,), stiffnesses: (stages,) [N.m/rad], dampings: (stages,) [N.m.s/rad], halves: (stages,) [rad],
-            all at the stages' outputs.
-        lag: of the drive [s].
+        p: parameters of the plant by name, of which effects are not seen, but for a constant ``LOAD_TORQUE`` [N.m]; and
+            ``IMPULSE`` [N.m.s]: what the last shaft lacks at the load when the teeth touch, and has too much when they
+            part, beside a damper ``c`` that acts from the first moment of contact on: half of ``c`` times the depth
+            within which a real contact's damping sets in (Hunt and Crossley 1975). It fades with the gap: without one,
+            nothing touches.
     """
+    inertias, drags = (np.array([p[f"{name}_{body}"] for body in row.bodies]) for name in "Jb")
+    ratios, stiffnesses, dampings, halves = (
+        np.array([p[name + stage] for stage in row.stages]) for name in ("i", "k", "c", "alpha")
+    )
     bodies, stages, n = inertias.size, halves.size, 2 * inertias.size + 1
-    normals = np.zeros((stages, n))
+    normals, pushes = np.zeros((stages, n)), np.zeros((stages, n))
     base = np.zeros((n, n))
     for body in range(bodies):
         base[2 * body, 2 * body + 1] = 1.0
         base[2 * body + 1, 2 * body + 1] = -drags[body] / inertias[body]
-    base[1, n - 1], base[n - 1, n - 1] = 1.0 / inertias[0], -1.0 / lag
+    base[1, n - 1], base[n - 1, n - 1] = 1.0 / inertias[0], -1.0 / p["tau"]
     matrices, constants = np.tile(base, (3**stages, 1, 1)), np.zeros((3**stages, n))
+    constants[:, n - 2] = -p.get(LOAD_TORQUE, 0.0) / inertias[-1]
     for stage in range(stages):
         normals[stage, 2 * stage], normals[stage, 2 * stage + 2] = 1.0 / ratios[stage], -1.0
-        push = np.zeros(n)  # accelerations by the shaft's torque
+        push = pushes[stage]  # accelerations by the shaft's torque
         push[2 * stage + 1] = -1.0 / (ratios[stage] * inertias[stage])
         push[2 * stage + 3] = 1.0 / inertias[stage + 1]
         wound = stiffnesses[stage] * normals[stage] + dampings[stage] * np.roll(normals[stage], 1)
@@ -107,23 +90,11 @@ def row_model(
             if flank:
                 matrices[mode] += np.outer(push, wound)
                 constants[mode] -= push * stiffnesses[stage] * flank * halves[stage]
-    asked = np.zeros(n)
-    asked[n - 1] = 1.0 / lag
-    inputs = _friction_inputs(asked, 1.0 / inertias)
-    return AffineModel(matrices, inputs, constants, normals, halves, 1.0 / inertias, np.zeros((stages, n)), dry)
-
-
-def _friction_inputs(asked: Array, mobility: Array) -> Array:
-    """Return the effects (3, n) of the request, and of torques on motor and load."""
-    inputs = np.zeros((3, asked.size))
-    inputs[0] = asked
-    inputs[1, 1], inputs[2, -2] = mobility[0], mobility[-1]
-    return inputs
-
-
-def _unit(n: int) -> State:
-    a, b, c, d, e = (1.0 if m == n else 0.0 for m in range(STATES))
-    return (a, b, c, d, e, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    inputs = np.zeros((3, n))
+    inputs[0, n - 1], inputs[1, 1], inputs[2, n - 2] = 1.0 / p["tau"], 1.0 / inertias[0], 1.0 / inertias[-1]
+    jumps = np.zeros((stages, n))
+    jumps[-1] = -p.get(IMPULSE, 0.0) * halves[-1] / math.hypot(halves[-1], FADING) * pushes[-1]
+    return AffineModel(matrices, inputs, constants, normals, halves, 1.0 / inertias, jumps, dry)
 
 
 @dataclass(frozen=True)

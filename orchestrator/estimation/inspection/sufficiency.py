@@ -7,9 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.errors import RecordError
-from orchestrator.estimation.design import Excitation, MachineLimits, error_bound_of_excitation, simple_candidates
+from orchestrator.estimation.design import (
+    Excitation,
+    MachineLimits,
+    error_bound_of_excitation,
+    plant_of,
+    simple_candidates,
+)
 from orchestrator.estimation.filter.innovations import count_traversals, simulate
-from orchestrator.estimation.filter.model import affine_model
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.estimation.signals import sides_of
@@ -17,7 +22,6 @@ from orchestrator.plants.known.two_stage_train import TRAIN
 from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible, smooth, smooth_rows
 from orchestrator.records.record import Record
-from pyfmu_sources.drivetrain.equations import DrivetrainParameters
 
 SIZES = (5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05)  # rad, half-gaps that are tried
 MOST_ROWS = 3000  # for one bound
@@ -149,9 +153,8 @@ def _other_sign(record: Record, model: Model) -> float:
 
 def _traversals(model: Model, record: Record, size: float) -> int:
     """Return how often the model's plant, driven by the record's torque from rest, goes through a half-gap [rad]."""
-    p = DrivetrainParameters._make(model.values)._replace(alpha=size)
-    states = simulate(affine_model(p), record.u, record.step, np.zeros(5))
-    twist = states[:, 0] / p.i - states[:, 2]
+    states = simulate(plant_of(model, size), record.u, record.step, np.zeros(5))
+    twist = states[:, 0] / model.parameters["i"].value - states[:, 2]
     return count_traversals(sides_of(twist, size))
 
 

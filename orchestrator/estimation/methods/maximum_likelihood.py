@@ -21,7 +21,7 @@ from orchestrator.estimation.effort import Effort, Stop, StoppedError, never
 from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
-from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
+from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
 from orchestrator.estimation.problem import (
     DRY,
     IMPULSE,
@@ -88,7 +88,7 @@ def estimate(
     return by_record(found, records) if more else found
 
 
-def _fit(records: Sequence[Record], model: Model, threads: int, likelihood: Likelihood, report: Report) -> GapFit:
+def _fit(records: Sequence[Record], model: Model, threads: int, likelihood: Likelihood, report: Report) -> Fit:
     """Return the fit of all unknowns to all rows."""
     settings, fit = likelihood.settings, None
     if sum(one.size for one in records) > settings.fit.long_record:
@@ -103,7 +103,7 @@ def _fit(records: Sequence[Record], model: Model, threads: int, likelihood: Like
     return fit
 
 
-def _on_all_rows(fit: GapFit, likelihood: Likelihood) -> GapFit:
+def _on_all_rows(fit: Fit, likelihood: Likelihood) -> Fit:
     """Return a fit, perhaps of the beginning, as one of all rows; nothing ends what is still to be run."""
     whole = likelihood.with_options(soft=fit.likelihood.soft, effort=Effort())
     return replace(fit, likelihood=whole, point=whole.at(fit.point.theta))
@@ -118,7 +118,7 @@ def _likelihood(
     return Likelihood(first, threads, settings, effort)
 
 
-def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit | None:
+def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> Fit | None:
     """Return the fit that starts from that of the beginning; None where the beginning does not show the gap."""
     first = fit_record(short)
     short = first.likelihood
@@ -135,7 +135,7 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit
     return _with_contact(best) if likelihood.problem.outputs.shape[1] == 2 else best
 
 
-def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
+def fit_record(likelihood: Likelihood, report: Report = _quiet) -> Fit:
     """Return the fit of all unknowns, by grid and continuation in the torque noise."""
     problem = likelihood.problem
     report("trying sizes", 0.0)
@@ -151,11 +151,11 @@ def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
     return _free_fit(_fit_one_encoder(likelihood))
 
 
-def _objective(fit: GapFit) -> float:
+def _objective(fit: Fit) -> float:
     return fit.point.objective
 
 
-def _with_contact(best: GapFit) -> GapFit:
+def _with_contact(best: Fit) -> Fit:
     """Return the fit, with a least torque noise where the machine's contact law is not the model's."""
     likelihood, impulse = best.likelihood, best.parameters()[IMPULSE]
     is_clear = abs(impulse["value"]) > likelihood.settings.fit.clear_impulse * impulse["standard_error"]
@@ -167,7 +167,7 @@ def _with_contact(best: GapFit) -> GapFit:
     )
 
 
-def _fit_long(likelihood: Likelihood, start: Array) -> GapFit:
+def _fit_long(likelihood: Likelihood, start: Array) -> Fit:
     """Return the fit with the torque noise free that starts from a vector near it."""
     best = maximise(likelihood, start, likelihood.others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
     return _free_fit(best)
@@ -176,18 +176,23 @@ def _fit_long(likelihood: Likelihood, start: Array) -> GapFit:
 def _has_least_noise(likelihood: Likelihood) -> bool:
     """Return whether the torque noise is kept above what an inexact model needs."""
     problem = likelihood.problem
-    return problem.unknowns[problem.index("log_torque_load")].lower >= math.log(problem.least_where_inexact[-1])
+    return problem.unknowns[problem.index("log_torque_load")].lower >= math.log(_least_noise(likelihood)[-1])
 
 
 def _with_least_noise(likelihood: Likelihood) -> Likelihood:
     """Return the likelihood with the torque noise kept above what an inexact model needs."""
     problem = likelihood.problem
-    for side, least in zip(("motor", "load"), problem.least_where_inexact, strict=True):
+    for side, least in zip(("motor", "load"), _least_noise(likelihood), strict=True):
         problem = problem.with_unknown(problem.index(f"log_torque_{side}"), lower=math.log(least))
     return likelihood.with_options(problem=problem)
 
 
-def _continue(best: GapFit, levels: Sequence[tuple[float, float]]) -> GapFit:
+def _least_noise(likelihood: Likelihood) -> tuple[float, float]:
+    """Return the least torque noise at motor and load [N.m.s^0.5] that keeps an inexact model honest."""
+    return scale_noise(LEAST_WHERE_INEXACT, likelihood.problem.units)
+
+
+def _continue(best: Fit, levels: Sequence[tuple[float, float]]) -> Fit:
     """Return the last fit that paid while the torque noise goes through ``levels``."""
     failures, least = 0, best.point.objective
     for level in levels:
@@ -202,21 +207,21 @@ def _continue(best: GapFit, levels: Sequence[tuple[float, float]]) -> GapFit:
     return best
 
 
-def _fit_at_level(fit: GapFit, level: tuple[float, float], tolerance: float) -> GapFit:
+def _fit_at_level(fit: Fit, level: tuple[float, float], tolerance: float) -> Fit:
     """Return the fit at a level of torque noise that starts from another."""
     likelihood, start = fit.likelihood, fit.point.theta.copy()
     start[likelihood.torque_places] = np.log(level)
     return maximise(likelihood, start, likelihood.others, likelihood.settings.fit.steps_per_level, tolerance)
 
 
-def _fit_one_encoder(likelihood: Likelihood) -> GapFit:
+def _fit_one_encoder(likelihood: Likelihood) -> Fit:
     """Return the best fit with little torque noise.
 
     The flanks are blurred at first and sharpened then. The second start of the grid is tried where the first one does
     not get down to little noise. Where no fit with sharp flanks comes up to a blurred one, that one stays, with the
     wide interval that it deserves.
     """
-    found: list[GapFit] = []
+    found: list[Fit] = []
     blur = _levels(likelihood, BLURRED)
     for first in _first_fits(likelihood.with_options(soft=True), np.log(blur[0]))[:2]:
         blurred = _continue(first, blur[1:])
@@ -226,12 +231,12 @@ def _fit_one_encoder(likelihood: Likelihood) -> GapFit:
     return min(found, key=_objective)
 
 
-def _sharpen(blurred: GapFit) -> GapFit:
+def _sharpen(blurred: Fit) -> Fit:
     """Return the fit with sharp flanks that starts from one with ``blurred`` flanks.
 
     Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it.
     """
-    fits: list[GapFit] = []
+    fits: list[Fit] = []
     levels = _levels(blurred.likelihood, MOTOR_ENCODER)
     blurred = replace(blurred, likelihood=blurred.likelihood.with_options(soft=False))
     for place in SHARP_STARTS:
@@ -243,16 +248,16 @@ def _sharpen(blurred: GapFit) -> GapFit:
 
 def _levels(likelihood: Likelihood, levels: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Return levels of torque noise as the strength of the record's drive asks for."""
-    return [scale_noise(level, likelihood.problem.torque_units) for level in levels]
+    return [scale_noise(level, likelihood.problem.units) for level in levels]
 
 
-def _is_calm(fit: GapFit) -> bool:
+def _is_calm(fit: Fit) -> bool:
     """Tell whether a fit of one encoder gets down to as little torque noise at the load as a right one does."""
-    most = fit.likelihood.problem.torque_units[1] * fit.likelihood.settings.fit.calm_torque_noise
+    most = fit.likelihood.problem.units[1] * fit.likelihood.settings.fit.calm_torque_noise
     return fit.likelihood.noise(fit.point.theta).torque[1] <= most
 
 
-def _first_fits(likelihood: Likelihood, level: Array) -> list[GapFit]:
+def _first_fits(likelihood: Likelihood, level: Array) -> list[Fit]:
     """Return fits at high torque noise (its logarithm ``level``), the best first.
 
     They start from the two best places of a grid of alpha and from the smallest size that is about as good: where the
@@ -273,7 +278,7 @@ def _first_fits(likelihood: Likelihood, level: Array) -> list[GapFit]:
     smallest = next(point for point in points if point.objective < best + likelihood.settings.fit.about_as_good)
     if all(smallest is not start for start in starts):
         starts.append(smallest)
-    fits: list[GapFit] = []
+    fits: list[Fit] = []
     # A first step of these too may leave the size behind for good.
     held = {SCALE, TORQUE_OFFSET, LATE, LOAD_TORQUE, *DRY}
     early = [n for n in likelihood.others if problem.names[n] not in held]
@@ -283,9 +288,9 @@ def _first_fits(likelihood: Likelihood, level: Array) -> list[GapFit]:
     return sorted(fits, key=_objective)
 
 
-def _different(fits: list[GapFit], ratio: float) -> list[GapFit]:
+def _different(fits: list[Fit], ratio: float) -> list[Fit]:
     """Return the fits of which no better one has about the same size."""
-    chosen: list[GapFit] = []
+    chosen: list[Fit] = []
     for fit in fits:
         sizes = [(max(fit.size, other.size), min(fit.size, other.size)) for other in chosen]
         if all(larger > ratio * smaller + GRID[1] for larger, smaller in sizes):
@@ -293,7 +298,7 @@ def _different(fits: list[GapFit], ratio: float) -> list[GapFit]:
     return chosen
 
 
-def _free_fit(best: GapFit) -> GapFit:
+def _free_fit(best: Fit) -> Fit:
     """Return the fit with the torque noise free, except where the record cannot tell it from none."""
     likelihood = best.likelihood
     _, information, likelihood = likelihood.derivatives(best.point, np.array(likelihood.torque_places))

@@ -17,10 +17,9 @@ from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import block_variance
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
-from orchestrator.estimation.likelihood import Fit, Point, maximise
+from orchestrator.estimation.likelihood import Fit, Likelihood, Point, maximise
 from orchestrator.estimation.settings import StageSettings
-from orchestrator.estimation.stages.likelihood import StagesLikelihood
-from orchestrator.estimation.stages.problem import BODIES, SHARE, TOTAL, TWIST
+from orchestrator.estimation.stages.problem import BODIES, GAPS, SHARE, TOTAL, TWIST
 
 GRID = tuple(1e-3 * 1.4**n for n in range(18))  # rad, to a third of a radian
 SHARES = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
@@ -32,7 +31,6 @@ SHARES_BETWEEN = 13  # that a rough fit of both tries
 SHARES_NEARBY, NEARBY = 24, 6.0  # that a fit tries about its own, to so many standard deviations of it
 NOISE_STEPS = (-3.0, -1.0, 1.0)  # of a logarithm
 
-StagesFit = Fit[StagesLikelihood]
 Report = Callable[[str, float], None]
 
 
@@ -44,14 +42,14 @@ class StageFits:
         shared: every optimum with a gap in both stages that was found.
     """
 
-    first: StagesFit
-    second: StagesFit
-    both: StagesFit
-    free: StagesFit
-    shared: tuple[StagesFit, ...]
+    first: Fit
+    second: Fit
+    both: Fit
+    free: Fit
+    shared: tuple[Fit, ...]
 
 
-def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Report) -> StageFits:
+def fit_stages(likelihood: Likelihood, settings: StageSettings, report: Report) -> StageFits:
     """Return the fits of a record; ``report`` is called with what is done, and the share of the work behind."""
     report("trying sizes", 0.0)
     coarse = _fit_size(likelihood)
@@ -98,7 +96,7 @@ def fit_stages(likelihood: StagesLikelihood, settings: StageSettings, report: Re
     return StageFits(singles[0], singles[1], both, free, tuple(found))
 
 
-def _begin_anew(single: StagesFit, free: StagesFit, share: float, hopeless: float) -> StagesFit:
+def _begin_anew(single: Fit, free: Fit, share: float, hopeless: float) -> Fit:
     """Return the fit of a single gap, begun anew from the free fit unless it is hopelessly far behind that."""
     if 0.5 * (single.point.objective - free.point.objective) >= hopeless:
         return single
@@ -106,11 +104,11 @@ def _begin_anew(single: StagesFit, free: StagesFit, share: float, hopeless: floa
     return _better(single, _finish(free.likelihood, start, _all_but(free.likelihood, SHARE)))
 
 
-def _better(*fits: StagesFit) -> StagesFit:
+def _better(*fits: Fit) -> Fit:
     return min(fits, key=lambda fit: fit.point.objective)
 
 
-def _free(likelihood: StagesLikelihood, *fits: StagesFit) -> StagesFit:
+def _free(likelihood: Likelihood, *fits: Fit) -> Fit:
     """Return the fit with the share free that starts from the best."""
     best = _better(*fits)
     return maximise(
@@ -118,25 +116,25 @@ def _free(likelihood: StagesLikelihood, *fits: StagesFit) -> StagesFit:
     )
 
 
-def _scatter(fit: StagesFit) -> float:
+def _scatter(fit: Fit) -> float:
     """Return by what blocks of the record differ on the share, over what noise does; much, and a fit is no optimum."""
     column = list(fit.free).index(fit.likelihood.problem.index(SHARE))
     return block_variance(fit, column, fit.likelihood.settings.verdict.blocks)
 
 
-def _renew(fit: StagesFit) -> Array:
+def _renew(fit: Fit) -> Array:
     """Return the best vector at another share, with some torque noise: where a fit begins anew."""
     theta = with_noise(fit.likelihood, fit.point.theta, FINE)
     return min(_try_shares(fit.likelihood, theta, SHARES), key=_objective).theta
 
 
-def _bound_share(likelihood: StagesLikelihood, shared: float) -> StagesLikelihood:
+def _bound_share(likelihood: Likelihood, shared: float) -> Likelihood:
     """Return the likelihood in which each stage has at least a share of the gap."""
     problem = likelihood.problem
     return likelihood.with_options(problem=problem.with_unknown(problem.index(SHARE), lower=shared, upper=1.0 - shared))
 
 
-def with_noise(likelihood: StagesLikelihood, theta: Array, level: float) -> Array:
+def with_noise(likelihood: Likelihood, theta: Array, level: float) -> Array:
     """Return a vector with the torque noise at a level, that of the intermediate shaft far below the others."""
     problem, theta = likelihood.problem, theta.copy()
     quiet = QUIET * problem.base["J_s"] / problem.base["J_m"]
@@ -151,17 +149,17 @@ def _objective(point: Point) -> float:
     return point.objective
 
 
-def _share(fit: StagesFit) -> float:
+def _share(fit: Fit) -> float:
     return float(fit.point.theta[fit.likelihood.problem.index(SHARE)])
 
 
-def _all_but(likelihood: StagesLikelihood, *names: str) -> list[int]:
+def _all_but(likelihood: Likelihood, *names: str) -> list[int]:
     """Return the places of all unknowns but those of these names; "torque" stands for all torque noise."""
     noise = [f"log_torque_{body}" for body in BODIES] if "torque" in names else []
     return [n for n, name in enumerate(likelihood.problem.names) if name not in (*names, *noise)]
 
 
-def _fit_size(likelihood: StagesLikelihood) -> StagesFit:
+def _fit_size(likelihood: Likelihood) -> Fit:
     """Return a rough fit with a gap in stage 1 alone, which has about the size of any."""
     problem = likelihood.problem
     start = with_noise(likelihood, problem.start, COARSE)
@@ -183,7 +181,7 @@ def _fit_size(likelihood: StagesLikelihood) -> StagesFit:
     return fit
 
 
-def _try_shares(likelihood: StagesLikelihood, theta: Array, shares: Iterable[float]) -> list[Point]:
+def _try_shares(likelihood: Likelihood, theta: Array, shares: Iterable[float]) -> list[Point]:
     """Return the likelihood at each share, the intermediate shaft at its best place in the first gap."""
     problem = likelihood.problem
     share_at, twist_at = problem.index(SHARE), problem.index(TWIST)
@@ -191,7 +189,7 @@ def _try_shares(likelihood: StagesLikelihood, theta: Array, shares: Iterable[flo
     for share in shares:
         moved = theta.copy()
         moved[share_at] = share
-        half = likelihood.halves(moved)[0]
+        half = likelihood.parameters(moved)[GAPS[0]]
         points = [likelihood.at(moved)]
         for place in PLACES:
             other = moved.copy()
@@ -201,7 +199,7 @@ def _try_shares(likelihood: StagesLikelihood, theta: Array, shares: Iterable[flo
     return found
 
 
-def _fit_both(likelihood: StagesLikelihood, start: Array, levels: Sequence[float]) -> StagesFit:
+def _fit_both(likelihood: Likelihood, start: Array, levels: Sequence[float]) -> Fit:
     """Return the fit of a gap in both stages; the torque noise goes down levels for as long as that pays."""
     best = None
     theta = np.clip(start, *likelihood.problem.bounds(range(start.size)))
@@ -217,7 +215,7 @@ def _fit_both(likelihood: StagesLikelihood, start: Array, levels: Sequence[float
     return _finish(likelihood, best, _all_but(likelihood))
 
 
-def _follow_share(fit: StagesFit) -> list[Point]:
+def _follow_share(fit: Fit) -> list[Point]:
     """Return the likelihood of a fit and along the share, once with all else as it is and once moved with it."""
     place = fit.likelihood.problem.index(SHARE)
     low, high = (float(bound[0]) for bound in fit.likelihood.problem.bounds([place]))
@@ -230,14 +228,14 @@ def _follow_share(fit: StagesFit) -> list[Point]:
     return [fit.point, *alone, *move_share(fit, shares - fit.point.theta[place])]
 
 
-def look_nearby(fit: StagesFit) -> Point:
+def look_nearby(fit: Fit) -> Point:
     """Return the best point at shares near that of a fit."""
     column = list(fit.free).index(fit.likelihood.problem.index(SHARE))
     away = np.linspace(-NEARBY, NEARBY, SHARES_NEARBY) * math.sqrt(fit.covariance[column, column])
     return min(move_share(fit, away), key=_objective)
 
 
-def move_share(fit: StagesFit, away: Iterable[float]) -> list[Point]:
+def move_share(fit: Fit, away: Iterable[float]) -> list[Point]:
     """Return the likelihood at other shares, all unknowns that are at no bound moved as the information of a fit says.
 
     A bound is where the record shows next to nothing of an unknown, so that the information would move it anywhere.
@@ -256,14 +254,14 @@ def move_share(fit: StagesFit, away: Iterable[float]) -> list[Point]:
     return found
 
 
-def _fit_at(fit: StagesFit, share: float) -> StagesFit:
+def _fit_at(fit: Fit, share: float) -> Fit:
     """Return the fit with this share that starts from another."""
     likelihood = fit.likelihood
     start = _try_shares(likelihood, fit.point.theta, [share])[0]
     return maximise(likelihood, start.theta, _all_but(likelihood, SHARE), 6, tolerance=0.1)
 
 
-def _finish(likelihood: StagesLikelihood, start: Point, free: Sequence[int]) -> StagesFit:
+def _finish(likelihood: Likelihood, start: Point, free: Sequence[int]) -> Fit:
     """Return the fit of ``free`` and of the torque noise, which falls as the fit gets better."""
     torque = [likelihood.problem.index(f"log_torque_{body}") for body in BODIES]
     others = [n for n in free if n not in torque]
@@ -273,7 +271,7 @@ def _finish(likelihood: StagesLikelihood, start: Point, free: Sequence[int]) -> 
     return maximise(fit.likelihood, settled.theta, free, 16, tolerance=0.1)
 
 
-def _settle_noise(likelihood: StagesLikelihood, point: Point, torque: Sequence[int]) -> Point:
+def _settle_noise(likelihood: Likelihood, point: Point, torque: Sequence[int]) -> Point:
     """Return the best point reached by steps of one level of torque noise at a time."""
     unknowns = likelihood.problem.unknowns
     for _ in range(2):

@@ -19,11 +19,11 @@ from orchestrator.estimation.description import autocorrelation, block_variance,
 from orchestrator.estimation.effort import Effort, Stop, never
 from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.filter.model import Array
+from orchestrator.estimation.likelihood import Fit, Likelihood
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings, StageSettings
-from orchestrator.estimation.stages.fit import GRID, Report, StageFits, StagesFit, fit_stages
-from orchestrator.estimation.stages.likelihood import StagesLikelihood
-from orchestrator.estimation.stages.problem import BODIES, ENCODERS, OFFSET, SHARE, TOTAL, make_problem
+from orchestrator.estimation.stages.fit import GRID, Report, StageFits, fit_stages
+from orchestrator.estimation.stages.problem import BODIES, ENCODERS, GAPS, OFFSET, SHARE, TOTAL, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
@@ -103,7 +103,7 @@ def locate_gap(
     if still:
         raise RecordError(f"{record.source}: {still.split(';')[0]}: log a motion that reverses")
     effort = Effort(time.monotonic() + time_limit, stop)
-    likelihood = StagesLikelihood(problem, 1, settings, effort)
+    likelihood = Likelihood(problem, 1, settings, effort)
     return locate(fit_stages(likelihood, settings.stages, report), settings.stages)
 
 
@@ -169,7 +169,7 @@ def _possible_answers(behind: dict[str, float], share: float, settings: StageSet
     return [BOTH]
 
 
-def _torque_noise(fit: StagesFit) -> float:
+def _torque_noise(fit: Fit) -> float:
     """Return the torque noise of motor or load, whichever is more, over the drive's torque there [s^0.5]."""
     problem = fit.likelihood.problem
     return max(
@@ -179,23 +179,24 @@ def _torque_noise(fit: StagesFit) -> float:
     )
 
 
-def _scatter(fit: StagesFit) -> float:
+def _scatter(fit: Fit) -> float:
     """Return by what the variance of the size among blocks of the record exceeds that of white errors."""
     return block_variance(fit, fit.column, fit.likelihood.settings.verdict.blocks)
 
 
-def _scatter_of_stages(fit: StagesFit) -> float:
+def _scatter_of_stages(fit: Fit) -> float:
     """Return the same of the stages' own half-gaps, whichever is more."""
     blocks = fit.likelihood.settings.verdict.blocks
     return max(block_variance_along(fit, slope, blocks) for slope in _gradients(fit)[1])
 
 
-def _gradients(fit: StagesFit) -> tuple[Array, Array]:
+def _gradients(fit: Fit) -> tuple[Array, Array]:
     """Return both half-gaps (2,) [rad] and their derivatives by the free unknowns (2, k)."""
     likelihood, theta = fit.likelihood, fit.point.theta
     problem = likelihood.problem
     total, share = theta[problem.index(TOTAL)], theta[problem.index(SHARE)]
-    ratio = likelihood.value(theta, "i_2")
+    p = likelihood.parameters(theta)
+    ratio = p["i_2"]
     by = {
         TOTAL: ((1.0 - share) * ratio, share),
         SHARE: (-total * ratio, total),
@@ -203,14 +204,14 @@ def _gradients(fit: StagesFit) -> tuple[Array, Array]:
     }
     names = [problem.names[n] for n in fit.free]
     slopes = np.array([by.get(name, (0.0, 0.0)) for name in names]).T
-    return np.array(likelihood.halves(theta)), slopes
+    return np.array([p[name] for name in GAPS]), slopes
 
 
-def _sizes(fit: StagesFit, wider: float) -> tuple[StageGap, StageGap]:
+def _sizes(fit: Fit, wider: float) -> tuple[StageGap, StageGap]:
     """Return the half-gap of each stage by one fit."""
     values, slopes = _gradients(fit)
     reach = NORMAL_95 * np.sqrt(wider * np.einsum("ij,jk,ik->i", slopes, fit.covariance, slopes))
-    most = _total(fit, wider).interval[1] * np.array([fit.likelihood.value(fit.point.theta, "i_2"), 1.0])
+    most = _total(fit, wider).interval[1] * np.array([fit.likelihood.parameters(fit.point.theta)["i_2"], 1.0])
     first, second = (
         StageGap(float(value), (max(float(value - half), 0.0), min(float(value + half), float(end))))
         for value, half, end in zip(values, reach, most, strict=True)
@@ -218,7 +219,7 @@ def _sizes(fit: StagesFit, wider: float) -> tuple[StageGap, StageGap]:
     return first, second
 
 
-def _sizes_of_all(best: StagesFit, optima: Sequence[StagesFit], wider: float) -> tuple[StageGap, StageGap]:
+def _sizes_of_all(best: Fit, optima: Sequence[Fit], wider: float) -> tuple[StageGap, StageGap]:
     """Return the half-gap of each stage by the best fit; the intervals hold those of all that are about as good."""
     limit = best.point.objective + NORMAL_95**2 * wider
     alike = [_sizes(fit, wider) for fit in optima if fit.point.objective <= limit]
@@ -229,7 +230,7 @@ def _sizes_of_all(best: StagesFit, optima: Sequence[StagesFit], wider: float) ->
     return first, second
 
 
-def _total(fit: StagesFit, wider: float) -> StageGap:
+def _total(fit: Fit, wider: float) -> StageGap:
     half = NORMAL_95 * math.sqrt(wider) * fit.size_deviation
     return StageGap(fit.size, (max(fit.size - half, 0.0), fit.size + half))
 
@@ -241,18 +242,17 @@ def _join(gaps: list[StageGap]) -> StageGap:
     return StageGap(math.nan, (min(gap.interval[0] for gap in gaps), max(gap.interval[1] for gap in gaps)))
 
 
-def _curves(fit: StagesFit, states: Array, contacts: NDArray[np.int64], errors: Array) -> dict[str, Array]:
+def _curves(fit: Fit, states: Array, contacts: NDArray[np.int64], errors: Array) -> dict[str, Array]:
     """Return twists [rad] and flanks (-1, 0, 1) of both stages, and one-step errors [rad], each (n,)."""
     p = fit.likelihood.parameters(fit.point.theta)
     record = fit.likelihood.problem.record
-    offset = fit.likelihood.value(fit.point.theta, OFFSET)
     curves: dict[str, Any] = {
         "time": record.time,
         "u": record.u,
         "theta_m": record.theta_m,
         "theta_l": fit.likelihood.problem.outputs[:, 1],
         "theta_m_fitted": states[:, 0],
-        "theta_l_fitted": states[:, 4] + offset,
+        "theta_l_fitted": states[:, 4] + p[OFFSET],
         "twist_1": states[:, 0] / p["i_1"] - states[:, 2],
         "twist_2": states[:, 2] / p["i_2"] - states[:, 4],
         "contact_1": contacts[:, 0].astype(float),

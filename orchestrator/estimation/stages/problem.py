@@ -1,16 +1,19 @@
 """What is unknown about a record of a train of two stages, and where each unknown is looked for."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
+from orchestrator.estimation.filter.model import TRAIN, Array, BodyNames, NoiseLevels
 from orchestrator.estimation.problem import (
     DRY,
     OFFSET,
     OFFSET_SPREAD,
+    GapProblem,
     Unknown,
-    UnknownProblem,
     encoder_unknown,
     first_line,
     parameter_unknowns,
@@ -38,18 +41,31 @@ SPEED_DEVIATIONS = (3.0, 1.0)  # rad/s of motor and load at the first row
 
 
 @dataclass(frozen=True)
-class StagesProblem(UnknownProblem):
-    """What is unknown about a record of a train of two stages.
+class StagesProblem(GapProblem):
+    """What is unknown about a record of a train of two stages; ``units`` are its drive's rms torque at each body [N.m].
 
     Attributes:
-        base: parameters of the model by name.
-        first: (4,) angles and speeds of motor and load at the first row.
-        units: torque [N.m] of the drive at motor, intermediate inertia and load: its rms times the gears.
+        lines: angle and speed of motor and load at the first row.
     """
 
-    base: dict[str, float]
-    first: tuple[float, float, float, float]
-    units: tuple[float, float, float]
+    row: ClassVar[BodyNames] = TRAIN
+    gap: ClassVar[str] = TOTAL
+    difference: ClassVar[float] = 0.3  # long, since contacts come and go
+    lines: tuple[float, float, float, float]
+
+    def parameters(self, values: Mapping[str, float]) -> Mapping[str, float]:
+        """Return all parameters of the train by name, of the values of the unknowns."""
+        p = {**self.base, **values}
+        total, share = p[TOTAL], p[SHARE]
+        return p | dict(zip(GAPS, (total * (1.0 - share) * p["i_2"], total * share), strict=True))
+
+    def first(self, p: Mapping[str, float], noise: NoiseLevels) -> tuple[Array, Array]:
+        """Return state and standard deviations at the first row: (7,) each."""
+        angle_m, speed_m, angle_l, speed_l = self.lines
+        ratio, (noise_m, noise_l), (fast, slow) = p["i_1"], noise.measured, SPEED_DEVIATIONS
+        x0 = [angle_m, speed_m, angle_m / ratio - p[TWIST], speed_m / ratio, angle_l, speed_l, p[TORQUE]]
+        spread = [noise_m, fast, 0.1 * noise_m / abs(ratio), fast / abs(ratio), noise_l, slow, 0.0]
+        return np.array(x0), np.array(spread)
 
 
 def make_problem(record: Record, model: Model) -> StagesProblem:
@@ -73,10 +89,10 @@ def make_problem(record: Record, model: Model) -> StagesProblem:
         high = math.log(unit * LARGEST_AT_SHAFT) if body == "middle" else high
         unknowns.append(Unknown(f"log_torque_{body}", -7.0, math.inf, 0.5, low, high))
     speeds = [first_line(record.time, angles) for angles in (record.theta_m, record.theta_l)]
-    first = (speeds[0][1], speeds[0][0], speeds[1][1], speeds[1][0])
+    lines = (speeds[0][1], speeds[0][0], speeds[1][1], speeds[1][0])
     outputs = np.column_stack([record.theta_m, record.theta_l])
     sliding = sliding_speeds(record, base["i_1"] * base["i_2"])
-    return StagesProblem(record, tuple(unknowns), outputs, sliding, base, first, units)
+    return StagesProblem(record, tuple(unknowns), outputs, sliding, base, units, lines)
 
 
 def _zero_of_load(record: Record, ratio: float) -> float:
