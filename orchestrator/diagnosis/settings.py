@@ -101,6 +101,9 @@ class ReportSettings(Settings, frozen=True):
     worse: Annotated[float, share("relative increase of the misfit on test data that may be chance")] = 0.05
     of_noise: Annotated[float, share("and relative to the encoder's noise")] = 0.1
     level: Annotated[float, share("probability of the reported intervals")] = 0.95
+    possible_share: Annotated[
+        float, share("probability of an effect that is only possible: the share that was right of 170 such names")
+    ] = 0.2
 
 
 class FmuSettings(Settings, frozen=True):

@@ -1,6 +1,5 @@
 """What is said of an axis: laws that a machine can have, names that test data refute, hints beside verdicts."""
 
-import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -24,6 +23,7 @@ from orchestrator.diagnosis.selection.evidence import acts_one_way
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model, read_model
+from orchestrator.shared.inference.normal import NORMAL_95
 from tests.support.axis_record import MODEL, axis_record
 from tests.support.led_axis import led_axis
 
@@ -173,7 +173,7 @@ def test_a_miss_is_judged_by_noise_and_by_what_the_values_leave_open() -> None:
 
 
 def test_a_possible_name_widens_the_sizes_of_the_others() -> None:
-    """Two models of equal chance, 3 apart with errors of 1 and 2: the variance about the first is (1 + 4 + 9) / 2."""
+    """Two models 3 apart with errors of 1 and 2, the second one of a fifth of the chance: drawn, and 95 % counted."""
     one, other = (
         GradedEffect(
             "backlash", "shaft", Grade.LIKELY, (), {"alpha": ValueEstimate(v, e, (v - 2 * e, v + 2 * e), "rad")},
@@ -181,11 +181,15 @@ def test_a_possible_name_widens_the_sizes_of_the_others() -> None:
         )
         for v, e in ((5.0, 1.0), (8.0, 2.0))
     )  # fmt: skip
-    wide = open_to(one, other).parameters["alpha"]
+    wide, rng, second = open_to(one, other, SETTINGS.report).parameters["alpha"], np.random.default_rng(1), 20_000
+    scale = 2.0 / NORMAL_95
+    drawn = np.append(rng.normal(5.0, scale, 4 * second), rng.normal(8.0, 2.0 * scale, second))
     assert wide.value == 5.0
-    assert wide.standard_error == pytest.approx(math.sqrt(7.0))
-    assert wide.interval == pytest.approx((5.0 - 2.0 * math.sqrt(7.0), 5.0 + 2.0 * math.sqrt(7.0)))
-    assert open_to(other, replace(other)).parameters == other.parameters
+    assert wide.standard_error == pytest.approx(np.sqrt(0.8 * 1.0 + 0.2 * (4.0 + 9.0)))
+    assert wide.interval[0] == 3.0  # of the first alone, which reaches further down
+    assert np.mean(drawn > wide.interval[1]) == pytest.approx(0.025, abs=0.002)
+    alike = open_to(other, replace(other), SETTINGS.report).parameters["alpha"]
+    assert alike.interval == pytest.approx(other.parameters["alpha"].interval)
 
 
 def test_the_drift_of_free_runs_is_what_values_off_make(model: Model) -> None:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.stats import norm
 from scipy.stats import t as student
 
@@ -19,7 +20,7 @@ from orchestrator.diagnosis.model.interface import ModelPoint, Values
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, TestMisfit, ValueEstimate
 from orchestrator.diagnosis.selection.grading import grade_effect
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, RecordEvidence, SearchResult
-from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.diagnosis.settings import DiagnosisSettings, ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.records.model_file import Model
 
@@ -138,26 +139,39 @@ def report_effects(
     graded = [report(result if one.label in labels else searched, one, one.label in labels) for one in evidence]
     if len(searched.final.labels) > len(labels):
         pairs = zip(graded, evidence, strict=True)
-        graded = [open_to(one, report(searched, own, True)) if one.in_model else one for one, own in pairs]
+        graded = [
+            open_to(one, report(searched, own, True), settings.report) if one.in_model else one for one, own in pairs
+        ]
     return tuple(graded)
 
 
-def open_to(effect: GradedEffect, other: GradedEffect) -> GradedEffect:
+def open_to(effect: GradedEffect, other: GradedEffect, settings: ReportSettings) -> GradedEffect:
     """Return an effect whose sizes are as uncertain as two models leave them of which the record excludes neither.
 
-    Each has half the probability: the variance about the first one's value is half of either's second moment.
+    The other model has the probability ``possible_share``. An interval reaches from the lower to the upper quantile of
+    the mixture of both models' normal distributions, and is never narrower than that of the first.
 
     Args:
         other: the same effect in the other model, which has an effect that is only possible too.
     """
+    shares = np.array([1.0 - settings.possible_share, settings.possible_share])
+    tail = 0.5 * (1.0 - settings.level)
 
     def widen(name: str, first: ValueEstimate) -> ValueEstimate:
         there = other.parameters[name]
-        away = _wrap_phase(name, there.value - first.value)
-        variance = 0.5 * (first.standard_error**2 + there.standard_error**2 + away**2)
-        factor = max(math.sqrt(variance) / max(first.standard_error, 1e-300), 1.0)
-        low, high = (first.value + factor * (end - first.value) for end in first.interval)
-        return replace(first, standard_error=factor * first.standard_error, interval=(low, high))
+        away = np.array([0.0, _wrap_phase(name, there.value - first.value)])
+        errors = np.array([first.standard_error, there.standard_error])
+        if not np.all((errors > 0.0) & np.isfinite(errors)):
+            return first
+        scales = np.array([one.interval[1] - one.value for one in (first, there)]) / -float(norm.ppf(tail))
+        reach = float(np.max(np.abs(away) + 10.0 * scales))
+        low, high = (
+            brentq(lambda x, share=share: float(shares @ norm.cdf((x - away) / scales)) - share, -reach, reach)
+            for share in (tail, 1.0 - tail)
+        )
+        error = max(math.sqrt(float(shares @ (errors**2 + away**2))), first.standard_error)
+        interval = (min(first.interval[0], first.value + low), max(first.interval[1], first.value + high))
+        return replace(first, standard_error=error, interval=interval)
 
     return replace(effect, parameters={name: widen(name, first) for name, first in effect.parameters.items()})
 
