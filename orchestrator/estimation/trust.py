@@ -48,12 +48,14 @@ def trust_of_location(location: Location, record: Record, model: Model, settings
             )
         if location.answers and location.traversals < settings.trust.least_traversals:
             yield Reason(Level.AMBER, f"the gap is traversed only {_times(location.traversals)}")
+        sizes = [("both half-gaps together", location.total)] if location.answers else []
         for stage, gap in zip((FIRST, SECOND), location.stages, strict=True):
+            if location.answers in ((stage,), (BOTH,)):
+                sizes.append((f"the half-gap of stage {stage}", gap))
+        for name, gap in sizes:
             low, high = gap.interval
-            widest = 2.0 * NORMAL_95 * settings.trust.widest * gap.alpha
-            if location.answers in ((stage,), (BOTH,)) and high - low > widest:
-                text = f"the half-gap of stage {stage} lies anywhere from {low:.2g} to {high:.2g} rad"
-                yield Reason(Level.AMBER, text)
+            if high - low > 2.0 * NORMAL_95 * settings.trust.widest * gap.alpha:
+                yield Reason(Level.AMBER, f"{name} may be anything from {low:.2g} to {high:.2g} rad")
         if record.u_sampled is not None:
             yield Reason(Level.AMBER, "the torque has rows of its own and was taken as held between them")
         if record.u_deviation is not None:

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from orchestrator.estimation.protocol import Estimate
-from orchestrator.estimation.settings import TrustSettings
-from orchestrator.estimation.trust import trust_of_estimates
+from orchestrator.estimation.settings import DEFAULT_SETTINGS, TrustSettings
+from orchestrator.estimation.stages.location import Location, StageGap
+from orchestrator.estimation.trust import trust_of_estimates, trust_of_location
 from orchestrator.records.model_file import default_model
+from orchestrator.records.record import Record
 from orchestrator.shared.results import TrustFound
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
@@ -83,6 +85,24 @@ def test_a_value_far_outside_is_red_where_the_half_gap_hangs_on_it(correlation: 
 def test_a_value_outside_its_stated_range_is_named_with_both() -> None:
     (reason,) = trust_of_estimates([fitted("J_l", 1.078)], default_model())["maximum_likelihood"].reasons
     assert reason == "`J_l` is fitted as 6.037, but stated as 5.6 to within 0.28"
+
+
+@pytest.mark.parametrize(
+    ("answers", "wide", "said"),
+    [
+        (("1",), "", ""), (("1",), "total", "both half-gaps together"), (("1", "both"), "total", "both half-gaps"),
+        (("1",), "stage", "the half-gap of stage 1"), (("1", "both"), "stage", ""),
+    ],
+)  # fmt: skip
+def test_a_size_that_may_be_anything_is_not_green(answers: tuple[str, ...], wide: str, said: str) -> None:
+    """A set of answers is honest, and so are the sizes of its stages; both half-gaps together are one value."""
+    close, apart = StageGap(0.01, (0.0099, 0.0101)), StageGap(0.01, (0.004, 0.016))
+    total, stage = (apart if wide == name else close for name in ("total", "stage"))
+    location = Location(answers, total, (stage, close), {}, True, True, 9, (0.0, 0.0), {}, {})
+    record = Record(np.arange(400) * 1e-3, np.ones(400), np.ones(400), np.ones(400), "train")
+    trust = trust_of_location(location, record, default_model(), DEFAULT_SETTINGS)
+    assert trust.level is (Level.AMBER if said else Level.GREEN)
+    assert all(reason.startswith(said) for reason in trust.reasons)
 
 
 def test_methods_without_a_check_of_their_own_are_held_against_the_fit() -> None:
