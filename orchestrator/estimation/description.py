@@ -10,7 +10,7 @@ from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.likelihood import Fit
-from orchestrator.estimation.problem import DRY, IMPULSE, LEAST_TORQUE_NOISE, OFFSET
+from orchestrator.estimation.problem import DRY, LEAST_TORQUE_NOISE, OFFSET
 from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import GapVerdictSettings
@@ -25,9 +25,7 @@ def describe(fit: Fit) -> Estimate:
     low, high = curve.interval(fit.size, NORMAL_95**2 * wider)
     # A profile point that is not quite the maximum makes the interval too short, never too long.
     half = NORMAL_95 * math.sqrt(wider) * fit.size_deviation
-    shift = contact_shift(fit)
-    below, above = (math.hypot(max(reach, half), NORMAL_95 * shift) for reach in (fit.size - low, high - fit.size))
-    return _describe(fit, curve, wider, (max(fit.size - below, 0.0), fit.size + above), shift)
+    return _describe(fit, curve, wider, (max(min(low, fit.size - half), 0.0), max(high, fit.size + half)))
 
 
 def _widening(fit: Fit) -> float:
@@ -36,22 +34,6 @@ def _widening(fit: Fit) -> float:
     Kent (Biometrika 69(1), 1982): twice the drop of the log likelihood is chi-squared times that ratio.
     """
     return max(_misfit_variance(fit), block_variance(fit, fit.column, fit.likelihood.settings.verdict.blocks))
-
-
-def contact_shift(fit: Fit) -> float:
-    """Return by how much [rad] the half-gap depends on where in a contact its impulse acts, which no record tells.
-
-    In the law of Hunt and Crossley damping sets in over a depth ``d``, and the impulse is ``J = c d / 2`` with its
-    centre at ``d / 3``. Until the teeth are there, the twist moves on by what the impulse will take of its speed.
-    """
-    p = fit.likelihood.parameters(fit.point.theta)
-    kept = fit.likelihood.run(fit.point.theta, keep=True)
-    touches = np.flatnonzero((kept.contacts[:-1, 0] == 0) & (kept.contacts[1:, 0] != 0))
-    if not touches.size:
-        return 0.0
-    speed = float(np.median(np.abs(kept.states[touches, 1] / p["i"] - kept.states[touches, 3])))
-    depth = 2.0 * abs(p[IMPULSE]) / max(p["c"], 1e-300)
-    return abs(p[IMPULSE]) * (1.0 / (p["J_m"] * p["i"] ** 2) + 1.0 / p["J_l"]) * depth / (3.0 * max(speed, 1e-300))
 
 
 def describe_unfinished(fit: Fit, why: str) -> Estimate:
@@ -75,14 +57,11 @@ def _misfit_variance(fit: Fit) -> float:
     return fit.likelihood.settings.verdict.misfit_widening**2 if inexact else 1.0
 
 
-def _describe(fit: Fit, curve: Profile, wider: float, interval: tuple[float, float], shift: float = 0.0) -> Estimate:
-    """Return the estimate of a fit with this interval [rad], whose variance is ``wider`` times that of white errors.
-
-    ``shift`` is what contacts add to the standard error [rad].
-    """
+def _describe(fit: Fit, curve: Profile, wider: float, interval: tuple[float, float]) -> Estimate:
+    """Return the estimate of a fit with this interval [rad], whose variance is ``wider`` times that of white errors."""
     likelihood = fit.likelihood
     problem, settings = likelihood.problem, likelihood.settings.verdict
-    alpha, error = fit.size, math.hypot(math.sqrt(wider) * fit.size_deviation, shift)
+    alpha, error = fit.size, math.sqrt(wider) * fit.size_deviation
     low, high = interval
     kept, levels = likelihood.run(fit.point.theta, keep=True), likelihood.noise(fit.point.theta)
     contacts = kept.contacts[:, 0]
@@ -114,9 +93,7 @@ def _describe(fit: Fit, curve: Profile, wider: float, interval: tuple[float, flo
     curves = {"states": kept.states, "contacts": contacts, "errors": kept.errors, "profile": curve}
     curves["offset"] = p[OFFSET]
     curves["model"] = tuple(problem.base[name] if name == OFFSET else p[name] for name in problem.base)
-    covariance = wider * fit.covariance  # of diagnostics["parameters"], in their order
-    covariance[fit.column, fit.column] += shift**2
-    curves["covariance"] = covariance
+    curves["covariance"] = wider * fit.covariance  # of diagnostics["parameters"], in their order
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
 
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import DRIVETRAIN, IMPULSE, LOAD_TORQUE, Array, BodyNames, NoiseLevels
+from orchestrator.estimation.filter.model import DEPTH, DRIVETRAIN, LOAD_TORQUE, Array, BodyNames, NoiseLevels
 from orchestrator.estimation.zeros import held_twist, play_of
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
@@ -26,9 +26,9 @@ SLIDING = 5e-3  # of a body's rms speed, at which its dry friction has set in by
 SAMPLED = "u_sampled"  # way from a torque that is held between its own rows to a smooth one: 0 to 1
 SMOOTH = "u_smooth"  # the same of a torque that has a row for each of the record's
 OFFSET = "effects.sensor_offset.load.offset"
-# Depth within which a contact's damping sets in, prior standard deviation: an angle [rad], or, where that is more, a
-# share of the shaft's twist under the drive's torque.
-IMPULSE_DEPTH, IMPULSE_SHARE = 2e-3, 0.1
+# Depth at which a contact's damping sets in, prior standard deviation: an angle [rad], or, where that is more, a share
+# of the shaft's twist under the drive's torque.
+LEAST_DEPTH, DEPTH_SHARE = 1e-3, 0.05
 OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
 # White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record, and one whose contact
@@ -132,9 +132,8 @@ def make_problem(record: Record, model: Model) -> GapProblem:
         held = held_twist(filled, model) > 0.5 * (high - low)
         unknowns.append(Unknown(OFFSET, 0.0 if held else -0.5 * (low + high), OFFSET_SPREAD, 1e-3))
     pull = abs(ratio) * rms_behind_lag(record.u, record.step, lag)
-    depth = max(IMPULSE_DEPTH, IMPULSE_SHARE * pull / base["k"])
-    impulse = 0.5 * depth * base["c"]
-    unknowns.append(Unknown(IMPULSE, 0.0, impulse, impulse))
+    depth = max(LEAST_DEPTH, DEPTH_SHARE * pull / base["k"])
+    unknowns.append(Unknown(DEPTH, 0.0, depth, depth))
     unknowns += torque_unknowns(record, model, lag, ratio)
     if LOAD_TORQUE not in (unknown.name for unknown in unknowns):
         unknowns.append(Unknown(LOAD_TORQUE, base[LOAD_TORQUE], pull, 1e-3 * pull))

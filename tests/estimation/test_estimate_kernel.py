@@ -6,7 +6,7 @@ import scipy.linalg
 
 from orchestrator.estimation.filter.innovations import KERNELS, _arrays
 from orchestrator.estimation.filter.kernel import BLUR
-from orchestrator.estimation.filter.model import affine_model
+from orchestrator.estimation.filter.model import DEPTH, affine_model
 from pyfmu_sources.drivetrain.equations import parameters
 
 STEP, TORQUE = 0.005, 40.0
@@ -25,8 +25,9 @@ def advanced(model, x):
     ("twist", "omega_m", "omega_l", "events"),
     [(0.0, 0.5, 0.1, 0), (0.9, 4.0, -0.5, 1), (-0.9, -4.0, 0.5, 1), (1.05, -4.0, 0.5, 1), (0.5, 60.0, 0.0, 1)],
 )
-def test_the_jacobian_is_the_derivative_also_across_contact_events(twist, omega_m, omega_l, events):
-    model = affine_model(parameters(alpha=0.01, c=20.0)._asdict())
+@pytest.mark.parametrize("depth", [0.0, 4e-4, -4e-4])
+def test_the_jacobian_is_the_derivative_also_across_contact_events(twist, omega_m, omega_l, events, depth):
+    model = affine_model(parameters(alpha=0.01, c=20.0)._asdict() | {DEPTH: depth})
     load = 0.3
     motor = 3.984 * (load + twist * 0.01)
     x = np.array([motor, omega_m, load, omega_l, 25.0])
@@ -54,9 +55,9 @@ def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
     touching = weights @ (np.abs(twists) > 0.01)
     h, after, total = 1e-6, x.copy(), np.empty((5, 5))
     KERNELS[1].advance_blurred(*_arrays(model, h)[:5], covariance, h, TORQUES, after, total)
-    free, tight = model.matrices[1], model.matrices[2]
+    free, tight = model.matrices[2], model.matrices[4]
     by_twist = free[:, 2] - tight[:, 2]  # accelerations per twist of the shaft
-    rate = free @ x + TORQUES @ model.inputs + model.constants[1] + by_twist * wound
+    rate = free @ x + TORQUES @ model.inputs + model.constants[2] + by_twist * wound
     np.testing.assert_allclose((after - x) / h, rate, rtol=1e-3, atol=1e-2)
     np.testing.assert_allclose((total - np.eye(5)) / h, free + touching * (tight - free), rtol=0.02, atol=1e-2)
 
@@ -66,7 +67,7 @@ def test_the_transition_is_exact_for_a_drive_of_any_lag(lag):
     """A lag of a thousandth of a sample too: the series of the whole sample would have lost every digit."""
     model = affine_model(parameters(J_m=0.002, J_l=0.3, k=900.0, c=1.0, b_m=0.003, b_l=0.1, i=12.0, tau=lag)._asdict())
     *_, phi, gain, gain_1 = _arrays(model, STEP)
-    for mode in range(3):
+    for mode in range(5):
         whole = np.zeros((7, 7))
         whole[:5, :5] = model.matrices[mode]
         whole[:5, 5], whole[:5, 6] = model.inputs[0], model.constants[mode]

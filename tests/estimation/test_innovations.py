@@ -6,7 +6,7 @@ from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
 from orchestrator.estimation.filter.innovations import Innovations, innovations, simulate
-from orchestrator.estimation.filter.model import FADING, IMPULSE, LOAD_TORQUE, NoiseLevels, affine_model
+from orchestrator.estimation.filter.model import DEPTH, FADING, LOAD_TORQUE, NoiseLevels, affine_model
 from pyfmu_sources.drivetrain import contact, drivetrain
 from pyfmu_sources.drivetrain import equations as dt
 
@@ -19,7 +19,7 @@ START = np.array([0.1, 0.5, 0.02, 0.1, 2.0])
 def joint(y: np.ndarray, p: tuple[float, ...]) -> float:
     """Return twice the negative log density of a record, without 2 pi, from its mean and covariance as a whole."""
     model = affine_model(p._asdict())
-    A, b, outputs = model.matrices[2], model.inputs[0], y.shape[1]
+    A, b, outputs = model.matrices[4], model.inputs[0], y.shape[1]
     block = np.zeros((6, 6))
     block[:5, :5], block[:5, 5] = A * H, b * H
     step = expm(block)
@@ -99,13 +99,13 @@ def test_nothing_is_kept_unless_asked_for() -> None:
 def test_modes_by_hand() -> None:
     p = dt.parameters(alpha=0.01, J_m=0.5, J_l=5.0, k=3000.0, c=2.0, b_m=0.1, b_l=1.0, i=4.0, tau=0.5)
     model = affine_model(p._asdict())
-    assert np.allclose(model.matrices[2][1], [-3000 / (0.5 * 16), -(2 / 16 + 0.1) / 0.5, 3000 / (0.5 * 4), 1.0, 2.0])
-    assert np.allclose(model.matrices[2][3], [3000 / (5 * 4), 2 / (5 * 4), -600.0, -0.6, 0.0])
-    assert np.allclose(model.matrices[1][1], [0.0, -0.2, 0.0, 0.0, 2.0])
-    assert np.allclose(model.matrices[0], model.matrices[2])
-    assert np.allclose(model.constants[2], [0.0, 3000 * 0.01 / 4 / 0.5, 0.0, -3000 * 0.01 / 5, 0.0])
-    assert np.allclose(model.constants[0], -model.constants[2])
-    assert np.allclose(model.constants[1], 0.0)
+    assert np.allclose(model.matrices[4][1], [-3000 / (0.5 * 16), -(2 / 16 + 0.1) / 0.5, 3000 / (0.5 * 4), 1.0, 2.0])
+    assert np.allclose(model.matrices[4][3], [3000 / (5 * 4), 2 / (5 * 4), -600.0, -0.6, 0.0])
+    assert np.allclose(model.matrices[2][1], [0.0, -0.2, 0.0, 0.0, 2.0])
+    assert np.allclose(model.matrices[0], model.matrices[4])
+    assert np.allclose(model.constants[4], [0.0, 3000 * 0.01 / 4 / 0.5, 0.0, -3000 * 0.01 / 5, 0.0])
+    assert np.allclose(model.constants[0], -model.constants[4])
+    assert np.allclose(model.constants[2], 0.0)
     assert np.allclose(model.inputs, [[0, 0, 0, 0, 2.0], [0, 2.0, 0, 0, 0], [0, 0, 0, 0.2, 0]])
     assert np.allclose(model.normals, [[0.25, 0, -1, 0, 0]])
     assert np.allclose(model.mobility, [2.0, 0.2])
@@ -141,13 +141,37 @@ def test_dry_friction_is_not_seen() -> None:
     assert np.array_equal(seen.inputs, smooth.inputs)
 
 
-def test_the_impulse_of_a_contact_fades_with_the_gap() -> None:
-    pushed = {IMPULSE: 3.0}
-    wide = affine_model(dt.parameters(alpha=1.0)._asdict() | pushed).jumps[0]
-    assert wide == pytest.approx([0.0, 3.0 / 0.4 / 3.984, 0.0, -3.0 / 5.6, 0.0], rel=1e-5)
-    narrow = affine_model(dt.parameters(alpha=FADING)._asdict() | pushed).jumps[0]
-    assert narrow == pytest.approx(wide / np.sqrt(2.0), rel=1e-5)
-    assert not affine_model(dt.parameters(alpha=0.0)._asdict() | pushed).jumps.any()
+@pytest.mark.parametrize("depth", [0.003, -0.003])
+def test_damping_sets_in_at_a_depth(depth: float) -> None:
+    """Against small steps of a shaft whose spring acts from the half-gap on, its damper from the depth beyond that."""
+    alpha, parts = 0.02, 4800
+    p = dt.parameters(alpha=alpha, c=40.0)
+    torque = np.repeat([60.0, -60.0, 60.0], 40)
+    model = affine_model(p._asdict() | {DEPTH: depth * np.hypot(alpha, FADING) / alpha})
+    assert model.depths == pytest.approx(depth)
+    found = simulate(model, torque, H, np.zeros(5))
+
+    def rates(x: np.ndarray, u: float) -> np.ndarray:
+        twist, rate = x[0] / p.i - x[2], x[1] / p.i - x[3]
+        over = abs(twist) - alpha
+        shaft = p.k * max(over, 0.0) * np.sign(twist) + (p.c * rate if over > depth else 0.0)
+        motor = (x[4] - p.b_m * x[1] - shaft / p.i) / p.J_m
+        return np.array([x[1], motor, x[3], (shaft - p.b_l * x[3]) / p.J_l, (u - x[4]) / p.tau])
+
+    x, h = np.zeros(5), H * len(torque) / parts
+    for n in range(parts):
+        if n * len(torque) % parts == 0:
+            assert np.allclose(found[n * len(torque) // parts], x, atol=2e-4 * (1.0 + np.abs(x))), n
+        u = torque[n * len(torque) // parts]
+        x = x + h * rates(x + 0.5 * h * rates(x, u), u)
+    assert np.ptp(x) > 0.0
+
+
+def test_the_depth_of_a_contact_fades_with_the_gap() -> None:
+    faded = [
+        affine_model(dt.parameters(alpha=alpha)._asdict() | {DEPTH: 1e-3}).depths[0] for alpha in (1.0, FADING, 0.0)
+    ]
+    assert faded == pytest.approx([1e-3, 1e-3 / np.sqrt(2.0), 0.0], rel=1e-5)
 
 
 def test_blurred_flanks_change_what_is_expected() -> None:

@@ -110,7 +110,7 @@ def _arrays(model: AffineModel, step: float) -> tuple[Array, ...]:
     )
     KERNELS[model.stages].transitions(model.matrices, model.inputs, model.constants, step, phi, gain, gain_1)
     return (
-        model.matrices, model.inputs, model.constants, model.normals, model.halves, model.jumps, phi, gain, gain_1
+        model.matrices, model.inputs, model.constants, model.normals, model.halves, model.depths, phi, gain, gain_1
     )  # fmt: skip
 
 

@@ -109,7 +109,7 @@ def advance_blurred(
             moved[r] = b[0, r] * torques[0] + b[1, r] * torques[1] + b[2, r] * torques[2] + b_1[free, r]
             for c in range(STATES):
                 lin[r, c] = dt * mats[free, r, c]
-        digit = MODES // 3
+        digit = 2 * (MODES // 5)
         for stage in range(STAGES):
             a = 2 * stage
             variance = 0.0
@@ -132,7 +132,7 @@ def advance_blurred(
                 moved[r] -= push * (wound - share * d)
                 for c in range(STATES):
                     lin[r, c] += dt * share * (mats[touch, r, c] - mats[free, r, c])
-            digit = digit // 3
+            digit = digit // 5
         for r in range(STATES):
             acc = dt * moved[r]
             for c in range(STATES):
@@ -149,16 +149,16 @@ def advance_blurred(
         multiply(one, before, total)
 
 
-def _mode_at(normals: Stages, halves: Halves, x: Vector) -> int:
+def _mode_at(normals: Stages, halves: Halves, depths: Halves, x: Vector) -> int:
     """Return the mode at a state."""
     mode = 0
     for stage in range(STAGES):
-        mode = 3 * mode + flank_of(normals, stage, halves[stage], x)
+        mode = 5 * mode + flank_of(normals, halves, depths, stage, x)
     return min(max(mode, 0), MODES - 1)
 
 
 def _step(
-    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, jumps: Stages,
+    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, depths: Halves,
     phi: ModeMatrices, gain: ModeInputs, gain_1: ModeVectors, h: float, u: float, dry: Dry, cov: Matrix, soft: bool,
     x: Vector, total: Matrix, end: Vector,
 ) -> None:  # fmt: skip
@@ -166,7 +166,7 @@ def _step(
     torques = scratch(3)
     slopes = scratch(2, STATES)
     torques[0] = u
-    mode = (MODES - 1) // 2 if soft else _mode_at(normals, halves, x)
+    mode = (MODES - 1) // 2 if soft else _mode_at(normals, halves, depths, x)
     for body in range(2):
         if dry[body, 0] > 0.0:
             at = 1 if body == 0 else STATES - 2
@@ -174,7 +174,7 @@ def _step(
     if soft:
         advance_blurred(mats, b, b_1, normals, halves, cov, h, torques, x, total)
     else:
-        propagate(mats, b, b_1, normals, halves, jumps, phi, gain, gain_1, h, torques, x, total, end)
+        propagate(mats, b, b_1, normals, halves, depths, phi, gain, gain_1, h, torques, x, total, end)
     for body in range(2):
         if dry[body, 0] > 0.0:
             _add_product(gain[mode, 1 + body], slopes[body], total)
@@ -188,7 +188,7 @@ def _add_product(column: Vector, row: Vector, total: Matrix) -> None:
 
 
 def run_free(
-    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, jumps: Stages,
+    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, depths: Halves,
     phi: ModeMatrices, gain: ModeInputs, gain_1: ModeVectors, h: float, u: Reals, dry: Dry, x0: Vector, states: States,
 ) -> None:  # fmt: skip
     """Fill ``states`` (rows, n) with the run from ``x0`` under ``u`` (rows,), nothing measured."""
@@ -201,7 +201,7 @@ def run_free(
     for k in range(len(u)):
         for r in range(STATES):
             states[k, r] = x[r]
-        _step(mats, b, b_1, normals, halves, jumps, phi, gain, gain_1, h, u[k], dry, cov, False, x, total, end)
+        _step(mats, b, b_1, normals, halves, depths, phi, gain, gain_1, h, u[k], dry, cov, False, x, total, end)
 
 
 def _update(x: Vector, cov: Matrix, row: int, e: float, s: float, gain: Vector) -> None:
@@ -280,7 +280,7 @@ def _carry_torque(total: Matrix, cov: Matrix, gain: Vector, variance: float) -> 
 
 
 def run_filter(
-    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, jumps: Stages,
+    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, depths: Halves,
     phi: ModeMatrices, gain: ModeInputs, gain_1: ModeVectors, h: float, u: Reals, u_variance: Reals, y: Table,
     variance: Reals, intensity: Reals, dry: Dry, x0: Vector, spread: Vector, errors: Table, variances: Table,
     states: States, flanks: WholeTable, soft: bool,
@@ -326,10 +326,11 @@ def run_filter(
             _update(x, cov, row, e, s, vector)
         if keep:
             for stage in range(STAGES):
-                flanks[k, stage] = flank_of(normals, stage, halves[stage], x) - 1
+                flank = flank_of(normals, halves, depths, stage, x)
+                flanks[k, stage] = (1 if flank > 2 else 0) - (1 if flank < 2 else 0)
             for r in range(STATES):
                 states[k, r] = x[r]
-        _step(mats, b, b_1, normals, halves, jumps, phi, gain, gain_1, h, u[k], dry, cov, soft, x, total, vector)
+        _step(mats, b, b_1, normals, halves, depths, phi, gain, gain_1, h, u[k], dry, cov, soft, x, total, vector)
         _carry(total, cov, work, intensity, h)
         if len(u_variance) == n:
             _carry_torque(total, cov, gain[free, 0], u_variance[k])

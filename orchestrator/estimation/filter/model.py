@@ -1,6 +1,5 @@
 """Drivetrains as the filter takes them: affine modes, dry friction, noise levels."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,13 +8,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 LOAD_TORQUE = "effects.load_torque.torque"
-IMPULSE = "contact_impulse"
-FADING = 1e-3  # rad, half-gap below which the impulse of a contact fades
+DEPTH = "contact_depth"
+FADING = 1e-3  # rad, half-gap below which the depth of a contact fades: without one, nothing touches
 
 
 @dataclass(frozen=True)
 class AffineModel:
-    """A plant in its smooth modes; an index of modes has a digit for each stage, 0: flank -1, 1: free, 2: flank 1.
+    """A plant in its smooth modes; an index of modes has a digit for each stage, 0 to 4; see :mod:`.motion`.
 
     Attributes:
         matrices: (modes, n, n) A, 1/s.
@@ -23,8 +22,8 @@ class AffineModel:
         constants: (modes, n) effect of offsets and constant torques.
         normals: (stages, n) twist = normal . x.
         halves: (stages,) half-gaps [rad].
+        depths: (stages,) of a contact, at which its damping sets in [rad].
         mobility: (bodies,) what a torque at a body does to its speed, 1/inertia.
-        jumps: (stages, n) sudden change of the state when the teeth touch at flank 1.
         dry: (2, 2) dry friction of motor and load [N.m], and the speed at which it has set in [rad/s].
     """
 
@@ -33,8 +32,8 @@ class AffineModel:
     constants: Array
     normals: Array
     halves: Array
+    depths: Array
     mobility: Array
-    jumps: Array
     dry: Array
 
     @property
@@ -61,40 +60,37 @@ def affine_model(p: Mapping[str, float], row: BodyNames = DRIVETRAIN, dry: Array
 
     Args:
         p: parameters of the plant by name, of which effects are not seen, but for a constant ``LOAD_TORQUE`` [N.m]; and
-            ``IMPULSE`` [N.m.s]: what the last shaft lacks at the load when the teeth touch, and has too much when they
-            part, beside a damper ``c`` that acts from the first moment of contact on: half of ``c`` times the depth
-            within which a real contact's damping sets in (Hunt and Crossley 1975). It fades with the gap: without one,
-            nothing touches.
+            the ``DEPTH`` [rad] of a contact at which its damping sets in.
     """
     inertias, drags = (np.array([p[f"{name}_{body}"] for body in row.bodies]) for name in "Jb")
     ratios, stiffnesses, dampings, halves = (
         np.array([p[name + stage] for stage in row.stages]) for name in ("i", "k", "c", "alpha")
     )
     bodies, stages, n = inertias.size, halves.size, 2 * inertias.size + 1
-    normals, pushes = np.zeros((stages, n)), np.zeros((stages, n))
-    base = np.zeros((n, n))
+    normals, base = np.zeros((stages, n)), np.zeros((n, n))
     for body in range(bodies):
         base[2 * body, 2 * body + 1] = 1.0
         base[2 * body + 1, 2 * body + 1] = -drags[body] / inertias[body]
     base[1, n - 1], base[n - 1, n - 1] = 1.0 / inertias[0], -1.0 / p["tau"]
-    matrices, constants = np.tile(base, (3**stages, 1, 1)), np.zeros((3**stages, n))
+    modes = np.arange(5**stages)
+    matrices, constants = np.tile(base, (modes.size, 1, 1)), np.zeros((modes.size, n))
     constants[:, n - 2] = -p.get(LOAD_TORQUE, 0.0) / inertias[-1]
+    depths = np.maximum(p.get(DEPTH, 0.0) * halves / np.hypot(halves, FADING), -0.5 * halves)
     for stage in range(stages):
         normals[stage, 2 * stage], normals[stage, 2 * stage + 2] = 1.0 / ratios[stage], -1.0
-        push = pushes[stage]  # accelerations by the shaft's torque
+        push = np.zeros(n)  # accelerations by the shaft's torque
         push[2 * stage + 1] = -1.0 / (ratios[stage] * inertias[stage])
         push[2 * stage + 3] = 1.0 / inertias[stage + 1]
-        wound = stiffnesses[stage] * normals[stage] + dampings[stage] * np.roll(normals[stage], 1)
-        for mode in range(3**stages):
-            flank = mode // 3 ** (stages - 1 - stage) % 3 - 1
-            if flank:
-                matrices[mode] += np.outer(push, wound)
-                constants[mode] -= push * stiffnesses[stage] * flank * halves[stage]
+        flank = modes // 5 ** (stages - 1 - stage) % 5 - 2
+        full, shallow = np.abs(flank) == 2, np.abs(flank) == 1
+        springs = stiffnesses[stage] * (full | shallow & (depths[stage] >= 0.0))
+        dampers = dampings[stage] * (full | shallow & (depths[stage] < 0.0))
+        matrices += np.multiply.outer(springs, np.outer(push, normals[stage]))
+        matrices += np.multiply.outer(dampers, np.outer(push, np.roll(normals[stage], 1)))
+        constants -= np.outer(springs * np.sign(flank) * halves[stage], push)
     inputs = np.zeros((3, n))
     inputs[0, n - 1], inputs[1, 1], inputs[2, n - 2] = 1.0 / p["tau"], 1.0 / inertias[0], 1.0 / inertias[-1]
-    jumps = np.zeros((stages, n))
-    jumps[-1] = -p.get(IMPULSE, 0.0) * halves[-1] / math.hypot(halves[-1], FADING) * pushes[-1]
-    return AffineModel(matrices, inputs, constants, normals, halves, 1.0 / inertias, jumps, dry)
+    return AffineModel(matrices, inputs, constants, normals, halves, depths, 1.0 / inertias, dry)
 
 
 @dataclass(frozen=True)

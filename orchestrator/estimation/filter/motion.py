@@ -2,14 +2,15 @@
 
 The state is ``x = (theta_1, omega_1, theta_2, ..., omega_B, T_m)``: angle and speed of each body, motor first, and the
 drive's torque. The twist of stage ``s`` is ``d = theta_s / i_s - theta_(s+1)``; while teeth touch at flank ``f``, its
-shaft carries ``k (d - f alpha) + c d'``. Each stage is at flank -1, free, or at flank 1 (digits 0, 1, 2): a mode has
-the digits of all stages, the first in front, and is affine. Sizes are those of a plant: the module is written for
+shaft carries ``k (d - f alpha)``, and ``c d'`` where the contact is deeper than its ``depth``, as if the damping that
+sets in with depth did so at once. Each stage is at flank -1, shallow there, free, shallow at flank 1, or at flank 1
+(digits 0 to 4): a mode has the digits of all stages, the first in front, and is affine. Where ``depth`` is negative,
+only the damping acts while a contact is shallow. Sizes are those of a plant: the module is written for
 :mod:`.one_stage` and bound to others.
 
 In all functions: ``mats`` (modes, n, n), ``b`` (3, n), ``b_1`` (modes, n): the modes' matrices, what the request, and
 torques on motor and load do, constants. ``phi``, ``gain`` (modes, 3, n), ``gain_1``: the same over a sample ``h`` [s].
-``normals`` (stages, n) take twists from the state, ``halves`` (stages,) are half-gaps [rad]. ``jumps`` (stages, n) is
-how the state changes at once when teeth touch at flank 1; at flank -1, and when they part, it is the opposite.
+``normals`` (stages, n) take twists from the state, ``halves`` and ``depths`` (stages,) are half-gaps and depths [rad].
 ``torques`` (3,): the request, and what acts on motor and load [N.m]. ``total`` (n, n) is filled with the Jacobian.
 """
 
@@ -156,26 +157,34 @@ def identity(out: Matrix) -> None:
             out[r, c] = 1.0 if r == c else 0.0
 
 
-def flank_of(normals: Stages, stage: int, half: float, x: Vector) -> int:
-    """Return the flank of a stage as a digit: 0, 1 (free) or 2; closed where there is no gap."""
+def flank_of(normals: Stages, halves: Halves, depths: Halves, stage: int, x: Vector) -> int:
+    """Return the flank of a stage as a digit, 0 to 4; full contact where there is no gap."""
+    half, depth = halves[stage], depths[stage]
     if half <= 0.0:
-        return 2
+        return 4
     a = 2 * stage
     d = normals[stage, a] * x[a] + normals[stage, a + 2] * x[a + 2]
-    if d > half:
-        return 2
-    return 0 if d < -half else 1
+    side = 1 if d > 0.0 else -1
+    if abs(d) > half + max(depth, 0.0):
+        return 2 + 2 * side
+    return 2 + side if abs(d) > half + min(depth, 0.0) else 2
+
+
+def _border(half: float, depth: float, flank: int) -> float:
+    """Return the twist [rad] between a flank and the next one up."""
+    reach = half + (max(depth, 0.0) if flank == 0 or flank == 3 else min(depth, 0.0))
+    return reach if flank > 1 else -reach
 
 
 def _next_meeting(
-    normals: Stages, stage: int, half: float, flank: int, x: Vector, end: Vector, h: float
-) -> tuple[float, float]:
-    """Return (time, side) of the first meeting of twist and flank of a stage on the way to ``end``; -1.0: none.
+    normals: Stages, stage: int, half: float, depth: float, flank: int, x: Vector, end: Vector, h: float
+) -> tuple[float, int]:
+    """Return (time, flank) of the first change of flank of a stage on the way to ``end``; -1.0: none.
 
     ``end`` is where the present mode alone leads in ``h``; the cubic through both ends is close enough to find it.
     """
     if half <= 0.0:
-        return -1.0, 0.0
+        return -1.0, flank
     a = 2 * stage
     one, two = normals[stage, a], normals[stage, a + 2]
     d0 = one * x[a] + two * x[a + 2]
@@ -183,61 +192,62 @@ def _next_meeting(
     d1 = one * end[a] + two * end[a + 2]
     w1 = one * end[a + 1] + two * end[a + 3]
     hit = -1.0
-    side = 0.0
+    after = flank
     reach = h * (abs(w0) + abs(w1))
-    if flank == 1:
-        for way in range(2):
-            s = 1.0 if way == 0 else -1.0
-            if half - s * d1 > reach and half - s * d0 > reach:
-                continue
-            when = first_root(max(half - s * d0, 0.0), -s * w0, half - s * d1, -s * w1, h)
-            if when >= 0.0 and (hit < 0.0 or when < hit):
-                hit, side = when, s
-        return hit, side
-    side = 1.0 if flank == 2 else -1.0
-    if not (side * d1 - half > reach and side * d0 - half > reach):
-        hit = first_root(max(side * d0 - half, 0.0), side * w0, side * d1 - half, side * w1, h)
-    return hit, side
+    for way in range(2):
+        beside = flank + 1 if way == 0 else flank - 1
+        if beside < 0 or beside > 4:
+            continue
+        s = 1.0 if way == 0 else -1.0
+        border = s * _border(half, depth, min(flank, beside))
+        if border - s * d1 > reach and border - s * d0 > reach:
+            continue
+        when = first_root(max(border - s * d0, 0.0), -s * w0, border - s * d1, -s * w1, h)
+        if when >= 0.0 and (hit < 0.0 or when < hit):
+            hit, after = when, beside
+    if depth == 0.0 and (after == 1 or after == 3):
+        after = 2 * after - flank
+    return hit, after
 
 
 def _next_event(
-    normals: Stages, halves: Halves, flanks: FlankList, x: Vector, end: Vector, h: float
-) -> tuple[float, float, int]:
-    """Return (time, side, stage) of the first meeting in any stage; -1.0: none."""
+    normals: Stages, halves: Halves, depths: Halves, flanks: FlankList, x: Vector, end: Vector, h: float
+) -> tuple[float, int, int]:
+    """Return (time, flank, stage) of the first change of flank in any stage; -1.0: none."""
     hit = -1.0
-    side = 0.0
+    after = 0
     where = 0
     for stage in range(STAGES):
-        when, which = _next_meeting(normals, stage, halves[stage], int(flanks[stage]), x, end, h)
+        when, flank = _next_meeting(normals, stage, halves[stage], depths[stage], int(flanks[stage]), x, end, h)
         if when >= 0.0 and (hit < 0.0 or when < hit):
-            hit, side, where = when, which, stage
-    return hit, side, where
+            hit, after, where = when, flank, stage
+    return hit, after, where
 
 
 def _mode_of(flanks: FlankList) -> int:
     """Return the mode of all stages' flanks."""
     mode = 0
     for stage in range(STAGES):
-        mode = 3 * mode + int(flanks[stage])
+        mode = 5 * mode + int(flanks[stage])
     return min(max(mode, 0), MODES - 1)
 
 
 def propagate(
-    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, jumps: Stages,
+    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, depths: Halves,
     phi: ModeMatrices, gain: ModeInputs, gain_1: ModeVectors, h: float, torques: Three, x: Vector, total: Matrix,
     end: Vector,
 ) -> None:  # fmt: skip
     """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch."""
     flanks = scratch(STAGES)
     for stage in range(STAGES):
-        flanks[stage] = float(flank_of(normals, stage, halves[stage], x))
+        flanks[stage] = float(flank_of(normals, halves, depths, stage, x))
     mode = _mode_of(flanks)
     _advance(phi[mode], gain[mode], gain_1[mode], torques, x, end)
-    hit, _, _ = _next_event(normals, halves, flanks, x, end, h)
+    hit, _, _ = _next_event(normals, halves, depths, flanks, x, end, h)
     if hit < 0.0:
         _copy(phi[mode], end, total, x)
         return
-    _cross(mats, b, b_1, normals, halves, jumps, h, torques, x, total, end, flanks)
+    _cross(mats, b, b_1, normals, halves, depths, h, torques, x, total, end, flanks)
 
 
 def _expand(a: Matrix, b: Inputs, b_1: Vector, torques: Three, h: float, x: Vector, series: States) -> int:
@@ -301,7 +311,7 @@ def _grow(a: Matrix, h: float, total: Matrix) -> None:
 
 
 def _cross(
-    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, jumps: Stages, h: float,
+    mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, depths: Halves, h: float,
     torques: Three, x: Vector, total: Matrix, end: Vector, flanks: FlankList,
 ) -> None:  # fmt: skip
     """Advance ``x`` through a sample in which teeth meet or part, from ``flanks`` on.
@@ -319,7 +329,7 @@ def _cross(
         piece = min(left, 1.0 / max(_fastest_rate(mats[mode]), 1.0 / h))
         last = _expand(mats[mode], b, b_1[mode], torques, piece, x, series)
         _evaluate(series, last, 1.0, end)
-        hit, side, stage = _next_event(normals, halves, flanks, x, end, piece)
+        hit, after, stage = _next_event(normals, halves, depths, flanks, x, end, piece)
         if hit < 0.0 or events == MOST_EVENTS:
             _grow(mats[mode], piece, total)
             for r in range(STATES):
@@ -331,22 +341,20 @@ def _cross(
         events += 1
         a = 2 * stage
         one, two = normals[stage, a], normals[stage, a + 2]
+        border = _border(halves[stage], depths[stage], min(int(flanks[stage]), after))
         rate = 0.0
         for newton in range(4):
             # Newton steps on the series put the event where the cubic almost did.
             _evaluate(series, last, hit / piece, x)
-            gap = one * x[a] + two * x[a + 2] - side * halves[stage]
+            gap = one * x[a] + two * x[a + 2] - border
             rate = one * x[a + 1] + two * x[a + 3]
             if newton == 3 or abs(rate) < 1e-9 or abs(gap) < 1e-15:
                 break
             hit = min(max(hit - gap / rate, 0.0), piece)
         _grow(mats[mode], hit, total)
-        touches = int(flanks[stage]) == 1
         _advance(mats[mode], b, b_1[mode], torques, x, speed0)
-        flanks[stage] = (2.0 if side > 0.0 else 0.0) if touches else 1.0
+        flanks[stage] = float(after)
         mode = _mode_of(flanks)
-        for r in range(STATES):
-            x[r] += (side if touches else -side) * jumps[stage, r]
         _advance(mats[mode], b, b_1[mode], torques, x, speed1)
         if abs(rate) > 1e-6:
             for c in range(STATES):

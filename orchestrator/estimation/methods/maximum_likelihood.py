@@ -19,12 +19,11 @@ from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import describe, describe_unfinished
 from orchestrator.estimation.effort import Effort, Stop, StoppedError, never
 from orchestrator.estimation.filter.innovations import count_traversals
-from orchestrator.estimation.filter.model import Array
+from orchestrator.estimation.filter.model import DEPTH, Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
 from orchestrator.estimation.problem import (
     DRY,
-    IMPULSE,
     LATE,
     LEAST_WHERE_INEXACT,
     LOAD_TORQUE,
@@ -157,8 +156,8 @@ def _objective(fit: Fit) -> float:
 
 def _with_contact(best: Fit) -> Fit:
     """Return the fit, with a least torque noise where the machine's contact law is not the model's."""
-    likelihood, impulse = best.likelihood, best.parameters()[IMPULSE]
-    is_clear = abs(impulse["value"]) > likelihood.settings.fit.clear_impulse * impulse["standard_error"]
+    likelihood, depth = best.likelihood, best.parameters()[DEPTH]
+    is_clear = abs(depth["value"]) > likelihood.settings.fit.clear_depth * depth["standard_error"]
     if not is_clear or _has_least_noise(likelihood):
         return best
     likelihood = _with_least_noise(likelihood)
