@@ -19,7 +19,7 @@ from orchestrator.estimation.problem import OFFSET
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.estimation.stages.fit import fit_stages, look_nearby, move_share
 from orchestrator.estimation.stages.location import locate
-from orchestrator.estimation.stages.problem import SHARE, TOTAL, make_problem
+from orchestrator.estimation.stages.problem import GAPS, SHARE, TOTAL, make_problem
 from orchestrator.records.record import record_from_columns
 from tests.support.independent_plant import write_csv
 from tests.support.two_stage_record import FRICTION, NOMINAL, make_two_stage_record
@@ -193,17 +193,17 @@ def test_the_intervals_of_both_hold_every_optimum_that_is_about_as_good(both):
     assert own.answers == ("both",)
     likelihood, theta = both.free.likelihood, both.free.point.theta.copy()
     theta[likelihood.problem.index(SHARE)] += 0.2
-    ratio = likelihood.value(theta, "i_2")
+    p = likelihood.parameters(theta)
     for behind, held in ((2.0, True), (30.0, False)):  # of the objective
         point = replace(both.free.point, theta=theta, objective=both.free.point.objective + behind)
         other = replace(both.free, point=point)
         found = locate(replace(both, shared=(other,)), settings)
         assert [gap.alpha for gap in found.stages] == [gap.alpha for gap in own.stages]
-        for n, half in enumerate(likelihood.halves(theta)):
+        for n, half in enumerate(p[name] for name in GAPS):
             assert (found.stages[n].interval[0] <= half <= found.stages[n].interval[1]) == held
             assert found.stages[n].interval[0] <= own.stages[n].interval[0]
             assert found.stages[n].interval[1] >= own.stages[n].interval[1]
-    assert abs(own.total.alpha - (0.006 / ratio + 0.012)) < 1e-3
+    assert abs(own.total.alpha - (0.006 / p["i_2"] + 0.012)) < 1e-3
 
 
 def test_a_fit_at_a_wrong_share_finds_a_better_one_nearby(both):
