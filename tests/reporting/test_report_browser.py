@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missin
 
 @pytest.fixture(scope="module")
 def driver():
-    with browsers.browser() as started:
+    with browsers.browser(requests=True) as started:
         yield started
 
 

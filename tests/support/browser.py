@@ -33,8 +33,8 @@ def missing() -> str:
 
 
 @contextmanager
-def browser() -> Iterator[Any]:
-    """Yield a Selenium driver with a fresh profile that records everything that the page logs."""
+def browser(requests: bool = False) -> Iterator[Any]:
+    """Yield a Selenium driver with a fresh profile that records what the page logs; asked to, what it requests too."""
     os.environ["SE_OFFLINE"] = "true"
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
@@ -44,7 +44,8 @@ def browser() -> Iterator[Any]:
     with tempfile.TemporaryDirectory() as profile:
         for flag in (*FLAGS, f"--user-data-dir={profile}"):
             options.add_argument(flag)
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        logs = ("browser", "performance") if requests else ("browser",)
+        options.set_capability("goog:loggingPrefs", dict.fromkeys(logs, "ALL"))
         driver = webdriver.Chrome(options=options, service=Service(str(shutil.which("chromedriver"))))
         try:
             yield driver

@@ -29,7 +29,7 @@ def served(tmp_path_factory: pytest.TempPathFactory):
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return drive_log(tmp_path_factory.mktemp("log") / "drive.csv")
+    return drive_log(tmp_path_factory.mktemp("log") / "drive.csv", 1500)
 
 
 @pytest.fixture(scope="module")
@@ -242,16 +242,16 @@ def test_every_channel_is_drawn_and_found_by_its_name(inspected: Any) -> None:
     curves = inspected.execute_script(drawn)
     assert [one[0] for one in curves[:4]] == ["Time", "Torque asked for", "Motor angle", "Load angle"]
     assert len(curves) == 8  # beside the cards, and in the list
-    assert curves[0][2] == "0 to 5998 ms"
+    assert curves[0][2] == "0 to 2998 ms"
     assert curves[1][2].endswith(" A")
     type_into = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))"
     for text, count in (("achse", 1), ("load angle", 1), ("[deg]", 2), ("none", 0), ("", 4)):
         inspected.execute_script(type_into, find(inspected, "[data-key=find-channel]"), text)
         assert len(inspected.find_elements("css selector", "#panel-log .channel")) == count
     press(inspected, "Zoom in")
-    wait_for_text(inspected, "panel-log", "rows 751 to 2,250")
+    wait_for_text(inspected, "panel-log", "rows 376 to 1,125")
     press(inspected, "All rows")
-    wait_for_text(inspected, "panel-log", "rows 1 to 3,000")
+    wait_for_text(inspected, "panel-log", "rows 1 to 1,500")
     choose_tab(inspected, "start")
     wait_for_text(inspected, "panel-start", "✓ done drive.csv was looked at")
     wait_for_text(inspected, "panel-start", "to do press “Estimate the gap”")

@@ -30,7 +30,7 @@ pytest.importorskip("uvicorn")
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return drive_log(tmp_path_factory.mktemp("log") / "drive.csv")
+    return drive_log(tmp_path_factory.mktemp("log") / "drive.csv", 1500)
 
 
 @pytest.fixture(scope="module")
