@@ -107,7 +107,9 @@ from pathlib import Path
 import orchestrator as oc
 from orchestrator.reporting import report_from_directory
 
-found = oc.inspect("docs/examples/machine.csv")
+log = Path("docs/examples/machine.csv")
+log.write_text("".join(log.read_text().splitlines(keepends=True)[:401]))
+found = oc.inspect(log)
 found.save("out")
 (told,) = {row["median"] for row in json.loads(Path("out/inspect.json").read_text())["results"]["channels"][:1]}
 page = next(s for s in report_from_directory(Path("out")).all_sections() if s.title == "Channels")

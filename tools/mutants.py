@@ -4,9 +4,10 @@
 
 Each mutant changes one operator, comparison, constant, branch or statement of one module in a copy of the project and
 runs the fast tests of its room there, up to the first that fails; with ``--every`` all of them, and a table says which
-tests catch what no other does. A mutant that passes them all has survived; one whose run has to be ended counts as
-neither caught nor survived. Slices of one seed share one sample of mutants; results are merged into the file, so
-that the slices may run at different times. A mutant that was not caught is tried again by a later run.
+tests catch what no other does. ``--marks "night or not slow"`` runs the tests of the night too. A mutant that passes
+them all has survived; one whose run has to be ended counts as neither caught nor survived. Slices of one seed share one
+sample of mutants; results are merged into the file, so that the slices may run at different times. A mutant that was
+not caught is tried again by a later run.
 """
 
 import argparse
@@ -34,6 +35,7 @@ from tools.mutant_order import LIMIT, NOTES, PLACE
 ROOT = Path(__file__).resolve().parents[1]
 # s of one test run, for a mutant may loop for ever: processor time of the tests' process, and by the clock.
 TIME_LIMIT, CLOCK_LIMIT = 300.0, 3600.0
+MARKS = "not slow"  # tests of a day that are quick
 
 COMPARED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
             ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is}  # fmt: skip
@@ -211,7 +213,9 @@ def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
     return [(m, changed((root / m.module).read_text(encoding="utf-8"), node, number)) for m, node, number in chosen]
 
 
-def outcome(root: Path, tests: tuple[str, ...], place: str = "", every: bool = False) -> tuple[str, list[str]]:
+def outcome(
+    root: Path, tests: tuple[str, ...], place: str = "", every: bool = False, marks: str = MARKS
+) -> tuple[str, list[str]]:
     """Run tests in a copy of the project.
 
     The limit of processor time holds for the tests' process alone: a child that it ended would be a failed test.
@@ -221,6 +225,7 @@ def outcome(root: Path, tests: tuple[str, ...], place: str = "", every: bool = F
         tests: files or folders, from there.
         place: of the change, as ``module:line``; empty: there is none, and what the tests call is noted.
         every: go on after the first test that fails.
+        marks: which of the tests, as ``pytest -m`` says it.
 
     Returns:
         ``"survived"``; ``"caught"`` where a test fails or a module cannot be imported; ``"no end"`` where the run was
@@ -234,7 +239,7 @@ def outcome(root: Path, tests: tuple[str, ...], place: str = "", every: bool = F
     }
     environment |= {PLACE: place} if place else {}
     first = [] if every else ["-x"]
-    command = [sys.executable, "-m", "pytest", *first, "-q", "--no-header", "-m", "not slow", "-p", "no:cacheprovider"]
+    command = [sys.executable, "-m", "pytest", *first, "-q", "--no-header", "-m", marks, "-p", "no:cacheprovider"]
     with tempfile.TemporaryFile() as output:
         run = subprocess.Popen(
             [*command, "-p", mutant_order.__name__, *tests], cwd=root, env=environment, stdout=output, stderr=output,
@@ -274,6 +279,7 @@ def main() -> int:
     parser.add_argument("--slice", default="1/1", help="which part of the sample: 3/8 is the third of eight")
     parser.add_argument("--room", help="one room alone")
     parser.add_argument("--out", type=Path, default=Path("mutants.json"))
+    parser.add_argument("--marks", default=MARKS, help="which tests run, as `pytest -m` says it")
     parser.add_argument("--every", action="store_true", help="note all tests that catch a mutant, not the first alone")
     parser.add_argument("--seconds", type=float, default=1e9, help="start no mutant after this time")
     options = parser.parse_args()
@@ -287,7 +293,7 @@ def main() -> int:
         root = Path(folder) / "copy"
         shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".venv", ".git", "fmus"))
         for room in ROOMS:
-            if options.room in (None, room.name) and outcome(root, room.tests)[0] != "survived":
+            if options.room in (None, room.name) and outcome(root, room.tests, marks=options.marks)[0] != "survived":
                 sys.exit(f"the tests of {room.name} fail without any change")
         for mutant, source in sample(root, options.count, options.seed)[part - 1 :: parts]:
             key = (mutant.module, mutant.line, mutant.change, mutant.text)
@@ -298,7 +304,7 @@ def main() -> int:
             original = (root / mutant.module).read_text(encoding="utf-8")
             (root / mutant.module).write_text(source, encoding="utf-8")
             room, place = rooms[mutant.room], f"{mutant.module}:{mutant.line}"
-            found, by = outcome(root, room.tests, place, options.every)
+            found, by = outcome(root, room.tests, place, options.every, options.marks)
             (root / mutant.module).write_text(original, encoding="utf-8")
             results.append(asdict(mutant) | {"outcome": found, "by": by})
             options.out.write_text(json.dumps(results, indent=1))
