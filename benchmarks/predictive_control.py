@@ -29,7 +29,7 @@ import orchestrator as oc
 from orchestrator.api.compensate import summarise_law
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.control.loops import FMUS, SHIFTED, ControlTask, make_loop
-from orchestrator.control.measures import bound_time, first_path, measure_loop
+from orchestrator.control.measures import bound_time, measure_loop
 from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import ModelInterface, Signals, Transfer, Value, Variable
 from orchestrator.master.system import Connection, Instance, System
@@ -251,7 +251,7 @@ def run_predictive(task: ControlTask, plants: int, seed: int) -> LawFound:
     """Return what is measured of the MPC on the plants of ``compensate``."""
     law, fmus = PredictiveLaw(task), ensure_fastest(FMUS).paths
     runs = [simulate(make_predictive_loop(law, fmus, (seed, plant))) for plant in range(plants)]
-    return summarise_law(MPC, [measure_loop(run, task) for run in runs], first_path(runs[0], task))
+    return summarise_law(MPC, [measure_loop(run, task) for run in runs])
 
 
 def main() -> None:

@@ -21,7 +21,6 @@ from orchestrator.control.measures import (
     LoopMeasures,
     bound_path,
     bound_time,
-    first_path,
     measure_loop,
     quickest_landing,
 )
@@ -271,19 +270,17 @@ def _run_laws(
     laws, found = [], {}
     for n, law in enumerate(LAWS):
         measured: list[LoopMeasures] = []
-        path = (np.zeros(0), np.zeros(0))
         for plant in range(plants):
-            run = simulate(make_loop(task, fmus, law, (seed, plant)))
-            measured.append(measure_loop(run, task))
-            path = first_path(run, task) if not path[0].size else path
+            measured.append(measure_loop(simulate(make_loop(task, fmus, law, (seed, plant))), task))
             progress(n * plants + plant + 1, len(LAWS) * plants)
-        laws.append(summarise_law(law, measured, path))
+        laws.append(summarise_law(law, measured))
         found[law] = measured
     return tuple(laws), found
 
 
-def summarise_law(law: str, measured: Sequence[LoopMeasures], path: tuple[Array, Array]) -> LawFound:
+def summarise_law(law: str, measured: Sequence[LoopMeasures]) -> LawFound:
     """Return medians and 95 % quantiles over plants that are stable."""
+    times, path = next((m.path for m in measured if m.path[0].size), measured[0].path)
     stable = [m for m in measured if m.stable]
     every = {
         "time": np.concatenate([np.zeros(0), *(m.times for m in stable)]),
@@ -299,8 +296,8 @@ def summarise_law(law: str, measured: Sequence[LoopMeasures], path: tuple[Array,
         upper={name: float(np.quantile(every[name], 0.95)) for name in UPPER if every[name].size},
         times=tuple(every["time"].tolist()),
         impacts=tuple(every["landing"].tolist()),
-        path_times=tuple(path[0].tolist()),
-        path=tuple(path[1].tolist()),
+        path_times=tuple(times.tolist()),
+        path=tuple(path.tolist()),
     )
 
 

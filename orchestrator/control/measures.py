@@ -24,6 +24,7 @@ class LoopMeasures:
         rest: motion of the load at the end of the run, peak to peak [counts of its encoder, or its noise].
         contacts: at the end of the run [1/s].
         stable: the load stays near the end of the move.
+        path: of the first traversal, times [s] and twist from the flank at its start [rad]; empty where there is none.
     """
 
     times: Array
@@ -33,19 +34,26 @@ class LoopMeasures:
     rest: float
     contacts: float
     stable: bool
+    path: tuple[Array, Array]
 
 
 def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
     """Return the measures of a run of ``make_loop``."""
     contact = np.round(run["plant.contact"])
     speed = np.abs(run["plant.omega_m"] / task.nominal.i - run["plant.omega_l"])
+    twist = run["plant.theta_m"] / task.nominal.i - run["plant.theta_l"]
     met = np.flatnonzero((contact[1:] != 0) & (contact[:-1] != contact[1:]))
     left = np.flatnonzero((contact[:-1] != 0) & (contact[:-1] != contact[1:]))
     times, impacts = [], []
+    path = (np.zeros(0), np.zeros(0))
     for end in met:
         before = left[left <= end]
         if before.size and contact[before[-1]] == -contact[end + 1]:
-            times.append((end - before[-1]) * task.sample_time)
+            begin, flank = before[-1], contact[end + 1]
+            if not times:
+                rows = slice(begin, end + 2)
+                path = (run.time[rows] - run.time[begin], flank * twist[rows] + task.machine.alpha)
+            times.append((end - begin) * task.sample_time)
             impacts.append(speed[end])
     theta_l = run["plant.theta_l"]
     count = task.machine.counts[1] or task.machine.noise[1]
@@ -60,6 +68,7 @@ def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
         float(np.ptp(theta_l[tail]) / count),
         float(np.sum(run.time[met] >= moving) / REST),
         bool(np.abs(theta_l - reference)[tail].max() < task.height),
+        path,
     )
 
 
@@ -91,20 +100,6 @@ def bound_path(task: ControlTask, impact_speed: float) -> tuple[Array, Array]:
     return times, np.array(
         [point_at(t, float(time), task.nominal.tau, inertia)[0] for time in times]
     ) + task.machine.alpha
-
-
-def first_path(run: Recording, task: ControlTask) -> tuple[Array, Array]:
-    """Return times [s] and twist from the flank that is left [rad] of the first traversal of a run."""
-    contact = np.round(run["plant.contact"])
-    flank = 0.0
-    begin = 0
-    for n, now in enumerate(contact):
-        if now != 0.0:
-            if flank and now != flank:
-                twist = now * (run["plant.theta_m"] / task.nominal.i - run["plant.theta_l"])
-                return run.time[begin : n + 1] - run.time[begin], twist[begin : n + 1] + task.machine.alpha
-            flank, begin = now, n
-    return np.zeros(0), np.zeros(0)
 
 
 def _best(task: ControlTask, impact_speed: float) -> Traversal:

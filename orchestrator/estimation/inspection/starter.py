@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from orchestrator.estimation.inspection.machine import ROUGH
 from orchestrator.plain_text import plain_text
 from orchestrator.records.columns import COLUMNS, KINDS, Column
 from orchestrator.records.formats import open_source
@@ -179,6 +178,3 @@ def blank_starter(path: Path, columns: Mapping[str, Column], header: int | None,
         entry = f"{name} = {{ value = {value}, relative_uncertainty = {share} }}"
         lines.append(f"# {entry}   # {model.parameters[name].unit or '1'}; FILL IN: {meaning}")
     return "\n".join(lines).rstrip() + "\n"
-
-
-__all__ = ["ROUGH", "assume_columns", "blank_starter", "starter"]
