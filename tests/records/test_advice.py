@@ -224,7 +224,7 @@ ADVICE: dict[str, tuple[Input, str, Input]] = {
     ),
     "another raster": (
         Input(_two_rasters,
-            {"u": Column("u")}), "say how to bring it to those of `theta_m`: `resample` linear or cubic",
+            {"u": Column("u")}), "state how to interpolate it to those of `theta_m`: `resample` linear or cubic",
         Input(_two_rasters, {"u": Column("u")}, Reading(resample="linear")),
     ),
     "coarse stamps": (
