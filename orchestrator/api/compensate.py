@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.at_rest import five, margins_text, rest_text
 from orchestrator.api.machine import read_fitted_model, require_machine
 from orchestrator.api.plotted import PlottedResult
+from orchestrator.api.regulator import five
 from orchestrator.api.shown import Block
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.building.starts import SAMPLE_TIME
@@ -102,8 +102,8 @@ class CompensateResult(PlottedResult):
             *laws_tables(f"{title}: medians over {self.arguments['plants']} plants", self.laws),
             bound,
             chosen,
-            rest_text(self.forecast, "the plain LQR"),
-            margins_text(self.forecast),
+            self.forecast.rest_text("the plain LQR"),
+            self.forecast.margins_text(),
             *self.doubts,
         ]
 

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.at_rest import LARGEST_WEIGHT, five, margins_text, rest_text
 from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.shown import Block
 from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, TORQUE_WEIGHT
@@ -22,6 +21,7 @@ from orchestrator.shared.output import write_columns, write_whole
 from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound, gains_table
 
 RANGES = {"torque_weight": (1e-12, 1e12), "sample_time": (1e-4, 0.05), "delay": (0, 100)}  # s, samples
+LARGEST_WEIGHT = 1e12
 POINTS = 400  # of the response
 LOWEST = 1e-2  # frequency of the response [Hz]
 
@@ -64,7 +64,7 @@ class RegulatorResult(PlottedResult):
     def blocks(self) -> Sequence[Block]:
         """Return the gains, and what the loop does."""
         found = gains_table(self.gains_by_name, REGULATOR_STATES, GAIN_UNITS)
-        return [found, rest_text(self.forecast, "the loop"), margins_text(self.forecast)]
+        return [found, self.forecast.rest_text("the loop"), self.forecast.margins_text()]
 
     def _response(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return frequencies [Hz], size and phase [rad] of the loop without a gap, cut at the request."""
@@ -154,3 +154,10 @@ def design_regulator(
         chosen = design.design_regulator(five_state_model(values), np.diag(weights), torque_weight, sample_time).gains
     forecast = forecast_rest(values, chosen, sample_time, delay)
     return RegulatorResult(chosen, values, sample_time, delay, forecast, given)
+
+
+def five(name: str, numbers: Sequence[float], least: float) -> tuple[float, ...]:
+    """Return five numbers within their bounds, one for each of ``REGULATOR_STATES``."""
+    if len(numbers) != len(REGULATOR_STATES):
+        raise ScenarioError(f"`{name}` must be {len(REGULATOR_STATES)} numbers, but are {len(numbers)}", name)
+    return tuple(within(name, float(number), least, LARGEST_WEIGHT) for number in numbers)

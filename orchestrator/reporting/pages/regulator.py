@@ -12,10 +12,9 @@ def build(source: ResultDocument) -> Report:
     """Return the page."""
     results = read(source.results, RegulatorFound)
     f = results.forecast
-    cycle = f"has a limit cycle at {f.frequency:.3g} Hz, with an amplitude of {f.load:.3g} half-gaps at the load"
     return Report(
         title="Regulator of a drivetrain with a gap",
-        summary=f"Without friction, load torque and torque limit, the loop {cycle if f.cycles else 'comes to rest'}.",
+        summary=f.rest_text("the loop"),
         sections=(
             gains_table(results.gains, REGULATOR_STATES, GAIN_UNITS),
             *rest_facts(f, "The loop"),

@@ -1,5 +1,6 @@
 """What ``regulator.json`` holds: gains of an LQR, and what its loop does."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated
 
@@ -26,6 +27,27 @@ class ForecastFound(msgspec.Struct, frozen=True):
     settled: bool = True
     lower_gain: Annotated[float | None, Display("lower gain margin without a gap, as a factor")] = None
     upper_gain: Annotated[float | None, Display("upper gain margin without a gap, as a factor")] = None
+
+    def rest_text(self, loop: str) -> str:
+        """Say in one line what ``loop`` does at rest by its gains alone."""
+        rest = "comes to rest"
+        if self.cycles:
+            rest = (
+                f"has a limit cycle at {self.frequency:.3g} Hz, with an amplitude of {self.load:.3g} half-gaps at the "
+                f"load and {self.twist:.3g} half-gaps in the twist"
+            )
+        rest += "" if self.settled else "; the motion still changes at the end of the prediction"
+        return f"Without friction, load torque and torque limit, {loop} {rest}."
+
+    def margins_text(self) -> str:
+        """Say in one line which margins the loop has without a gap, and how many states are controllable."""
+        delay = "any delay" if self.delay_margin is None else f"{1e3 * self.delay_margin:.3g} ms"
+        upper = "any factor" if self.upper_gain is None else f"{self.upper_gain:.3g}"
+        return (
+            f"Margins of the loop without a gap: phase margin {math.degrees(self.phase_margin):.3g} degrees, delay "
+            f"margin {delay}, gain margins {self.lower_gain or 0.0:.3g} to {upper}. "
+            f"{self.rank} of 6 states are controllable; the load torque is not."
+        )
 
 
 class RegulatorFound(ResultData, frozen=True, kw_only=True):
