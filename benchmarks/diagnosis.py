@@ -3,6 +3,7 @@
     python -m benchmarks.diagnosis --singles 200 --none 100 --doubles 40 --unknown 50 --seed 80000
     python -m benchmarks.diagnosis --singles 200 --none 100 --doubles 40 --torque-noise --shifts --gain --seed 81000
     python -m benchmarks.diagnosis --one-encoder 60 --seed 82000    # a gap behind the motor's encoder alone
+    python -m benchmarks.diagnosis --off-centre 8 --seed 84000    # an encoder that is mounted off its centre
     python -m benchmarks.diagnosis --singles 40 --logger zeros --out OTHER    # then benchmarks.ablation --before
 
 One line a record as it goes, in two processes; the figures at the end, and ``figures.json``. Three machines take turns.
@@ -115,13 +116,13 @@ def ways_of(args: argparse.Namespace) -> Ways:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name in ("singles", "none", "doubles", "unknown", "one-encoder"):
+    for name in ("singles", "none", "doubles", "unknown", "one-encoder", "off-centre"):
         parser.add_argument(f"--{name}", type=int, default=0, metavar="N")
     add_ways(parser)
     parser.add_argument("--logger", choices=("zeros", "stamps"), default="", help="another zero, or stamps of a PC")
     parser.add_argument("--out", type=Path, default=Path("results/bench_diagnosis"))
     args = parser.parse_args()
-    counts = Counts(args.none, args.singles, args.doubles, args.unknown, args.one_encoder)
+    counts = Counts(args.none, args.singles, args.doubles, args.unknown, args.one_encoder, args.off_centre)
     tasks = simulated_tasks(counts, args.seed, ways_of(args), args.machines, args.logger)
     rows = run_tasks(tasks, diagnose_task, args.out / f"rows-{args.seed}.jsonl", args.processes)
     if rows:

@@ -26,7 +26,7 @@ SIZE = {
     "coulomb_friction": "torque", "stribeck_friction": "coulomb", "load_torque": "torque", "gravity_load": "amplitude",
     "torque_ripple": "amplitude", "quadratic_drag": "coefficient", "spring_load": "stiffness",
     "directional_friction": "difference", "load_dependent_friction": "coefficient",
-    "torque_saturation": "limit",
+    "torque_saturation": "limit", "motor_encoder_eccentricity": "amplitude",
 }  # fmt: skip
 
 

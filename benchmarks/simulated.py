@@ -11,6 +11,7 @@ from orchestrator.records.model_file import Model, default_model
 from orchestrator.records.record import Record, record_from_columns
 from tests.support.hidden_effects import (
     MACHINES,
+    OFF_CENTRE,
     SINGLE,
     UNKNOWN,
     Case,
@@ -42,6 +43,8 @@ RECOVERED = {
     "ecc": ("gear_eccentricity", "amplitude", False), "T0": ("load_torque", "torque", True),
     "grav": ("gravity_load", "amplitude", True), "J3": ("extra_resonance", "inertia", True),
     "qd": ("quadratic_drag", "coefficient", True),
+    "enc_m": ("motor_encoder_eccentricity", "amplitude", False),
+    "enc_l": ("load_encoder_eccentricity", "amplitude", False),
 }  # fmt: skip
 
 
@@ -50,7 +53,7 @@ class SimulatedTask:
     """One record of the independent simulator.
 
     Attributes:
-        group: "none", "single", "double", "unknown" or "one_encoder".
+        group: "none", "single", "double", "unknown", "one_encoder" or "off_centre".
         kinds: what is hidden.
         seed: of the record.
         ways: machine and nuisances.
@@ -78,7 +81,7 @@ class SimulatedTask:
         match self.group:
             case "none":
                 return none_case(self.seed, ways=self.ways)
-            case "single":
+            case "single" | "off_centre":
                 return single_case(self.kinds[0], self.seed, ways=self.ways)
             case "double":
                 return double_case((self.kinds[0], self.kinds[1]), self.seed, ways=self.ways)
@@ -122,6 +125,7 @@ class Counts:
     double: int = 0
     unknown: int = 0
     one_encoder: int = 0
+    off_centre: int = 0
 
 
 def simulated_tasks(
@@ -144,6 +148,7 @@ def simulated_tasks(
     kinds: dict[str, list[tuple[str, ...]]] = {
         "none": [()], "single": [(kind,) for kind in SINGLE], "double": list(pairs),
         "unknown": [(kind,) for kind in UNKNOWN], "one_encoder": [("backlash",)],
+        "off_centre": [(kind,) for kind in OFF_CENTRE],
     }  # fmt: skip
     tasks = []
     for place, (group, hidden) in enumerate(kinds.items()):

@@ -153,7 +153,7 @@ class Effect:
         takes_drive: it takes torque away from the drive.
         memory: it has a state of its own that no encoder shows.
         measurement: it is no physics of the machine but a property of its log.
-        rare_torque: it can be only where the torque has rows of its own, rarer than the angles'.
+        shown: scales -> whether a record can show it at all.
         against: quantity against which its law is drawn: "speed", "angle" within a turn, or "position"; "": none.
         law: around an FMU, number of the law of feedback.
         remembers: it matters what the signal was before the record.
@@ -184,7 +184,7 @@ class Effect:
     takes_drive: bool = False
     memory: bool = False
     measurement: bool = False
-    rare_torque: bool = False
+    shown: Callable[[Any], bool] = lambda scales: True
     against: str = ""
     law: int = 0
     remembers: bool = False

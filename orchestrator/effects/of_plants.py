@@ -311,6 +311,7 @@ PLANT_BANK: tuple[Effect, ...] = (
     of_logs.EARLY_TORQUE,
     of_logs.LATE_LOAD,
     of_logs.SAMPLED_TORQUE,
+    *of_logs.ECCENTRIC_ENCODERS,
 )  # fmt: skip
 
 

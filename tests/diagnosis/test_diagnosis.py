@@ -12,6 +12,7 @@ from orchestrator.diagnosis.report.estimates import find_drive_gain
 from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.diagnosis.selection.outcome import Grade
+from orchestrator.effects.of_logs import centre_angle
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.records.model_file import default_model, read_model
 from orchestrator.records.record import Record, record_from_columns
@@ -104,6 +105,23 @@ def test_a_late_load_encoder_is_of_the_log() -> None:
     (nuisance,) = [one for one in found.nuisances if one.name == "late_load"]
     assert nuisance.parameters["shift"].value == pytest.approx(0.0075, rel=0.1)
     assert any("stamped" in line for line in summarise(found))
+
+
+@pytest.mark.parametrize("body", ["motor", "load"])
+def test_an_encoder_off_its_centre_is_of_the_log(body: str) -> None:
+    found = diagnose(record_of({f"enc_{body[0]}": 0.02, f"enc_{body[0]}_ph": 0.9}, 48, 20.0), MODEL)
+    assert likely(found) == []
+    (nuisance,) = found.nuisances
+    assert (nuisance.name, nuisance.grade) == (f"{body}_encoder_eccentricity", Grade.CERTAIN)
+    low, high = nuisance.parameters["amplitude"].interval
+    assert low < 0.02 < high < 1.05 * low
+    assert nuisance.parameters["phase"].value == pytest.approx(0.9, abs=0.02)
+    assert f"`theta_{body[0]}` is off by up to 0.0" in "".join(summarise(found))
+
+
+def test_an_angle_is_centred_exactly() -> None:
+    angle = np.linspace(-9.0, 9.0, 101)
+    assert centre_angle(angle + 0.05 * np.sin(angle - 1.2), 0.05, -1.2) == pytest.approx(angle, abs=1e-6)
 
 
 def test_a_drive_that_delivers_more_is_a_gain() -> None:

@@ -55,6 +55,12 @@ SINGLE: dict[str, tuple[dict[str, float], str, tuple[str, ...]]] = {
     "offset": ({"off_m": 0.05}, "off_m", ("sensor_offset@motor", "sensor_offset@load")),
 }  # fmt: skip
 
+# The same of encoders that are mounted off their centre, which change no motion but that of a closed loop.
+OFF_CENTRE: dict[str, tuple[dict[str, float], str, tuple[str, ...]]] = {
+    f"off_centre_{body}": ({f"enc_{body[0]}": 0.03}, f"enc_{body[0]}", (f"{body}_encoder_eccentricity",))
+    for body in ("motor", "load")
+}
+
 UNKNOWN: dict[str, dict[str, float]] = {
     "late_friction": {"late_Fc": 0.6},
     "stiffness_with_speed": {"kspeed": 0.15},
@@ -162,7 +168,7 @@ def none_case(seed: int, duration: float = 30.0, ways: Ways = Ways()) -> Case:
 def single_case(kind: str, seed: int, duration: float = 30.0, ways: Ways = Ways()) -> Case:
     """Return a record with one effect, its size drawn log-uniformly from three times the noise to large."""
     rng = np.random.default_rng([seed, 2])
-    effects, size, right = SINGLE[kind]
+    effects, size, right = (SINGLE | OFF_CENTRE)[kind]
     effects = ways.sized(_varied(effects, rng))
     excitation = str(rng.choice(EXCITATIONS[:3] if kind in LIMITS else EXCITATIONS))
     chosen, ratio = draw_size(effects, size, seed, excitation, rng, duration, ways=ways)
@@ -238,6 +244,10 @@ def draw_size(
 ) -> tuple[dict[str, float], float]:  # fmt: skip
     """Return the effects at a size between ``least`` times the noise and ``largest``, and the drawn times-noise."""
     plain = _raw({}, seed, excitation, duration, ways)
+    if size in ("enc_m", "enc_l"):
+        noise = NOISE[size == "enc_l"]
+        drawn = 10.0 * noise * (effects[size] / (10.0 * noise)) ** float(rng.random())
+        return {size: drawn, f"{size}_ph": float(rng.uniform(-np.pi, np.pi))}, 0.0
     if size == "off_m":
         return scaled(effects, size, least * NOISE[0] / effects[size] * float(np.exp(rng.uniform(0.0, 3.0)))), 0.0
 

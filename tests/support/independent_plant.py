@@ -17,6 +17,7 @@ with the names used in ``truth``::
     J3 w3 z3              third inertia [kg.m2], its frequency [rad/s] and damping ratio (0.02)
     qd                    quadratic drag of the load [N.m.s2/rad2]
     off_m off_l           encoder offsets [rad]
+    enc_m enc_m_ph enc_l enc_l_ph   encoders off their centre: enc*sin(angle + ph) added to what they measure [rad]
     ks ks3 ks_x           spring that pulls the load back [N.m/rad, N.m/rad3], its angle at rest [rad]
     stop stop_k stop_d    end stops of the load at +stop and -stop [rad, 0: none], stiffness, dissipation [s/rad]
     dv_m dv_l             viscous friction that differs by direction [N.m.s/rad]
@@ -54,6 +55,7 @@ EFFECTS = {
     "ks": 0.0, "ks3": 0.0, "ks_x": 0.0, "stop": 0.0, "stop_k": 1e4, "stop_d": 0.1, "dv_m": 0.0, "dv_l": 0.0,
     "mu_m": 0.0, "mu_l": 0.0, "wav_m": 0.0, "wav_n": 1.0, "wav_ph": 0.0, "rip2": 0.0, "rip2_ph": 0.0, "rip3": 0.0,
     "rip3_ph": 0.0, "kvar": 0.0, "kvar_n": 1.0, "kvar_ph": 0.0, "tau2": 0.0, "slew": 0.0,
+    "enc_m": 0.0, "enc_m_ph": 0.0, "enc_l": 0.0, "enc_l_ph": 0.0,
     "bw": 0.0, "bw_x": 0.01, "late_Fc": 0.0, "alpha_end": -1.0, "kspeed": 0.0, "knock": 0.0,
 }  # fmt: skip
 LINEAR = tuple(NOMINAL)
@@ -67,7 +69,7 @@ SUBSTEPS = 100  # per sample
     RIP, RIP_N, RIP_PH, ECC, ECC_N,
     ECC_PH, T0, GRAV, GRAV_PH, J3, W3, Z3, QD, OFF_M, OFF_L, JVAR, KS, KS3, KS_X, STOP, STOP_K, STOP_D, DV_M, DV_L,
     MU_M, MU_L, WAV_M, WAV_N, WAV_PH, RIP2, RIP2_PH, RIP3, RIP3_PH, KVAR, KVAR_N, KVAR_PH, TAU2, SLEW,
-    BW, BW_X, LATE, ALPHA_END, KSPEED, KNOCK,
+    ENC_M, ENC_M_PH, ENC_L, ENC_L_PH, BW, BW_X, LATE, ALPHA_END, KSPEED, KNOCK,
 ) = range(len(NAMES))  # fmt: skip
 SIGMA_M, SIGMA_L = 4000.0, 20000.0  # LuGre bristle stiffness [N.m/rad]
 
@@ -221,12 +223,12 @@ def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp, p
     out = np.empty((n, 2))
     states = np.empty((n, 8))
     loop = np.zeros(3)
-    loop[0] = x0[0] + v[OFF_M]
+    loop[0] = x0[0] + v[OFF_M] + v[ENC_M] * np.sin(x0[0] + v[ENC_M_PH])
     applied = u.copy()
     for n_k in range(n):
         states[n_k] = x
-        out[n_k, 0] = x[0] + v[OFF_M] + noise_m[n_k]
-        out[n_k, 1] = x[2] + v[OFF_L] + noise_l[n_k]
+        out[n_k, 0] = x[0] + v[OFF_M] + v[ENC_M] * np.sin(x[0] + v[ENC_M_PH]) + noise_m[n_k]
+        out[n_k, 1] = x[2] + v[OFF_L] + v[ENC_L] * np.sin(x[2] + v[ENC_L_PH]) + noise_l[n_k]
         if gain > 0.0:
             ask = _control(loop, out[n_k, 0], target[n_k], step, gain, *seen)
             applied[n_k] = float(round(ask * 1e4)) / 1e4 + u[n_k]

@@ -17,12 +17,14 @@ Array = NDArray[np.float64]
 
 STEP, ROWS = 1e-3, 12000
 HIDDEN = ("none", "friction", "gravity", "friction and gravity", "drag", "by hand", "growing friction", "ripple")
-FURTHER = ("saturation", "one push", "load that doubles")  # not in the round of seeds
+OFF_CENTRE = "encoder off its centre"
+FURTHER = ("saturation", "one push", "load that doubles", OFF_CENTRE, f"friction, {OFF_CENTRE}")  # not in the round
 CYCLES = 17  # of the ripple, a turn
 RIGHT: dict[str, set[str]] = {
     "friction": {"coulomb_friction"}, "gravity": {"gravity_load"}, "drag": {"quadratic_drag"},
     "friction and gravity": {"coulomb_friction", "gravity_load"}, "ripple": {"torque_ripple"},
-    "saturation": {"torque_saturation"},
+    "saturation": {"torque_saturation"}, OFF_CENTRE: {"motor_encoder_eccentricity"},
+    f"friction, {OFF_CENTRE}": {"coulomb_friction", "motor_encoder_eccentricity"},
 }  # fmt: skip
 
 
@@ -46,13 +48,14 @@ class LedAxis:
 
 
 @njit
-def led(asked, speed, noise, push, law, gains, bristle, count, finer, limit=np.inf):
+def led(asked, speed, noise, push, law, gains, bristle, count, finer, limit=np.inf, off_centre=(0.0, 0.0)):
     """Return measured angles and torques of steps of 1 ms.
 
     ``asked`` [rad] and ``speed`` [rad/s] are led to; ``noise`` is on the torque that is measured, ``push`` [N.m] acts
     on the axis. ``law``: inertia, viscous, dry, gravity, drag, ripple; ``gains`` are those on position, speed and the
     integral of the position. Friction builds up over ``bristle``, the encoder counts ``count`` [rad]; a step has
-    ``finer`` parts. The drive delivers up to ``limit`` [N.m]; beyond it the integral waits.
+    ``finer`` parts. The drive delivers up to ``limit`` [N.m]; beyond it the integral waits. What the encoder adds
+    to an angle once a turn has the amplitude [rad] and the phase ``off_centre``.
     """
     inertia, viscous, dry, gravity, drag, ripple = law
     angle, rate, bent, integral, filtered, before = asked[0], 0.0, 0.0, 0.0, 0.0, asked[0]
@@ -60,7 +63,7 @@ def led(asked, speed, noise, push, law, gains, bristle, count, finer, limit=np.i
     torque = 0.0
     h = STEP / finer
     for n in range(asked.size):
-        seen = np.round(angle / count) * count
+        seen = np.round((angle + off_centre[0] * np.sin(angle + off_centre[1])) / count) * count
         filtered += 0.4 * ((seen - before) / STEP - filtered)
         before = seen
         if abs(torque) < limit:
@@ -99,6 +102,11 @@ def led_axis(seed: int, hidden: str = "") -> LedAxis:
     time = STEP * np.arange(ROWS)
     inertia, loop = 10.0 ** rng.uniform(-5.0, 0.0), 2.0 * np.pi * rng.uniform(3.0, 12.0)
     position, speed = _path(rng, time)
+    off_centre = (0.0, 0.0)
+    if OFF_CENTRE in hidden:
+        farther = 2.0 * np.pi * rng.uniform(1.2, 6.0) / float(np.ptp(position))
+        position, speed = farther * position, farther * speed
+        off_centre = (10.0 ** rng.uniform(-3.0, -1.5), rng.uniform(-np.pi, np.pi))
     moves, turns = inertia * float(np.std(np.gradient(speed, STEP))), float(np.std(speed))
     viscous = moves / turns * 10.0 ** rng.uniform(-1.0, 0.3)
     plain = math.hypot(moves, viscous * turns)
@@ -128,7 +136,7 @@ def led_axis(seed: int, hidden: str = "") -> LedAxis:
     law = (inertia, viscous, dry, gravity, drag, ripple)
     limit = math.inf
     given = (position, speed, noise, push, law, gains, bristle, count, finer)
-    angles, torques = led(*given)
+    angles, torques = led(*given, limit, off_centre)
     if hidden == "saturation":
         limit = float(np.quantile(np.abs(torques - noise), rng.uniform(0.9, 0.99)))
         angles, torques = led(*given, limit)
@@ -136,4 +144,5 @@ def led_axis(seed: int, hidden: str = "") -> LedAxis:
     stated = (inertia * rng.uniform(0.7, 1.4), viscous * rng.uniform(0.6, 1.6))
     names = ("J", "b", "coulomb_friction", "gravity_load", "quadratic_drag", "torque_ripple")
     truth = dict(zip(names, law, strict=True)) | {"noise": share, "size": size / plain, "torque_saturation": limit}
+    truth["motor_encoder_eccentricity"] = off_centre[0]
     return LedAxis(hidden, record, stated, RIGHT.get(hidden, set()), truth)

@@ -32,6 +32,7 @@ from orchestrator.diagnosis.data.signals import (
     triangle_average,
 )
 from orchestrator.diagnosis.model.drive import delivered_torque, logged_torque, shift_signal
+from orchestrator.diagnosis.model.encoders import centre_angles
 from orchestrator.diagnosis.model.interface import (
     CandidateEffect,
     ModelPoint,
@@ -236,6 +237,11 @@ class TorqueBalance(ResidualModel):
         if late and len(angles) > 1:
             for values in (angles, speeds, accelerations):
                 values[1] = shift_signal(values[1], -late / self.step)
+        for n, (angle, centred) in enumerate(zip(angles, centre_angles(self.plant, p, angles), strict=True)):
+            if centred is not angle:
+                error = angle - centred
+                angles[n], speeds[n] = centred, speeds[n] - first_derivative(error, self.step)
+                accelerations[n] = accelerations[n] - second_derivative(error, self.step)
         return angles, speeds, accelerations
 
     def _directions(self, p: Array) -> Array:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import first_derivative, smooth
 from orchestrator.diagnosis.model.drive import apply_lag, logged_torque, shift_signal
+from orchestrator.diagnosis.model.encoders import centre_angles
 from orchestrator.effects.of_logs import LEAD, SHIFT
 from orchestrator.plants.coarse_run import FINER, coarse_steps, runs_coarsely
 from orchestrator.plants.description import Plant
@@ -69,11 +70,11 @@ class RunSignals:
         return float(np.max(np.abs(self.angles[ahead:, 0] - self.angles[:-ahead, 0]))) / ahead
 
     def angles_in_time(self, plant: Plant, p: Array) -> Array:
-        """Return the angles (n, channels) [rad] as they were: what the log has late is put earlier."""
-        late = plant.value(p, SHIFT.name) if SHIFT.name in plant.names else 0.0
-        if late == 0.0 or self.channels == 1:
-            return self.angles
-        return np.column_stack([self.angles[:, 0], shift_signal(self.angles[:, 1], -late / self.step)])
+        """Return the angles (n, channels) [rad] as they were: what the log has late is put earlier, and centred."""
+        angles = list(self.angles.T)
+        if self.channels > 1 and SHIFT.name in plant.names:
+            angles[1] = shift_signal(angles[1], -plant.value(p, SHIFT.name) / self.step)
+        return np.column_stack(centre_angles(plant, p, angles))
 
     def requests_of(self, plant: Plant, p: Array) -> Array:
         """Return the requests (n,) [N.m] as the log has them, held or sampled."""

@@ -13,6 +13,7 @@ from orchestrator.shared.play import Play
 
 BODIES = {"motor": "the motor", "load": "the load"}
 SIGNALS = {"theta_m": "the motor", "theta_l": "the load"}
+ENCODERS = {"motor": "theta_m", "load": "theta_l"}
 # Experiments that tell effects apart, by their kind.
 EXPERIMENTS = {
     "friction": "constant speeds in both directions, from a crawl to the highest",
@@ -166,15 +167,18 @@ def sureness(effect: GradedEffect) -> str:
 
 def nuisance_words(nuisance: Nuisance) -> str:
     """Return a property of the log in words."""
-    ((name, e),) = nuisance.parameters.items()
+    name, e = next(iter(nuisance.parameters.items()))
     if name == "gain":
         return (
             f"the drive delivers {e.value:.3f} (95 %: {e.interval[0]:.3f} to {e.interval[1]:.3f}) times `u`, or all "
             "inertias, stiffnesses and torques of the model are off by this factor; sizes are in units of `u`"
         )
+    sure = "" if nuisance.grade is Grade.CERTAIN else f" ({nuisance.grade.word})"
+    if name == "amplitude":
+        encoder = ENCODERS[nuisance.name.partition("_")[0]]
+        return f"`{encoder}` is off by up to {value_words(e)} once a turn, as of an encoder off its centre{sure}"
     width = 0.5 * (e.interval[1] - e.interval[0])
     size = f"{1e3 * abs(e.value):.3g} ms (95 %: within {1e3 * width:.2g} ms)"
-    sure = "" if nuisance.grade is Grade.CERTAIN else f" ({nuisance.grade.word})"
     if name == "share":
         return (
             f"`u` is a sampled signal, not a request that is held from row to row{sure}: it is interpolated between "

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.effects.effect import DRIVETRAIN
-from orchestrator.effects.of_logs import LEAD, SAMPLED, SHIFT
+from orchestrator.effects.of_logs import LEAD, SAMPLED, SHIFT, eccentricity
 from orchestrator.effects.of_plants import PRESLIDING, bank_of, build_up_distance
 from orchestrator.plants.description import Body, Drive, Plant, Resonance, Shaft
 from pyfmu_sources.drivetrain import equations as dt
@@ -55,7 +55,14 @@ PLANT = Plant(
     followers=((5, 2), (6, 3)),
     starts={0: "theta_m_start", 1: "omega_m_start", 2: "theta_l_start", 3: "omega_l_start", 4: "T_m_start"},
     offsets=("effects.sensor_offset.motor.offset", "effects.sensor_offset.load.offset"),
-    nuisances=(*(PRESLIDING._replace(name=name) for name in NUISANCES), LEAD, SHIFT, SAMPLED),
+    nuisances=(
+        *(PRESLIDING._replace(name=name) for name in NUISANCES),
+        LEAD,
+        SHIFT,
+        SAMPLED,
+        *eccentricity("motor"),
+        *eccentricity("load"),
+    ),
     enumerations=("backlash_model",),
     bank=bank_of(DRIVETRAIN),
     kernel="orchestrator.plants.kernels.drivetrain",

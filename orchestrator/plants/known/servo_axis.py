@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.effects.effect import AXIS
-from orchestrator.effects.of_logs import LEAD, SAMPLED
+from orchestrator.effects.of_logs import LEAD, SAMPLED, eccentricity
 from orchestrator.effects.of_plants import PRESLIDING, bank_of, build_up_distance
 from orchestrator.plants.description import Body, Drive, Plant
 from pyfmu_sources.axis import axis_equations as ap
@@ -31,7 +31,7 @@ PLANT = Plant(
     drive=Drive(4, second_lag="effects.drive_filter.time_constant", rate="effects.rate_limit.rate"),
     starts={0: "theta_m_start", 1: "omega_m_start", 4: "T_m_start"},
     offsets=("effects.sensor_offset.motor.offset",),
-    nuisances=(PRESLIDING._replace(name="presliding.motor"), LEAD, SAMPLED),
+    nuisances=(PRESLIDING._replace(name="presliding.motor"), LEAD, SAMPLED, *eccentricity("motor")),
     bank=bank_of(AXIS),
     kernel="orchestrator.plants.kernels.servo_axis",
     presliding=("presliding.motor",),
