@@ -23,7 +23,7 @@ Subset = frozenset[str]
 PARTNERS = 8  # effects that are tried in pairs with every other one
 LEADING = 14  # effects that larger subsets are made of
 BEAM = 20  # subsets of each size that grow
-HOPELESS = 8.0  # of the log score, by which a size is worse than the best one, from which none larger is tried
+HOPELESS = 2.0  # times what an effect must bring, by which a size scores less than the best one: none larger is tried
 RIDGE = 1e-8  # of the diagonal of normal equations
 
 
@@ -204,7 +204,7 @@ class Neighbours:
         for size in range(3, most + 1):
             scores = {subset: fit[0] for subset, fit in found.items() if fit is not None}
             best = [max((s for one, s in scores.items() if len(one) == n), default=-np.inf) for n in range(size)]
-            if best[-1] < max(best) - HOPELESS:
+            if best[-1] < max(best) - HOPELESS * odds_against(self.score.settings):
                 break
             growing = sorted((one for one in scores if len(one) == size - 1), key=lambda subset: -scores[subset])[:BEAM]
             look([one | {label} for one in growing for label in leading(LEADING) if label not in one])
