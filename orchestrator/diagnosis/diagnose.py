@@ -13,7 +13,7 @@ from orchestrator.diagnosis.data.records import check_model, check_record, check
 from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import Values
 from orchestrator.diagnosis.model.law_arguments import law_arguments
-from orchestrator.diagnosis.model.plant_effects import effect_parameters, effects_of, in_metres, keep_effects, unit_in
+from orchestrator.diagnosis.model.plant_effects import effect_parameters, effects_of, keep_effects, unit_in
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.estimates import (
     Named,
@@ -134,6 +134,8 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     result, evidence, test = leave_out_refuted(searched, record, settings, add_tests)
     workings = _with_search(workings, result)
     test = with_drift(test, workings, model, settings.report)
+    missed = max((signal.excess for one in test for signal in one.signals if not one.still), default=0.0)
+    record = replace(record, missed=missed)
     graded = report_effects(searched, result, evidence, partial(_words, model, result), record, settings)
     graded = share_values(graded, result.final.labels, model.plant)
     effects = tuple(sorted((effect for effect in graded if not effect.of_log), key=lambda effect: -effect.grade))
@@ -157,7 +159,7 @@ def _dependences(workings: Workings, model: Model, settings: DiagnosisSettings) 
     """Return which signals what the final model leaves follows."""
     result = workings.search
     points = result.problem.record_points(result.final.point)
-    arguments = law_arguments(workings.balances, points, metric=in_metres(model))
+    arguments = law_arguments(workings.balances, points, partial(unit_in, model=model))
     return find_dependences(result, arguments, settings.selection)
 
 

@@ -114,9 +114,14 @@ class SignalMisfit:
         return self.miss > NOTABLE
 
     @property
+    def excess(self) -> float:
+        """Misfit of the final model over what noise and the uncertainty of its values account for."""
+        return self.final / math.hypot(self.noise, self.drift)
+
+    @property
     def tells(self) -> bool:
-        """Whether it is missed by more than noise and the uncertainty of the values account for."""
-        return self.final > NOTABLE * math.hypot(self.noise, self.drift)
+        """Whether it is missed by more than these account for."""
+        return self.excess > NOTABLE
 
 
 @dataclass(frozen=True)

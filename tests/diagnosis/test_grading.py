@@ -48,6 +48,12 @@ def test_nothing_is_certain_beside_a_curve_that_takes_a_part_of_what_it_takes(ga
     assert grade_effect(effect, record, SETTINGS) == ((Grade.LIKELY if lowered else Grade.CERTAIN), lowered)
 
 
+def test_nothing_is_certain_that_free_runs_miss_tenfold():
+    """More than ten times what noise and the values' uncertainty account for, though the name makes it far better."""
+    assert grade_effect(EFFECT, replace(RECORD, missed=9.0), SETTINGS)[0] is Grade.CERTAIN
+    assert grade_effect(EFFECT, replace(RECORD, missed=27.0), SETTINGS) == (Grade.LIKELY, ("confirmed",))
+
+
 def test_a_limit_leaves_little_of_its_own_torque_where_it_acts():
     effect = replace(EFFECT, left_where_it_acts=0.3)
     assert grade_effect(effect, RECORD, SETTINGS)[0] is Grade.CERTAIN

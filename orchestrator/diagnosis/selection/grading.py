@@ -9,6 +9,7 @@ from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, Reco
 from orchestrator.diagnosis.settings import DiagnosisSettings, GradeSettings
 
 FOLLOWING = ("wave", "limit", "timing", "constant")  # kinds that follow whatever another law leaves
+FAR = 10.0  # times what noise and the values' uncertainty account for: so far off something else is missing
 
 
 @dataclass(frozen=True)
@@ -114,9 +115,10 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "confirmed", Grade.LIKELY,
-        lambda e, r, s: _is_confirmed(e, s.grades),
-        "share of the motion's misfit, or of the torque's, on test data", "grades.confirmed_share",
-        "test data do not confirm it: an effect in place of the true one fits the record but predicts nothing",
+        lambda e, r, s: _is_confirmed(e, s.grades) and r.missed < FAR,
+        "share of the motion's misfit, or of the torque's, on test data; what free runs still miss",
+        "grades.confirmed_share",
+        "test data do not confirm it, or are missed with it too: it may stand in the place of another effect",
     ),
     GradeRule(
         "not refuted", Grade.POSSIBLE,
