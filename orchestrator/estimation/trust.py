@@ -16,6 +16,9 @@ from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
+STOPPED = "the fit stopped before it converged, and may be off: state values nearer to the machine, or record longer"
+MORE = "record more reversals of the torque"
+
 
 def trust_of_estimates(
     estimates: Sequence[Estimate], model: Model, settings: TrustSettings | None = None
@@ -40,14 +43,14 @@ def trust_of_location(location: Location, record: Record, model: Model, settings
 
     def reasons() -> Iterator[Reason]:
         if not location.converged:
-            yield Reason(Level.AMBER, "the fit stopped before it converged")
+            yield Reason(Level.AMBER, STOPPED)
         if not location.explained:
             yield Reason(
                 Level.AMBER,
                 "the model does not explain the record: the torque noise or the size of the best fit is too large",
             )
         if location.answers and location.traversals < settings.trust.least_traversals:
-            yield Reason(Level.AMBER, f"the gap is traversed only {_times(location.traversals)}")
+            yield Reason(Level.AMBER, _rarely(location.traversals))
         sizes = [("both half-gaps together", location.total)] if location.answers else []
         for stage, gap in zip((FIRST, SECOND), location.stages, strict=True):
             if location.answers in ((stage,), (BOTH,)):
@@ -80,15 +83,20 @@ def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Re
     if "stopped" in fit.diagnostics:
         yield Reason(Level.AMBER, str(fit.diagnostics["stopped"]))
     elif not fit.diagnostics.get("converged", True):
-        yield Reason(Level.AMBER, "the fit stopped before it converged")
+        yield Reason(Level.AMBER, STOPPED)
     if not math.isfinite(fit.interval[1]):
-        yield Reason(Level.AMBER, "the record cannot show a gap of any size")
+        text = (
+            "the interval of the half-gap has no upper end"
+            if fit.visible
+            else "the record cannot show a gap of any size"
+        )
+        yield Reason(Level.AMBER, f"{text}: {MORE}")
     elif fit.visible:
         traversals = int(fit.diagnostics.get("traversals", settings.least_traversals))
         if traversals < settings.least_traversals:
-            yield Reason(Level.AMBER, f"the gap is traversed only {_times(traversals)}")
+            yield Reason(Level.AMBER, _rarely(traversals))
         if fit.standard_error > settings.widest * fit.alpha:
-            yield Reason(Level.AMBER, "the standard error is more than a fifth of the half-gap")
+            yield Reason(Level.AMBER, f"the standard error is more than a fifth of the half-gap: {MORE}")
     yield from _of_values(fit.diagnostics.get("parameters", {}), model, settings, fit)
 
 
@@ -101,7 +109,7 @@ def _of_values(
     """
     for name, entry in parameters.items():
         stated = model.parameters.get(name)
-        if stated is None or stated.uncertainty <= 0.0:
+        if stated is None or stated.uncertainty <= 0.0 or stated.assumed:
             continue
         off = abs(entry["value"] - stated.value)
         if off <= stated.uncertainty + settings.beyond * entry["standard_error"]:
@@ -109,7 +117,8 @@ def _of_values(
         far = off > settings.far_beyond * stated.uncertainty
         level = Level.RED if far and (fit is None or _moves_gap(fit, name, off - stated.uncertainty)) else Level.AMBER
         text = f"`{name}` is fitted as {entry['value']:.4g}, but stated as {stated.value:.4g} to within"
-        yield Reason(level, f"{text} {stated.uncertainty:.2g}")
+        moves = "the half-gap hangs on it" if level is Level.RED else "something may be missing that it stands for"
+        yield Reason(level, f"{text} {stated.uncertainty:.2g}: {moves}; check its value and its unit")
 
 
 def _moves_gap(fit: Estimate, name: str, move: float) -> bool:
@@ -139,5 +148,6 @@ def _compare_methods(estimate: Estimate, fit: Estimate | None, fit_trust: Trust 
     yield Reason(fit_trust.level, f"{FITTED} beside it is {fit_trust.level.word}")
 
 
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
+def _rarely(count: int) -> str:
+    times = "once" if count == 1 else f"{count} times"
+    return f"the gap is traversed only {times}, and a disturbance may pass for it: {MORE}"

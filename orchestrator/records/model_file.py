@@ -27,7 +27,7 @@ parameter known to 5 %.
 import difflib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,8 @@ DEFAULT = "Drivetrain"
 class ModelParameter:
     """One parameter: its value, the largest error that the user grants it, and its unit.
 
-    ``uncertainty`` is half the width of an interval, all of whose points count as equally likely; 0.0: exact.
+    ``uncertainty`` is half the width of an interval, all of whose points count as equally likely; 0.0: exact. Of an
+    ``assumed`` value nobody stated either: that a fit leaves it says nothing against a result.
     """
 
     name: str
@@ -62,6 +63,7 @@ class ModelParameter:
     unit: str
     minimum: float
     maximum: float
+    assumed: bool = False
 
     @property
     def standard_deviation(self) -> float:
@@ -145,7 +147,7 @@ COLUMN_NUMBERS = {
 }
 # What a file may hold: in each table of named tables, the keys and their kinds.
 _ENTRIES: dict[str, dict[str, type]] = {
-    "parameters": {"value": float, "relative_uncertainty": float, "uncertainty": float},
+    "parameters": {"value": float, "relative_uncertainty": float, "uncertainty": float, "assumed": bool},
     "encoders": {"resolution": float, "counts_per_rev": float, "noise": float},
     "columns": {"name": str, "unit": str} | dict.fromkeys(COLUMN_NUMBERS, float),
 }
@@ -281,7 +283,7 @@ def _merge(parameter: ModelParameter, entry: Entry, key: str, content: _Content)
         uncertainty = _not_negative(entry, "uncertainty", key, content)
     elif "relative_uncertainty" in entry:
         uncertainty = _share(entry, key, content) * abs(value)
-    return ModelParameter(parameter.name, value, uncertainty, parameter.unit, parameter.minimum, parameter.maximum)
+    return replace(parameter, value=value, uncertainty=uncertainty, assumed=entry.get("assumed", False))
 
 
 def _not_negative(entry: Entry, name: str, key: str, content: _Content) -> float:

@@ -94,7 +94,8 @@ def _parameter_lines(parameter: ModelParameter, change: Mapping[str, Any] | None
     changed = (value, uncertainty) != (parameter.value, parameter.uncertainty)
     remark = f"{parameter.unit or '1'}: {YOURS}" if changed else said
     note = f"   # {plain_text(remark)}" if remark else ""
-    return [f"[parameters.{toml_text(parameter.name)}]", f"value = {value!r}{note}", f"uncertainty = {uncertainty!r}"]
+    lines = [f"[parameters.{toml_text(parameter.name)}]", f"value = {value!r}{note}", f"uncertainty = {uncertainty!r}"]
+    return lines + ["assumed = true"] * (parameter.assumed and not changed)
 
 
 def _remarks(text: str) -> dict[str, str]:
@@ -115,7 +116,7 @@ def _source(name: str, model: Model, said: Mapping[str, str]) -> str:
     remark = said.get(name, "")
     if name not in model.stated:
         return "assumed" if name in model.plant.linear else "the FMU's own"
-    if "ASSUMED" in remark or "of the thesis" in remark:
+    if model.parameters[name].assumed or "of the thesis" in remark:
         return "assumed"
     return "from the record" if "record" in remark or "ROUGH" in remark else YOURS
 

@@ -1,10 +1,12 @@
 """The verdict in one sentence says no more than was looked for."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from orchestrator.diagnosis.model.plant_effects import unit_in
 from orchestrator.diagnosis.report.judgement import judge_trust
 from orchestrator.diagnosis.report.summary import headline, words_on_test_data
 from orchestrator.diagnosis.report.summary import next_steps as experiments
@@ -12,6 +14,8 @@ from orchestrator.diagnosis.result import ParameterEstimate
 from orchestrator.diagnosis.selection.outcome import Dependence, Grade, RecordEvidence
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.effects.words import number_words
+from orchestrator.records.columns import Column
+from orchestrator.records.model_file import default_model
 from orchestrator.reporting.pages.diagnosis_answer import in_words, next_steps
 
 
@@ -74,15 +78,31 @@ def test_an_inertia_that_is_not_shown_is_no_number_to_ask_for() -> None:
 
 
 def test_a_value_far_below_what_is_stated_is_outside_as_one_above_is() -> None:
-    known: Any = SimpleNamespace(name="tau", uncertainty=1e-4)
-
-    def reasons(value: float) -> tuple[str, ...]:
+    def reasons(value: float, assumed: bool = False) -> tuple[str, ...]:
+        known: Any = SimpleNamespace(name="tau", uncertainty=1e-4, assumed=assumed)
         estimate = ParameterEstimate(value, 0.01 * value, (0.98 * value, 1.02 * value), "s", 2e-4)
         record = RecordEvidence(0.0, 1.0, 0.01, 0.6)
         return judge_trust("effects", (), True, record, (), {"tau": estimate}, (known,), DiagnosisSettings()).reasons
 
     assert [len(reasons(value)) for value in (1e-6, 1.5e-4, 3e-4, 1e-3)] == [1, 0, 0, 1]
     assert "`tau` lies outside the range" in reasons(1e-6)[0]
+    assert not reasons(1e-6, assumed=True)  # which nobody stated
+
+
+@pytest.mark.parametrize(
+    ("torque", "angle", "units"),
+    [
+        (Column(torque_constant=0.7), "rad", ("N.m", "kg.m2", "N.m.s/rad")),
+        (Column(torque_constant=1.0), "rad", ("A", "A.s2/rad", "A.s/rad")),
+        (Column(torque_constant=1.0), "m", ("A", "A.s2/m", "A.s/m")),
+        (Column(rated_value=100.0), "deg", ("%", "%.s2/rad", "%.s/rad")),
+        (Column(), "mm", ("N", "kg", "N.s/m")),
+    ],
+)
+def test_sizes_are_in_the_unit_of_a_log_that_nothing_converts(torque: Column, angle: str, units: tuple[str]) -> None:
+    model = replace(default_model(), columns={"u": torque, "theta_m": Column(unit=angle)})
+    assert tuple(unit_in(unit, model) for unit in ("N.m", "kg.m2", "N.m.s/rad")) == units
+    assert unit_in("rad", model, "phase") == "rad"
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,21 @@ def test_a_value_far_outside_is_red_where_the_half_gap_hangs_on_it(correlation: 
 
 def test_a_value_outside_its_stated_range_is_named_with_both() -> None:
     (reason,) = trust_of_estimates([fitted("J_l", 1.078)], default_model())["maximum_likelihood"].reasons
-    assert reason == "`J_l` is fitted as 6.037, but stated as 5.6 to within 0.28"
+    assert reason.startswith("`J_l` is fitted as 6.037, but stated as 5.6 to within 0.28: ")
+
+
+def test_a_range_that_nobody_stated_is_no_reason() -> None:
+    model = default_model()
+    assumed = replace(model.parameters["J_l"], assumed=True)
+    model = replace(model, parameters={**model.parameters, "J_l": assumed})
+    assert trust_of_estimates([fitted("J_l", 1.5)], model)["maximum_likelihood"].level is Level.GREEN
+
+
+@pytest.mark.parametrize(("visible", "said"), [(True, "no upper end"), (False, "cannot show a gap")])
+def test_an_interval_without_an_upper_end_is_said_of_a_gap_that_is_seen(visible: bool, said: str) -> None:
+    estimate = replace(GOOD, interval=(0.0199, math.inf), visible=visible)
+    (reason,) = trust_of_estimates([estimate], default_model())["maximum_likelihood"].reasons
+    assert said in reason
 
 
 @pytest.mark.parametrize(

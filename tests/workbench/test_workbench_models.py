@@ -21,6 +21,7 @@ counts_per_rev = 8192
 [parameters.J_m]
 value = 0.0123456789012345678   # kg.m2: inertia of the motor; ASSUMED: half of what is seen
 relative_uncertainty = 0.3
+assumed = true
 
 [parameters.k]
 value = 447.779   # N.m/rad: stiffness; ROUGH: a shaft that oscillates at 8.79 Hz

@@ -12,6 +12,7 @@ from orchestrator.effects.words import list_effects, number_words
 from orchestrator.records.model_file import ModelParameter
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
+RECORD_AGAIN = "record the same torque twice: what comes again is the machine"
 UNEXPLAINED = 0.1  # of the torque's power, a third of it in rms: a model that leaves more does not explain a record
 
 
@@ -59,31 +60,41 @@ def judge_trust(
     red, amber = [], []
     if verdict == "unknown":
         why = "no effect of the library is likely" if searched else "no search was done"
-        red.append(f"the model lacks something, and {why}")
+        red.append(f"the model lacks something, and {why}: do not predict with it; {RECORD_AGAIN}")
     if record.inertia_is_off(settings.selection.prior_deviations):
         asked = f"{record.inertia:.2g}" if record.shows_inertia else f"at most {record.highest_inertia:.2g}"
         red.append(
             f"without the ranges of the model file, the record fits {asked} times its inertia: check the "
-            "inertias, the units and the scale of the torque"
+            "inertias, the units and the scale of the torque, of which every size is a multiple"
         )
     for one in test:
         if one.is_worse(settings.report.worse, settings.report.of_noise):
-            red.append(f"the final model predicts the test part of {one.source} worse than re-fitted parameters do")
+            red.append(
+                f"the final model predicts the test part of {one.source} worse than re-fitted parameters do: its "
+                "effects may stand for others; judge it on another record"
+            )
         for signal in one.signals:
             if signal.tells:
                 amber.append(
                     f"free runs on the test part of {one.source} miss {signal.signal} by "
-                    f"{number_words(signal.miss)} times its noise{_of_motion(signal)}"
+                    f"{number_words(signal.miss)} times its noise{_of_motion(signal)}: a disturbance or a missing "
+                    f"effect; {RECORD_AGAIN}"
                 )
     if likely := [effect.label for effect in effects if effect.grade is Grade.LIKELY]:
-        amber.append(f"likely, not certain: {list_effects(likely)}")
+        amber.append(
+            f"likely, not certain: {list_effects(likely)}: another effect may stand there; make the record that is "
+            "advised"
+        )
     if record.left > UNEXPLAINED:
         left = number_words(100.0 * float(np.sqrt(record.left)), 2)
-        amber.append(f"{left} % (rms) of the torque remains unexplained in the fitted data")
+        amber.append(
+            f"{left} % (rms) of the torque remains unexplained in the fitted data: predictions miss as much; {RECORD_AGAIN}"
+        )
     for known in uncertain:
-        if known.name in parameters and _is_far(parameters[known.name], known.uncertainty):
+        if not known.assumed and known.name in parameters and _is_far(parameters[known.name], known.uncertainty):
             amber.append(
-                f"`{known.name}` lies outside the range that the model file states: check its value and its unit"
+                f"`{known.name}` lies outside the range that the model file states, and may stand for a missing "
+                "effect: check its value and its unit"
             )
     return trust_of([*(Reason(Level.RED, text) for text in red), *(Reason(Level.AMBER, text) for text in amber)])
 

@@ -121,8 +121,11 @@ def starter(
         lines += [
             f"# {meaning}", f"{mark}[parameters.{name}]",
             f"{mark}value = {entry.value:.6g}   # {entry.unit or '1'}; {said}",
-            f"{mark}relative_uncertainty = {share:.3g}   # {says}", "",
+            f"{mark}relative_uncertainty = {share:.3g}   # {says}",
         ]  # fmt: skip
+        if "ASSUMED" in said or entry.assumed:
+            lines.append(f"{mark}assumed = true   # no result is doubted for this value; leave it out with your own")
+        lines.append("")
     lines += ["# Effects such as friction, gravity or a torque limit: `diagnose` finds which of them the machine has."]
     return "\n".join(lines).rstrip() + "\n"
 

@@ -67,6 +67,9 @@ def test_what_a_model_file_leaves_open_is_of_the_record(
     shares = [text for text in found.starter.splitlines() if text.startswith("relative_uncertainty")]
     assert all(("holds the value" in text) == text.startswith("relative_uncertainty = 0 ") for text in shares)
     assert {"holds the value" in text for text in shares} == {True, False}
+    said = {name for name, one in model.parameters.items() if one.assumed}
+    assert said >= {"c"}
+    assert ("J_m" in said) == (not stated)
 
 
 SHEET = {"J_m": 0.004, "J_l": 1.9, "k": 9000.0, "c": 4.0, "b_m": 0.006, "b_l": 2.0, "i": 20.0}
