@@ -37,7 +37,7 @@ def test_friction_that_is_not_named_is_left_and_follows_the_speed():
     balance = balance_of(record_from_columns(columns, "record"), MODEL, SETTINGS)
     found = search_effects(fit_problem([balance], SETTINGS.fit), SelectionSettings(most_effects=0))
     points = found.problem.record_points(found.final.point)
-    strongest = find_dependences(found, law_arguments([balance], points, metric=False), SelectionSettings())[0]
+    strongest = find_dependences(found, law_arguments([balance], points, str), SelectionSettings())[0]
     assert (strongest.site, strongest.argument) == ("motor", "speed")
     assert strongest.comparison.gain > 0.3
     assert strongest.values[-1] == pytest.approx(0.8, rel=0.4)

@@ -1,6 +1,6 @@
 """The signals that a torque of a plant may follow where no effect explains it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -13,8 +13,10 @@ from orchestrator.diagnosis.model.torque_balance import TorqueBalance
 Array = NDArray[np.float64]
 
 
-def law_arguments(models: Sequence[TorqueBalance], points: Sequence[ModelPoint], metric: bool) -> list[LawArgument]:
-    """Return what a law of a plant may be a function of; in metres and newtons where ``metric``."""
+def law_arguments(
+    models: Sequence[TorqueBalance], points: Sequence[ModelPoint], unit_in: Callable[[str], str]
+) -> list[LawArgument]:
+    """Return what a law of a plant may be a function of; ``unit_in``: an SI unit of an axis that turns -> the log's."""
     first = models[0]
     scales = [model.scales for model in models]
     values = [model.values_at(point) for model, point in zip(models, points, strict=True)]
@@ -36,8 +38,8 @@ def law_arguments(models: Sequence[TorqueBalance], points: Sequence[ModelPoint],
             partial(_respond, model.residual_scale(point)[:, None] * _gains(model, site)[:, None])
             for model, point in zip(models, points, strict=True)
         )
-        shown, torque = (unit.replace("rad", "m").replace("N.m", "N"), "N") if metric else (unit, "N.m")
-        found.append(LawArgument(name, site, shown, torque, tuple(signal), responses, drives=unit == "N.m"))
+        drives = unit == "N.m"
+        found.append(LawArgument(name, site, unit_in(unit), unit_in("N.m"), tuple(signal), responses, drives=drives))
     return found
 
 

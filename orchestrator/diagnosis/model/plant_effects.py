@@ -11,6 +11,7 @@ from orchestrator.diagnosis.model.interface import CandidateEffect, Values, Wave
 from orchestrator.effects.effect import Effect, SignalScales
 from orchestrator.effects.of_plants import LEAST_CYCLES
 from orchestrator.plants.description import Plant
+from orchestrator.records.columns import Column
 from orchestrator.records.model_file import Model
 
 MOST_CYCLES = 40.0  # a revolution: teeth and poles of drives lie below
@@ -24,9 +25,8 @@ def candidate_effects(model: Model, scales: SignalScales, channels: Sequence[str
     for row in plant.bank:
         if row.label in own or (row.angular and not scales.angular) or (row.both_encoders and len(channels) < 2):
             continue
-        if row.rare_torque and not scales.torque_raster:
-            continue
-        found[row.label] = _candidate(plant, row, scales, channels)
+        if row.shown(scales):
+            found[row.label] = _candidate(plant, row, scales, channels)
     return found
 
 
@@ -145,7 +145,19 @@ def in_metres(model: Model) -> bool:
 
 
 def unit_in(unit: str, model: Model, parameter: str = "") -> str:
-    """Return the unit of a parameter of the plant's table as a model has it."""
-    if not in_metres(model):
-        return unit
-    return PERIODIC.get(parameter, METRIC.get(unit, unit))
+    """Return the unit of a parameter of the plant's table, or of a signal, as a model and its log have it."""
+    metric = in_metres(model)
+    if metric:
+        unit = PERIODIC.get(parameter, METRIC.get(unit, unit))
+    if own := _unit_of_log(model):  # an inertia is a torque for an acceleration
+        inertia, torque, path = ("kg", "N", "m") if metric else ("kg.m2", "N.m", "rad")
+        unit = f"{own}.s2/{path}" if unit == inertia else unit.replace(torque, own)
+    return unit
+
+
+def _unit_of_log(model: Model) -> str:
+    """Return the unit of a torque that nothing turns into N.m: sizes are in it; "": it is in N.m or N."""
+    u = model.columns.get("u", Column())
+    if u.torque_constant == 1.0:
+        return "A" if u.resistance is None else "V" if u.resistance == 1.0 else ""
+    return "%" if u.rated_value == 100.0 else ""

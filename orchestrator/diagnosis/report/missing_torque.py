@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
+from orchestrator.diagnosis.model.plant_effects import unit_in
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect
 
 Array = NDArray[np.float64]
@@ -58,7 +59,8 @@ def _missing_torque(diagnosis: Diagnosis, effect: GradedEffect) -> MissingTorque
     x, x_label = _abscissa(diagnosis, effect, channel)
     x = x[inner]
     force = diagnosis.test[0].signals[0].unit == "m"
-    y_label = f"{'force' if force else 'torque'} at the {balance.channels[channel]} [{'N' if force else 'N.m'}]"
+    unit = unit_in("N.m", diagnosis.model)
+    y_label = f"{'force' if force else 'torque'} at the {balance.channels[channel]} [{unit}]"
     if x_label.startswith("time"):
         shown = slice(0, min(x.size, round(SHOWN_SECONDS / balance.step)))
         return MissingTorque(effect.label, x_label, y_label, x[shown], missing[shown], law[shown], None)
