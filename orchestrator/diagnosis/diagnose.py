@@ -24,7 +24,7 @@ from orchestrator.diagnosis.report.estimates import (
     report_effects,
     share_values,
 )
-from orchestrator.diagnosis.report.hidden_gap import HiddenGap, find_hidden_gap, gap_effects, gap_parameters
+from orchestrator.diagnosis.report.hidden_gap import find_hidden_gap, gap_effects, gap_parameters, gap_values
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.misfit_on_test_data import (
     misfit_on_test_data,
@@ -39,6 +39,7 @@ from orchestrator.diagnosis.selection.remaining import find_dependences
 from orchestrator.diagnosis.selection.search import fit_effects, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.effects.words import list_effects
+from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
@@ -93,7 +94,7 @@ def diagnose(
     nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
     workings = Workings(fitted, test_data, result, tuple(models), nominal, base, final)
     if gap is not None:
-        values = model.plant.extend_values(gap.values.tolist())
+        values = model.plant.extend_values(gap_values(gap).tolist())
         return _report_hidden_gap(replace(workings, final=values), gap, model, settings)
     found = _report(workings, model, settings)
     notes = [f"left out of the model file, as asked: {list_effects(left_out)}"] if left_out else []
@@ -102,7 +103,7 @@ def diagnose(
     return replace(found, notes=(*found.notes, *notes))
 
 
-def _report_hidden_gap(workings: Workings, gap: HiddenGap, model: Model, settings: DiagnosisSettings) -> Diagnosis:
+def _report_hidden_gap(workings: Workings, gap: Estimate, model: Model, settings: DiagnosisSettings) -> Diagnosis:
     """Return the diagnosis of a record of one encoder that the estimator's model explains."""
     parameters = gap_parameters(gap, model, settings.report.level)
     record = RecordEvidence(0.0, 1.0, 0.0, np.inf)  # the model explains the record to its noise

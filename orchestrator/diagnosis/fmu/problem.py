@@ -1,7 +1,7 @@
 """A record, an FMU and a map, ready to be fitted: models are simulated, residuals come in units of the noise."""
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -259,36 +259,30 @@ class FmuProblem:
         return np.array(found)
 
 
+INPUTS: Mapping[str, Callable[[Array, float, float, float], Array]] = {
+    "input_gain": lambda fine, step, value, before: fine * (1.0 + value),
+    "input_offset": lambda fine, step, value, before: fine + value,
+    "input_delay": delay_input,
+    "input_lag": lag_input,
+    "input_saturation": lambda fine, step, value, before: np.clip(fine, -value, value),
+    "input_dead_zone": lambda fine, step, value, before: fine - np.clip(fine, -value, value),
+    "input_rate_limit": limit_rate,
+    "input_quantisation": lambda fine, step, value, before: quantise(fine, value),
+}
+OUTPUTS: Mapping[str, Callable[[Array, float, float, int], Array]] = {
+    "output_gain": lambda rows, step, value, m: rows * (1.0 + value),
+    "output_offset": lambda rows, step, value, m: rows + value,
+    "output_delay": delay_output,
+    "output_lag": lambda rows, step, value, m: lag_output(rows, step, value),
+    "output_quantisation": lambda rows, step, value, m: quantise(rows, value),
+}
+
+
 def at_input(effect: FmuEffect, fine: Array, step: float, value: float) -> Array:
     """Return an input behind an effect in series with it; before the record it had its first value, or was zero."""
-    before = 0.0 if effect.at_rest else float(fine[0])
-    match effect.row.name:
-        case "input_gain":
-            return np.asarray(fine * (1.0 + value))
-        case "input_offset":
-            return np.asarray(fine + value)
-        case "input_delay":
-            return delay_input(fine, step, value, before)
-        case "input_lag":
-            return np.asarray(lag_input(fine, step, value, before))
-        case "input_saturation":
-            return np.clip(fine, -value, value)
-        case "input_dead_zone":
-            return np.asarray(fine - np.clip(fine, -value, value))
-        case "input_rate_limit":
-            return np.asarray(limit_rate(fine, step, value, before))
-    return quantise(fine, value)
+    return np.asarray(INPUTS[effect.row.name](fine, step, value, 0.0 if effect.at_rest else float(fine[0])))
 
 
 def at_output(effect: FmuEffect, rows: Array, step: float, value: float, m: int) -> Array:
     """Return an output behind an effect in series with it; ``m``: see :func:`delay_output`."""
-    match effect.row.name:
-        case "output_gain":
-            return np.asarray(rows * (1.0 + value))
-        case "output_offset":
-            return np.asarray(rows + value)
-        case "output_delay":
-            return delay_output(rows, step, value, m)
-        case "output_lag":
-            return np.asarray(lag_output(rows, step, value))
-    return quantise(rows, value)
+    return np.asarray(OUTPUTS[effect.row.name](rows, step, value, m))

@@ -1,8 +1,5 @@
 """A gap behind the motor's encoder alone: found by the estimator, and graded."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
@@ -14,6 +11,7 @@ from orchestrator.diagnosis.selection.outcome import EffectEvidence
 from orchestrator.diagnosis.settings import GradeSettings
 from orchestrator.errors import OrchestratorError
 from orchestrator.estimation.methods.maximum_likelihood import estimate
+from orchestrator.estimation.protocol import Estimate
 from orchestrator.plants.known.drivetrain import PLANT
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -21,27 +19,8 @@ from orchestrator.records.record import Record
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class HiddenGap:
-    """What the estimator says of a record that its model explains.
-
-    Attributes:
-        alpha: half-gap at the load [rad]; 0.0: none is seen.
-        standard_error: of it [rad].
-        interval: 95 % [rad].
-        values: parameters of the plant (n,) with the gap.
-        parameters: name -> (value, standard error) of what was fitted beside it.
-    """
-
-    alpha: float
-    standard_error: float
-    interval: tuple[float, float]
-    values: Array
-    parameters: Mapping[str, tuple[float, float]]
-
-
-def find_hidden_gap(record: Record, model: Model) -> HiddenGap | None:
-    """Return the gap that a record of the motor's encoder alone shows."""
+def find_hidden_gap(record: Record, model: Model) -> Estimate | None:
+    """Return what the estimator says of a record of the motor's encoder alone; None: its model does not explain it."""
     alpha = model.parameters.get("alpha")
     if model.plant is not PLANT or alpha is None or alpha.value > 0.0 or record.n_missing:
         return None
@@ -49,36 +28,31 @@ def find_hidden_gap(record: Record, model: Model) -> HiddenGap | None:
         found = estimate(record.without_load_encoder(), model)
     except (OrchestratorError, FloatingPointError, np.linalg.LinAlgError):
         return None
-    if found.diagnostics["lacking"]:
-        return None
-    fitted = found.diagnostics["parameters"]
-    parameters = {
-        entry.name: (float(fitted[entry.name]["value"]), float(fitted[entry.name]["standard_error"]))
-        for entry in model.uncertain
-        if entry.name in fitted
-    }
-    values = np.asarray(found.curves["model"], dtype=float)
-    if not found.visible:
-        values = np.where(np.arange(values.size) == PLANT.index("alpha"), 0.0, values)
-        return HiddenGap(0.0, np.inf, (0.0, np.inf), values, parameters)
-    return HiddenGap(found.alpha, found.standard_error, found.interval, values, parameters)
+    return None if found.diagnostics["lacking"] else found
 
 
-def gap_parameters(gap: HiddenGap, model: Model, level: float) -> dict[str, ParameterEstimate]:
+def gap_values(gap: Estimate) -> Array:
+    """Return the parameters of the plant (n,), with the gap if one is seen."""
+    values = np.array(gap.curves["model"], dtype=float)
+    values[PLANT.index("alpha")] *= gap.visible
+    return values
+
+
+def gap_parameters(gap: Estimate, model: Model, level: float) -> dict[str, ParameterEstimate]:
     """Return the estimates of the parameters that were fitted beside a gap."""
     width = float(norm.ppf(0.5 + 0.5 * level))
-    return {
-        name: ParameterEstimate(
-            value, error, (value - width * error, value + width * error),
-            unit_in(model.parameters[name].unit, model), model.parameters[name].value,
-        )
-        for name, (value, error) in gap.parameters.items()
-    }  # fmt: skip
+    found = {}
+    for entry in model.uncertain:
+        if (fitted := gap.diagnostics["parameters"].get(entry.name)) is not None:
+            value, error = float(fitted["value"]), float(fitted["standard_error"])
+            interval = (value - width * error, value + width * error)
+            found[entry.name] = ParameterEstimate(value, error, interval, unit_in(entry.unit, model), entry.value)
+    return found
 
 
-def gap_effects(gap: HiddenGap, test: SignalMisfit, grades: GradeSettings) -> tuple[GradedEffect, ...]:
+def gap_effects(gap: Estimate, test: SignalMisfit, grades: GradeSettings) -> tuple[GradedEffect, ...]:
     """Return the gap as a graded effect; nothing where none is seen."""
-    if not gap.alpha:
+    if not gap.visible:
         return ()
     size = gap.alpha / gap.standard_error
     limits = {"sure size": grades.certain_size_t, "size": grades.likely_t}
