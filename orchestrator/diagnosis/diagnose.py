@@ -33,7 +33,7 @@ from orchestrator.diagnosis.report.misfit_on_test_data import (
     with_drift,
 )
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
-from orchestrator.diagnosis.selection.evidence import leave_out_refuted, record_evidence, torque_shares
+from orchestrator.diagnosis.selection.evidence import leave_out_refuted, noise_share, record_evidence, torque_shares
 from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence, Grade, RecordEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
 from orchestrator.diagnosis.selection.search import fit_effects, search_effects
@@ -144,7 +144,8 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}
     remaining = _dependences(workings, model, settings)
     left = torque_shares(result.problem, result.final.point)
-    record = replace(record, left=float(left.max()))  # that of the model as it is reported
+    noise = noise_share(result.problem, result.final.point)
+    record = replace(record, left=float(left.max()), noise=noise)  # those of the model as it is reported
     verdict = form_verdict(result, graded, remaining, record, test, settings)
     trust = judge_trust(verdict, graded, searched.searched, record, test, parameters, model.uncertain, settings)
     return Diagnosis(

@@ -54,6 +54,11 @@ def test_nothing_is_certain_that_free_runs_miss_tenfold():
     assert grade_effect(EFFECT, replace(RECORD, missed=27.0), SETTINGS) == (Grade.LIKELY, ("confirmed",))
 
 
+def test_noise_that_is_left_speaks_against_no_name():
+    assert grade_effect(EFFECT, replace(RECORD, left=5.0, noise=0.99), SETTINGS)[0] is Grade.CERTAIN
+    assert grade_effect(EFFECT, replace(RECORD, left=5.0, noise=0.9), SETTINGS) == (Grade.POSSIBLE, ("little left",))
+
+
 def test_a_limit_leaves_little_of_its_own_torque_where_it_acts():
     effect = replace(EFFECT, left_where_it_acts=0.3)
     assert grade_effect(effect, RECORD, SETTINGS)[0] is Grade.CERTAIN

@@ -88,7 +88,8 @@ def judge_trust(
     if record.left > UNEXPLAINED:
         left = number_words(100.0 * float(np.sqrt(record.left)), 2)
         amber.append(
-            f"{left} % (rms) of the torque remains unexplained in the fitted data: predictions miss as much; {RECORD_AGAIN}"
+            f"{left} % (rms) of the torque remains unexplained in the fitted data, {100.0 * record.noise:.0f} % of its "
+            f"power like noise: predictions miss the rest; {RECORD_AGAIN}"
         )
     for known in uncertain:
         if not known.assumed and known.name in parameters and _is_far(parameters[known.name], known.uncertainty):

@@ -40,7 +40,7 @@ def record_evidence(result: SearchResult, dependences: Sequence[Dependence]) -> 
     if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
         spread = np.inf
     follows = max((curve.comparison.gain for curve in dependences), default=0.0)
-    return RecordEvidence(float(left.max()), inertia, error, spread, follows)
+    return RecordEvidence(float(left.max()), inertia, error, spread, follows, noise_share(problem, result.final.point))
 
 
 def effect_evidence(result: SearchResult) -> list[EffectEvidence]:
@@ -132,6 +132,27 @@ def torque_shares(problem: FitProblem, point: ModelPoint) -> Array:
         ]
         shares.append(np.mean(power[0] ** 2, axis=1) / (np.mean(power[1] ** 2, axis=1) + 1e-300))
     return np.asarray(np.mean(shares, axis=0))
+
+
+def noise_share(problem: FitProblem, point: ModelPoint) -> float:
+    """Return the least share, over bodies and records, of what a model leaves within the band that is noise.
+
+    That is the encoders' own, and what is as strong in the upper half of a band as below: a law follows the motion,
+    which fills a small part of it.
+    """
+    from scipy.signal import welch
+
+    shares = []
+    for model, seen in zip(problem.models, problem.record_points(point), strict=True):
+        (left,) = model.residuals([seen])
+        frequencies, power = welch(left, 1.0 / model.step, nperseg=min(model.size // 4, 1024), detrend=False)
+        sources = model.noise_sources(frequencies)
+        own = np.einsum("fcm,m->cf", np.abs(sources.measurement) ** 2, sources.levels)
+        for one, encoders, cutoff in zip(power, own, model.cutoffs, strict=True):
+            band, top = frequencies < cutoff, (frequencies < cutoff) & (frequencies > 0.5 * cutoff)
+            floor = max(float(np.median(one[top] - encoders[top])), 0.0) if top.any() else 0.0
+            shares.append(float(np.sum(np.minimum(encoders + floor, one)[band]) / (np.sum(one[band]) + 1e-300)))
+    return min(shares)
 
 
 def inertia_of_record(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float]:

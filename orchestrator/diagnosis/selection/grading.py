@@ -67,8 +67,8 @@ def _is_confirmed(effect: EffectEvidence, s: GradeSettings) -> bool:
 
 
 def _left(effect: EffectEvidence, record: RecordEvidence) -> float:
-    """Return what is left of the torque, or of a limit's own where it acts, if that is more: a ceiling is flat."""
-    return max(record.left, effect.left_where_it_acts if effect.kind == "limit" else 0.0)
+    """Return what is left beside noise, or of a limit's own where it acts, if that is more: a ceiling is flat."""
+    return max(record.left * (1.0 - record.noise), effect.left_where_it_acts if effect.kind == "limit" else 0.0)
 
 
 GRADE_RULES: tuple[GradeRule, ...] = (
@@ -128,7 +128,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "little left", Grade.POSSIBLE, lambda e, r, s: _left(e, r) < s.grades.most_left,
-        "share of the torque that is left; for a limit, where it acts", "grades.most_left",
+        "share of the torque that is left beside noise; for a limit, where it acts", "grades.most_left",
         "too much of the torque remains unexplained, and a law then fits whatever is missing",
     ),
 )  # fmt: skip

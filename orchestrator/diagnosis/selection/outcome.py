@@ -96,6 +96,7 @@ class RecordEvidence:
         inertia_error: its standard error, in the same unit.
         inertia_spread: how far the model file lets it be off, as a share.
         follows: share of the squared error of what is left that the strongest curve of one signal takes.
+        noise: share of what is left that is noise.
         missed: largest misfit of free runs on test data, over what noise and the values' uncertainty account for.
     """
 
@@ -104,6 +105,7 @@ class RecordEvidence:
     inertia_error: float
     inertia_spread: float
     follows: float = 0.0
+    noise: float = 0.0
     missed: float = 0.0
 
     @property
