@@ -39,27 +39,18 @@ class ParameterEstimate(ValueEstimate):
 
 @dataclass(frozen=True)
 class GradedEffect:
-    """An effect that the model lacks.
-
-    Attributes:
-        grade: certain, likely or possible.
-        lowered_by: names of the rules that lowered the grade.
-        parameters: estimate of each parameter, by short name.
-        evidence: gain, shares and family.
-        block_values: short name -> (blocks,) its value when each block in turn decides by its share.
-        of_log: a property of the log, not of the machine.
-        in_model: the corrected model has it.
-    """
+    """An effect that the model lacks."""
 
     name: str
     site: str
-    grade: Grade
-    lowered_by: tuple[str, ...]
-    parameters: Mapping[str, ValueEstimate]
-    evidence: EffectEvidence
+    grade: Grade  # certain, likely or possible
+    lowered_by: tuple[str, ...]  # names of the rules that lowered the grade
+    parameters: Mapping[str, ValueEstimate]  # estimate of each parameter, by short name
+    evidence: EffectEvidence  # gain, shares and family
+    # short name -> (blocks,) its value when each block in turn decides by its share
     block_values: Mapping[str, tuple[float, ...]]
-    of_log: bool = False
-    in_model: bool = True
+    of_log: bool = False  # a property of the log, not of the machine
+    in_model: bool = True  # the corrected model has it
 
     @property
     def label(self) -> str:
@@ -69,18 +60,12 @@ class GradedEffect:
 
 @dataclass(frozen=True)
 class Nuisance:
-    """A property of the log: a late encoder, an early torque, the gain of the drive.
-
-    Attributes:
-        grade: certain, likely or possible.
-        parameters: estimate of each parameter, by short name.
-        lowered_by: names of the rules that lowered the grade.
-    """
+    """A property of the log: a late encoder, an early torque, the gain of the drive."""
 
     name: str
-    grade: Grade
-    parameters: Mapping[str, ValueEstimate]
-    lowered_by: tuple[str, ...] = ()
+    grade: Grade  # certain, likely or possible
+    parameters: Mapping[str, ValueEstimate]  # estimate of each parameter, by short name
+    lowered_by: tuple[str, ...] = ()  # names of the rules that lowered the grade
 
 
 @dataclass(frozen=True)
@@ -126,22 +111,16 @@ class SignalMisfit:
 
 @dataclass(frozen=True)
 class TestMisfit:
-    """The misfit on test data of one record.
-
-    Attributes:
-        rows: of its test part.
-        signals: misfit of each encoder.
-        torque: (nominal, parameters, final): share of the torque that each leaves; empty: not worked out.
-        still: nothing moves in it: it tests nothing.
-    """
+    """The misfit on test data of one record."""
 
     __test__ = False
 
     source: str
-    rows: int
-    signals: tuple[SignalMisfit, ...]
+    rows: int  # of its test part
+    signals: tuple[SignalMisfit, ...]  # misfit of each encoder
+    # (nominal, parameters, final): share of the torque that each leaves; empty: not worked out
     torque: tuple[float, ...] = ()
-    still: bool = False
+    still: bool = False  # nothing moves in it: it tests nothing
 
     def is_worse(self, more: float, of_noise: float) -> bool:
         """Tell whether the final model predicts test data worse than re-fitted parameters do.
@@ -185,32 +164,21 @@ class Workings:
 
 @dataclass(frozen=True)
 class DiagnosisOutcome:
-    """What a diagnosis of a plant of ours and of any FMU have in common.
+    """What a diagnosis of a plant of ours and of any FMU have in common."""
 
-    Attributes:
-        verdict: "none" (the model explains the record), "parameters" (re-fitted, it does), "effects" (one at least is
-            likely) or "unknown" (something is missing, and nothing is likely).
-        effects: of the machine, surest first.
-        left: share of each residual's power that no law explains, by body or output.
-        remaining: what that follows, strongest first.
-        test: misfits on test data.
-        record: evidence of the records as a whole.
-        trust: how far the corrected model can be trusted.
-        notes: what to bear in mind, a sentence each.
-        searched: effects were looked for.
-    """
-
+    # "none" (the model explains the record), "parameters" (re-fitted, it does), "effects" (one at least is likely) or
+    # "unknown" (something is missing, and nothing is likely)
     verdict: str
-    effects: tuple[GradedEffect, ...]
+    effects: tuple[GradedEffect, ...]  # of the machine, surest first
     parameters: Mapping[str, ParameterEstimate]
-    left: Mapping[str, float]
-    remaining: tuple[Dependence, ...]
-    test: tuple[TestMisfit, ...]
-    record: RecordEvidence
-    trust: Trust
-    notes: tuple[str, ...]
+    left: Mapping[str, float]  # share of each residual's power that no law explains, by body or output
+    remaining: tuple[Dependence, ...]  # what that follows, strongest first
+    test: tuple[TestMisfit, ...]  # misfits on test data
+    record: RecordEvidence  # evidence of the records as a whole
+    trust: Trust  # how far the corrected model can be trusted
+    notes: tuple[str, ...]  # what to bear in mind, a sentence each
     settings: DiagnosisSettings
-    searched: bool
+    searched: bool  # effects were looked for
 
     @property
     def largest_miss(self) -> float:
@@ -229,15 +197,10 @@ class DiagnosisOutcome:
 
 @dataclass(frozen=True)
 class Diagnosis(DiagnosisOutcome):
-    """The outcome of a diagnosis of a plant of ours; docs/diagnosis.md says what each word means.
-
-    Attributes:
-        law: the strongest dependence of what is left, as a curve, where it may be used; None: there is none.
-        model: that the record was compared with.
-        workings: how it was made.
-    """
+    """The outcome of a diagnosis of a plant of ours; docs/diagnosis.md says what each word means."""
 
     nuisances: tuple[Nuisance, ...]
+    # the strongest dependence of what is left, as a curve, where it may be used; None: there is none
     law: Dependence | None
-    model: Model
-    workings: Workings = field(repr=False)
+    model: Model  # that the record was compared with
+    workings: Workings = field(repr=False)  # how it was made

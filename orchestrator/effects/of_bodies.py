@@ -10,26 +10,16 @@ from pyfmu_sources.laws import body
 
 @dataclass(frozen=True)
 class BodyLaw:
-    """A law of :mod:`pyfmu_sources.laws.body`, at the load of plants, and at a port.
-
-    Attributes:
-        kind: what sort of law it is.
-        value: short name of its coefficient, ``effects.NAME.VALUE`` in the plants' tables.
-        unit: of the coefficient at a port, where "effort" and "flow" stand for the units there.
-        small: (typical torque, typical speed) -> a small change of the coefficient.
-        number: of the law at a port.
-        motion: what it does to the motion, in words of a drive engineer.
-        plants: on which it stands.
-    """
+    """A law of :mod:`pyfmu_sources.laws.body`, at the load of plants, and at a port."""
 
     name: str
-    kind: str
-    value: str
-    unit: str
-    small: Callable[[float, float], float]
-    number: int
-    motion: str
-    plants: tuple[str, ...] = BOTH_PLANTS
+    kind: str  # what sort of law it is
+    value: str  # short name of its coefficient, ``effects.NAME.VALUE`` in the plants' tables
+    unit: str  # of the coefficient at a port, where "effort" and "flow" stand for the units there
+    small: Callable[[float, float], float]  # (typical torque, typical speed) -> a small change of the coefficient
+    number: int  # of the law at a port
+    motion: str  # what it does to the motion, in words of a drive engineer
+    plants: tuple[str, ...] = BOTH_PLANTS  # on which it stands
 
 
 LAWS = (

@@ -35,17 +35,12 @@ R = TypeVar("R", bound=Rows)
 
 @dataclass(frozen=True, eq=False)
 class TestData(Generic[R]):
-    """Records of which some rows are test data.
-
-    Attributes:
-        _records: whole records, so that what a torque was asked for before the test part is known.
-        _first_rows: row at which the test part of each begins.
-    """
+    """Records of which some rows are test data."""
 
     __test__ = False  # it is no test case
 
-    _records: tuple[R, ...]
-    _first_rows: tuple[int, ...]
+    _records: tuple[R, ...]  # whole records, so that what a torque was asked for before the test part is known
+    _first_rows: tuple[int, ...]  # row at which the test part of each begins
 
 
 def split_records(records: Sequence[R], share: float, other: R | None = None) -> tuple[tuple[R, ...], TestData[R]]:

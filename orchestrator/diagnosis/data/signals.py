@@ -25,36 +25,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Signals of one record at the rate of the analysis.
+    """Signals of one record at the rate of the analysis."""
 
-    Attributes:
-        step: sample time [s].
-        torque: (n,) requested torque [N.m].
-        angles: (channels, n) encoders: motor, and load where there is one [rad].
-        held: the torque is constant over each sample; else it is a smooth signal at its samples.
-        cutoffs: (channels,) highest frequency of each body's balance [Hz].
-        noise: (channels,) standard deviation of each encoder [rad].
-        measured: (n,) rows whose samples were measured, not interpolated.
-        source: name of the record.
-        rows_each: rows of the record for each row here.
-        torque_raster: step of the torque's own rows [s], where these are rarer than the record's; else 0.0.
-        zeros_set: the encoders' zeros were brought near each other, and what is left of that is unknown.
-        smoothing: (n,) what the torque changes by when its own rows are samples of a smooth signal [N.m]; empty
-            where they are not rarer.
-    """
-
-    step: float
-    torque: Array
-    angles: Array
-    held: bool
-    cutoffs: tuple[float, ...]
-    noise: tuple[float, ...]
-    measured: NDArray[np.bool_]
-    source: str
-    rows_each: int = 1
-    torque_raster: float = 0.0
+    step: float  # sample time [s]
+    torque: Array  # (n,) requested torque [N.m]
+    angles: Array  # (channels, n) encoders: motor, and load where there is one [rad]
+    held: bool  # the torque is constant over each sample; else it is a smooth signal at its samples
+    cutoffs: tuple[float, ...]  # (channels,) highest frequency of each body's balance [Hz]
+    noise: tuple[float, ...]  # (channels,) standard deviation of each encoder [rad]
+    measured: NDArray[np.bool_]  # (n,) rows whose samples were measured, not interpolated
+    source: str  # name of the record
+    rows_each: int = 1  # rows of the record for each row here
+    torque_raster: float = 0.0  # step of the torque's own rows [s], where these are rarer than the record's; else 0.0
+    # (n,) what the torque changes by when its own rows are samples of a smooth signal [N.m]; empty where they are not
+    # rarer
     smoothing: Array = field(default_factory=lambda: np.empty(0))
-    zeros_set: bool = False
+    zeros_set: bool = False  # the encoders' zeros were brought near each other, and what is left of that is unknown
 
     @property
     def size(self) -> int:
@@ -67,10 +53,8 @@ def prepare_signals(
 ) -> Signals:
     """Return the signals of a record at the rate that its motion asks for.
 
-    Args:
-        record: with uniform time; missing samples are NaN.
-        inertia: nominal inertia [kg.m2] of a single body, which bounds its band by the torque that is there; None: of
-            two bodies no such bound is taken.
+    ``record``: with uniform time; missing samples are NaN. ``inertia``: nominal inertia [kg.m2] of a single body, which
+    bounds its band by the torque that is there; None: of two bodies no such bound is taken.
     """
     angles = [interpolate_missing(record.theta_m)]
     if load_encoder and record.theta_l is not None:

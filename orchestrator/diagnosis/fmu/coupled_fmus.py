@@ -57,16 +57,13 @@ class LoadRequest:
 
 @dataclass(frozen=True)
 class Run:
-    """One run: start values by name, inputs (steps, inputs) that are held over each step, effects at ports and cuts.
-
-    Attributes:
-        ports: of each effect: place of the input, law, places of position and speed (-1: differentiated).
-        laws: of each effect: its four parameters, the direction in which the input pushes, the effort that ends a run.
-    """
+    """One run: start values by name, inputs (steps, inputs) that are held over each step, effects at ports and cuts."""
 
     starts: dict[str, Value]
     table: Array
+    # of each effect: place of the input, law, places of position and speed (-1: differentiated)
     ports: tuple[tuple[int, ...], ...] = ()
+    # of each effect: its four parameters, the direction in which the input pushes, the effort that ends a run
     laws: tuple[tuple[float, ...], ...] = ()
 
 

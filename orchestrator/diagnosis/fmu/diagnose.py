@@ -156,21 +156,13 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
 
 @dataclass(frozen=True)
 class FmuCalibration:
-    """Parameters that explain records.
+    """Parameters that explain records."""
 
-    Attributes:
-        diagnosis: of the re-fitted model, no effect searched for.
-        learned: name -> share of the granted uncertainty that the records have removed, 0 to 1.
-        confounded: pairs that the records hardly tell apart.
-        explained: free runs over test data miss no output by more than its noise, and what is left follows nothing.
-        notes: what to bear in mind, a sentence each.
-    """
-
-    diagnosis: FmuDiagnosis
-    learned: Mapping[str, float]
-    confounded: tuple[tuple[str, str], ...]
-    explained: bool
-    notes: tuple[str, ...]
+    diagnosis: FmuDiagnosis  # of the re-fitted model, no effect searched for
+    learned: Mapping[str, float]  # name -> share of the granted uncertainty that the records have removed, 0 to 1
+    confounded: tuple[tuple[str, str], ...]  # pairs that the records hardly tell apart
+    explained: bool  # free runs over test data miss no output by more than its noise, and what is left follows nothing
+    notes: tuple[str, ...]  # what to bear in mind, a sentence each
 
 
 def _stopping_limit(entry: UncertainParameter, value: float) -> str:

@@ -79,9 +79,7 @@ def lag_output(rows: Reals, step: float, constant: float, out: Reals) -> None:
 def efforts_along(law: int, x: Reals, v: Reals, a: Reals, q: Reals, step: float, out: Reals) -> None:
     """Fill ``out`` (n,) with the effort against a motion that a law of ``laws.body`` has in each sample.
 
-    Args:
-        x, v, a: (n,) position, speed, acceleration.
-        q: (4,) parameters of the law.
+    ``x, v, a``: (n,) position, speed, acceleration; ``q``: (4,) parameters of the law.
     """
     built = 0.0
     for k in range(len(x)):

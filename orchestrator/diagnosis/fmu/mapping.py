@@ -106,23 +106,14 @@ class MapFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Map(MapFile, frozen=True):
-    """A map that has been checked against its FMU, with columns filled in.
+    """A map that has been checked against its FMU, with columns filled in."""
 
-    Attributes:
-        uncertain: what is re-fitted.
-        fixed: values by name of what is set and not re-fitted.
-        source: file name, for messages.
-        tunable: those of what is re-fitted that their FMU says may change within a run.
-        initial: those of what is re-fitted that one record begins with.
-        units: of inputs and outputs, where the FMU states them.
-    """
-
-    uncertain: tuple[ModelParameter, ...] = ()
-    fixed: dict[str, Value] = {}
-    source: str = ""
-    tunable: tuple[str, ...] = ()
-    initial: tuple[str, ...] = ()
-    units: dict[str, Unit] = {}
+    uncertain: tuple[ModelParameter, ...] = ()  # what is re-fitted
+    fixed: dict[str, Value] = {}  # values by name of what is set and not re-fitted
+    source: str = ""  # file name, for messages
+    tunable: tuple[str, ...] = ()  # those of what is re-fitted that their FMU says may change within a run
+    initial: tuple[str, ...] = ()  # those of what is re-fitted that one record begins with
+    units: dict[str, Unit] = {}  # of inputs and outputs, where the FMU states them
 
 
 def read_map(path: Path, system: FmuSystem) -> Map:

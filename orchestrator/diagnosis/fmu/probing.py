@@ -191,10 +191,8 @@ def output_noise(given: Map, data: FmuRecord, traces: Sequence[Array]) -> tuple[
 
     A data sheet knows the encoder, not the counts, the cable and the differentiator behind it: where the record shows
     more than the map says, that is believed. Far more is something that moves, and so is more at a rate that was
-    brought down. Less may be noise that was filtered.
-
-    Args:
-        traces: (n, outputs) each: what was measured, and what a model leaves of it; the smoothest counts.
+    brought down. Less may be noise that was filtered. ``traces``: (n, outputs) each: what was measured, and what a
+    model leaves of it; the smoothest counts.
 
     Returns:
         Noise (outputs,), and a sentence for each output whose record shows another.

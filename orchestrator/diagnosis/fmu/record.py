@@ -38,27 +38,17 @@ DEFAULT = FmuSettings()
 
 @dataclass(frozen=True, eq=False)
 class FmuRecord:
-    """The columns of a record that a map names.
+    """The columns of a record that a map names."""
 
-    Attributes:
-        time: (n,) s, uniform.
-        inputs: (n, inputs) in the order of the map.
-        outputs: (n, outputs).
-        source: file name, for messages.
-        signals: (n, signals), off their references.
-        factor: rows of the file for one of these.
-        notes: what was detected and filled when the file was read.
-        held: (n * factor, inputs) inputs in all rows of the file, where there are more; ``inputs`` are their means.
-    """
-
-    time: Array
-    inputs: Array
-    outputs: Array
-    source: str
-    signals: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    factor: int = 1
+    time: Array  # (n,) s, uniform
+    inputs: Array  # (n, inputs) in the order of the map
+    outputs: Array  # (n, outputs)
+    source: str  # file name, for messages
+    signals: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (n, signals), off their references
+    factor: int = 1  # rows of the file for one of these
+    # (n * factor, inputs) inputs in all rows of the file, where there are more; ``inputs`` are their means
     held: Array | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what was detected and filled when the file was read
 
     @property
     def file_inputs(self) -> Array:
@@ -93,11 +83,8 @@ class FmuRecord:
 def read_fmu_record(path: Path, given: Map, uneven: float = DEFAULT.uneven) -> FmuRecord:
     """Return the columns that a map names.
 
-    Rows that are lost and cells that are empty are few and short, and are filled: inputs as they are held, outputs by
-    a spline.
-
-    Args:
-        uneven: share of a sample by which a time may be off.
+    Rows that are lost and cells that are empty are few and short, and are filled: inputs as they are held, outputs by a
+    spline. ``uneven``: share of a sample by which a time may be off.
     """
     tables = (("inputs", given.inputs), ("outputs", given.outputs), ("signals", given.signals))
     columns = [(f"$.{table}.{name}", name, entry) for table, entries in tables for name, entry in entries.items()]

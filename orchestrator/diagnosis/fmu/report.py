@@ -23,17 +23,11 @@ STAGES = ("nominal", "refitted", "corrected")
 
 @dataclass(frozen=True)
 class FmuWorkings:
-    """What figures and the corrected system need of how a diagnosis was made.
+    """What figures and the corrected system need of how a diagnosis was made."""
 
-    Attributes:
-        test_data: which only the report opens.
-        search: problem, steps and models.
-        residuals: the FMU beside each record, without its test data.
-    """
-
-    test_data: TestData[FmuRecord] = field(repr=False)
-    search: SearchResult = field(repr=False)
-    residuals: tuple[FmuResiduals, ...] = field(repr=False)
+    test_data: TestData[FmuRecord] = field(repr=False)  # which only the report opens
+    search: SearchResult = field(repr=False)  # problem, steps and models
+    residuals: tuple[FmuResiduals, ...] = field(repr=False)  # the FMU beside each record, without its test data
 
     @property
     def problem(self) -> FmuProblem:
@@ -66,15 +60,10 @@ class FmuWorkings:
 
 @dataclass(frozen=True)
 class FmuDiagnosis(DiagnosisOutcome):
-    """The outcome of a diagnosis of any FMU; docs/any-fmu.md says what each word means.
+    """The outcome of a diagnosis of any FMU; docs/any-fmu.md says what each word means."""
 
-    Attributes:
-        map: that the records were read by.
-        workings: how it was made.
-    """
-
-    map: Map
-    workings: FmuWorkings = field(repr=False)
+    map: Map  # that the records were read by
+    workings: FmuWorkings = field(repr=False)  # how it was made
 
 
 def _test_problems(workings: FmuWorkings) -> list[tuple[FmuProblem, int]]:

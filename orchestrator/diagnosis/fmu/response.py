@@ -22,18 +22,13 @@ START_LAGS = 24  # rows before the record at which what was pushed has led to it
 
 @dataclass(frozen=True, eq=False)
 class PulseResponses:
-    """What outputs answer to a pulse of one sample, over its size.
+    """What outputs answer to a pulse of one sample, over its size."""
 
-    Attributes:
-        rows: of the record at which pulses began, the first one zero.
-        found: input -> for each of these rows, the response (n - row, outputs) from there on, over the pulse's size in
-            the input's unit.
-        size: rows of the record.
-    """
-
-    rows: tuple[int, ...]
+    rows: tuple[int, ...]  # of the record at which pulses began, the first one zero
+    # input -> for each of these rows, the response (n - row, outputs) from there on, over the pulse's size in the
+    # input's unit
     found: dict[int, tuple[Array, ...]]
-    size: int
+    size: int  # rows of the record
 
     def is_linear(self, share: float) -> bool:
         """Tell whether the responses along the record are the same."""

@@ -37,22 +37,14 @@ class FmuConnection:
 
 @dataclass(frozen=True)
 class FmuSystem:
-    """One FMU, or several.
+    """One FMU, or several."""
 
-    Attributes:
-        path: of the FMU, or of the scenario.
-        members: FMU by name; the name of a lone one is empty.
-        model: all variables and units; those of one of several are called ``fmu.variable``.
-        given: values that the scenario sets.
-        fed: inputs that the scenario feeds from a source.
-    """
-
-    path: Path
-    members: Mapping[str, Path]
-    model: ModelInterface
+    path: Path  # of the FMU, or of the scenario
+    members: Mapping[str, Path]  # FMU by name; the name of a lone one is empty
+    model: ModelInterface  # all variables and units; those of one of several are called ``fmu.variable``
     connections: tuple[FmuConnection, ...] = ()
-    given: Mapping[str, Value] = field(default_factory=dict)
-    fed: tuple[str, ...] = ()
+    given: Mapping[str, Value] = field(default_factory=dict)  # values that the scenario sets
+    fed: tuple[str, ...] = ()  # inputs that the scenario feeds from a source
 
     @cached_property
     def units(self) -> dict[str, str]:

@@ -20,27 +20,17 @@ UNKNOWN = 1e3  # standard error of a value that changes nothing, in small change
 
 @dataclass(frozen=True, eq=False)
 class FittedModel:
-    """A fitted model.
-
-    Attributes:
-        residual: (rows,) whitened.
-        jacobian: (rows, coordinates).
-        cost: squared residuals and prior.
-        covariance: (coordinates, coordinates) of white residuals.
-        held_out: (rows,) residuals of each block, predicted from the others.
-        blocks: (rows,) block of each residual.
-        block_shifts: (blocks, coordinates) how the values move when a block is left out.
-    """
+    """A fitted model."""
 
     point: ModelPoint
     coordinates: tuple[Coordinate, ...]
-    residual: Array
-    jacobian: Array
-    cost: float
-    covariance: Array
-    held_out: Array
-    blocks: NDArray[np.int64]
-    block_shifts: Array
+    residual: Array  # (rows,) whitened
+    jacobian: Array  # (rows, coordinates)
+    cost: float  # squared residuals and prior
+    covariance: Array  # (coordinates, coordinates) of white residuals
+    held_out: Array  # (rows,) residuals of each block, predicted from the others
+    blocks: NDArray[np.int64]  # (rows,) block of each residual
+    block_shifts: Array  # (blocks, coordinates) how the values move when a block is left out
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -224,16 +214,12 @@ def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
 
 @dataclass(frozen=True)
 class ScoreComparison:
-    """How much better one model predicts blocks left out than another.
+    """How much better one model predicts blocks left out than another."""
 
-    Attributes:
-        gain: share of the squared error that it takes away.
-        t: paired gain over its standard error: the larger of the mean log ratio, in which blocks count alike, and of
-            the sum, whose error is that of what is left: an effect that acts in few blocks, but
-            not in one alone, is no less sure there.
-    """
-
-    gain: float
+    gain: float  # share of the squared error that it takes away
+    # paired gain over its standard error: the larger of the mean log ratio, in which blocks count alike, and of the
+    # sum, whose error is that of what is left: an effect that acts in few blocks, but not in one alone, is no less sure
+    # there
     t: float
 
 

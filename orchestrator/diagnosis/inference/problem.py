@@ -27,21 +27,15 @@ FARTHEST = 1e-3  # of its nominal value, below which no parameter falls
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """Records beside a model that they share.
+    """Records beside a model that they share."""
 
-    Attributes:
-        models: one for each record; they share effects and all parameters but local ones.
-        whitenings: one for each record.
-        overdispersion: by how much blocks differ more than white residuals do, as a factor on variances: the prior
-            counts for as much more.
-        first: values from which a fit without effects begins too, beside the nominal ones.
-    """
-
-    models: tuple[ResidualModel, ...]
-    whitenings: tuple[Whitening, ...]
+    models: tuple[ResidualModel, ...]  # one for each record; they share effects and all parameters but local ones
+    whitenings: tuple[Whitening, ...]  # one for each record
     settings: FitSettings
+    # by how much blocks differ more than white residuals do, as a factor on variances: the prior counts for as much
+    # more
     overdispersion: float = 1.0
-    first: ModelPoint | None = None
+    first: ModelPoint | None = None  # values from which a fit without effects begins too, beside the nominal ones
 
     @cached_property
     def shared(self) -> tuple[UncertainParameter, ...]:

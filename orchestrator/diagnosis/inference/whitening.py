@@ -32,21 +32,13 @@ RIDGE = 1e-12  # of the diagonal of a spectral matrix: encoders that move as one
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Weights of one record's residuals, and the rows that are kept of what they give.
+    """Weights of one record's residuals, and the rows that are kept of what they give."""
 
-    Attributes:
-        weights: (f, channels, channels) lower triangular, at the frequencies of the band, from zero on.
-        rows: (m,) rows that are kept, evenly apart, about independent of each other.
-        taper: (n,) how the record fades in and out.
-        active: (channels, m) weights of the kept rows.
-        length: of the Fourier transforms, a multiple of how far rows are apart.
-    """
-
-    weights: Complex
-    rows: NDArray[np.int64]
-    taper: Array
-    active: Array
-    length: int
+    weights: Complex  # (f, channels, channels) lower triangular, at the frequencies of the band, from zero on
+    rows: NDArray[np.int64]  # (m,) rows that are kept, evenly apart, about independent of each other
+    taper: Array  # (n,) how the record fades in and out
+    active: Array  # (channels, m) weights of the kept rows
+    length: int  # of the Fourier transforms, a multiple of how far rows are apart
 
     @property
     def size(self) -> int:

@@ -147,11 +147,9 @@ def requests_for_fmu(signals: RunSignals, plant: Plant, p: Array) -> Array:
 def format_corrected_model(model: Model, diagnosis: Diagnosis, record: FittedRecord | None = None) -> str:
     """Return the TOML text of a model with the values of a diagnosis; it reads records as ``model`` does.
 
-    Every value that differs from the FMU's default is stated. Those that were fitted carry the half-width of their
-    95 % interval as uncertainty, so that another record may move them; all others are exact.
-
-    Args:
-        record: what :func:`fitted_record_of` says; None: that is left out.
+    Every value that differs from the FMU's default is stated. Those that were fitted carry the half-width of their 95 %
+    interval as uncertainty, so that another record may move them; all others are exact. ``record``: what
+    :func:`fitted_record_of` says; None: that is left out.
     """
     plant, final = model.plant, diagnosis.workings.final
     fitted: dict[str, ValueEstimate] = dict(diagnosis.parameters)

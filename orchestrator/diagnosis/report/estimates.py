@@ -149,10 +149,8 @@ def open_to(effect: GradedEffect, other: GradedEffect, settings: ReportSettings)
     """Return an effect whose sizes are as uncertain as two models leave them of which the record excludes neither.
 
     The other model has the probability ``possible_share``. An interval reaches from the lower to the upper quantile of
-    the mixture of both models' normal distributions, and is never narrower than that of the first.
-
-    Args:
-        other: the same effect in the other model, which has an effect that is only possible too.
+    the mixture of both models' normal distributions, and is never narrower than that of the first. ``other``: the same
+    effect in the other model, which has an effect that is only possible too.
     """
     shares = np.array([1.0 - settings.possible_share, settings.possible_share])
     tail = 0.5 * (1.0 - settings.level)

@@ -38,19 +38,12 @@ LEAST_SPEED = 1e-3  # typical size of a speed at rest [rad/s]
 
 @dataclass(frozen=True)
 class FreeRun:
-    """A simulated part of a record.
+    """A simulated part of a record."""
 
-    Attributes:
-        outputs: (n, channels) simulated encoder angles.
-        start: (8,) the initial state.
-        rms: (channels,) rms of simulated minus measured.
-        straight: it answered to its initial state as its derivatives said: no other start leads closer.
-    """
-
-    outputs: Array
-    start: Array
-    rms: Array
-    straight: bool = False
+    outputs: Array  # (n, channels) simulated encoder angles
+    start: Array  # (8,) the initial state
+    rms: Array  # (channels,) rms of simulated minus measured
+    straight: bool = False  # it answered to its initial state as its derivatives said: no other start leads closer
 
 
 def free_run(plant: Plant, p: Array, guess: Array, signals: RunSignals, part: slice, history: bool = True) -> FreeRun:

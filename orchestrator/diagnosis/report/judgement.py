@@ -20,10 +20,7 @@ def form_verdict(
     search: SearchResult, effects: Sequence[GradedEffect], dependences: Sequence[Dependence], record: RecordEvidence,
     test: Sequence[TestMisfit], settings: DiagnosisSettings,
 ) -> str:  # fmt: skip
-    """Return the verdict.
-
-    Args:
-        test: misfits on test data, with how far the values' uncertainty lets free runs drift.
+    """Return the verdict. ``test``: misfits on test data, with how far the values' uncertainty lets free runs drift.
 
     Returns:
         "effects": one at least is likely; "unknown": something is missing and nothing is likely; "none" or

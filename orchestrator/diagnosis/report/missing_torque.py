@@ -18,25 +18,15 @@ SHOWN_SECONDS = 4.0  # of an effect that follows the time
 
 @dataclass(frozen=True)
 class MissingTorque:
-    """The missing torque over the signal that an effect's law follows: means of bins, or values over the time.
+    """The missing torque over the signal that an effect's law follows: means of bins, or values over the time."""
 
-    Attributes:
-        label: name and site, as the bank of effects has them.
-        x_label: the signal that the law follows, with its unit in brackets.
-        y_label: torque or force, its place and unit.
-        x: (n,) NaN where the signal leaves a wide gap.
-        missing: (n,) what is missing without the effect.
-        law: (n,) what of it the law accounts for.
-        spread: (n,) standard deviation within the bins; None over the time.
-    """
-
-    label: str
-    x_label: str
-    y_label: str
-    x: Array
-    missing: Array
-    law: Array
-    spread: Array | None
+    label: str  # name and site, as the bank of effects has them
+    x_label: str  # the signal that the law follows, with its unit in brackets
+    y_label: str  # torque or force, its place and unit
+    x: Array  # (n,) NaN where the signal leaves a wide gap
+    missing: Array  # (n,) what is missing without the effect
+    law: Array  # (n,) what of it the law accounts for
+    spread: Array | None  # (n,) standard deviation within the bins; None over the time
 
 
 def missing_torques(diagnosis: Diagnosis) -> Iterator[MissingTorque]:

@@ -32,25 +32,15 @@ NOISE_WINDOW = 9  # samples of the sliding cubic whose residual is the encoder's
 
 @dataclass(frozen=True, eq=False)
 class RunSignals:
-    """Signals of one record.
+    """Signals of one record."""
 
-    Attributes:
-        step: sample time [s].
-        requests: (n,) requested torque [N.m], held from sample to sample.
-        angles: (n, channels) as the log has them [rad].
-        noise: (channels,) standard deviation of each encoder's noise, rounding included [rad].
-        torque: rms of the requests [N.m].
-        cutoff: frequency up to which the machine moves [Hz], for first guesses of speeds.
-        smoothing: (n,) what the requests change by when the torque's own rows are samples of a smooth signal [N.m]; or
-            empty.
-    """
-
-    step: float
-    requests: Array
-    angles: Array
-    noise: Array
-    torque: float
-    cutoff: float
+    step: float  # sample time [s]
+    requests: Array  # (n,) requested torque [N.m], held from sample to sample
+    angles: Array  # (n, channels) as the log has them [rad]
+    noise: Array  # (channels,) standard deviation of each encoder's noise, rounding included [rad]
+    torque: float  # rms of the requests [N.m]
+    cutoff: float  # frequency up to which the machine moves [Hz], for first guesses of speeds
+    # (n,) what the requests change by when the torque's own rows are samples of a smooth signal [N.m]; or empty
     smoothing: Array = field(default_factory=lambda: np.empty(0))
 
     @property
@@ -143,17 +133,13 @@ def run_signals(record: Record, channels: int, cutoff: float) -> RunSignals:
 
 @dataclass(frozen=True)
 class Simulation:
-    """A model, ready to be run: what does not depend on where a run starts is done once.
-
-    Attributes:
-        signals: of the record; requests before a part matter when there is a dead time.
-        history: requests before a part are still under way in a dead time; False: there were none, as in an FMU that
-            starts with the part.
-    """
+    """A model, ready to be run: what does not depend on where a run starts is done once."""
 
     plant: Plant
     p: Array
-    signals: RunSignals
+    signals: RunSignals  # of the record; requests before a part matter when there is a dead time
+    # requests before a part are still under way in a dead time; False: there were none, as in an FMU that starts with
+    # the part
     history: bool = True
 
     def run(self, start: Array, part: slice) -> Array:

@@ -14,19 +14,14 @@ FAR = 10.0  # times what noise and the values' uncertainty account for: so far o
 
 @dataclass(frozen=True)
 class GradeRule:
-    """A row that lowers a grade.
-
-    Attributes:
-        highest: the grade that an effect has at most where the rule does not hold.
-        holds: (effect, record, settings) -> whether it holds.
-        setting: name of the threshold.
-    """
+    """A row that lowers a grade."""
 
     name: str
-    highest: Grade
+    highest: Grade  # the grade that an effect has at most where the rule does not hold
+    # (effect, record, settings) -> whether it holds
     holds: Callable[[EffectEvidence, RecordEvidence, DiagnosisSettings], bool]
     statistic: str
-    setting: str
+    setting: str  # name of the threshold
     reason: str
 
 

@@ -21,18 +21,12 @@ class TriedEffect:
 
 @dataclass(frozen=True, eq=False)
 class SearchStep:
-    """A model, what was tried on top of it, and what the final model has of that ("": nothing).
-
-    Attributes:
-        tried: the effects, by gain.
-        taken: label of the effect that the final model has.
-        family: labels of those that are not told from it.
-    """
+    """A model, what was tried on top of it, and what the final model has of that ("": nothing)."""
 
     before: FittedModel
-    tried: tuple[TriedEffect, ...]
-    taken: str = ""
-    family: tuple[str, ...] = ()
+    tried: tuple[TriedEffect, ...]  # the effects, by gain
+    taken: str = ""  # label of the effect that the final model has
+    family: tuple[str, ...] = ()  # labels of those that are not told from it
 
     @property
     def entry(self) -> TriedEffect | None:
@@ -42,27 +36,19 @@ class SearchStep:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """What the search ended with.
+    """What the search ended with."""
 
-    Attributes:
-        problem: with the whitening and the prior's weight of the final model.
-        base: the model with re-fitted parameters alone, as the problem of its own time had it.
-        alone: effects that were fitted alone on top of the base, by gain.
-        reviews: label -> the step that it makes in the final model, with the family that it has there.
-        entries: label -> the model of those effects alone that take more than it, and what it does on top of that.
-        searched: whether effects were looked for.
-        complete: False when time ran out.
-        asked: labels of effects that were asked for: they stay, whatever they gain.
-    """
-
-    problem: FitProblem
-    base: FittedModel
+    problem: FitProblem  # with the whitening and the prior's weight of the final model
+    base: FittedModel  # the model with re-fitted parameters alone, as the problem of its own time had it
     final: FittedModel
-    alone: tuple[TriedEffect, ...] = ()
+    alone: tuple[TriedEffect, ...] = ()  # effects that were fitted alone on top of the base, by gain
+    # label -> the step that it makes in the final model, with the family that it has there
     reviews: Mapping[str, SearchStep] = field(default_factory=dict)
+    # label -> the model of those effects alone that take more than it, and what it does on top of that
     entries: Mapping[str, tuple[FittedModel, TriedEffect]] = field(default_factory=dict)
-    searched: bool = False
-    complete: bool = True
+    searched: bool = False  # whether effects were looked for
+    complete: bool = True  # False when time ran out
+    # labels of effects that were asked for: they stay, whatever they gain
     asked: frozenset[str] = field(default_factory=frozenset)
 
     @property
@@ -88,24 +74,15 @@ class Grade(IntEnum):
 
 @dataclass(frozen=True)
 class RecordEvidence:
-    """What a record says of the final model as a whole.
+    """What a record says of the final model as a whole."""
 
-    Attributes:
-        left: share of the torque that is left, of the body where it is largest.
-        inertia: that the record asks for by itself, in units of the nominal one; 1.0: the model has none.
-        inertia_error: its standard error, in the same unit.
-        inertia_spread: how far the model file lets it be off, as a share.
-        follows: share of the squared error of what is left that the strongest curve of one signal takes.
-        noise: share of what is left that is noise.
-        missed: largest misfit of free runs on test data, over what noise and the values' uncertainty account for.
-    """
-
-    left: float
-    inertia: float
-    inertia_error: float
-    inertia_spread: float
-    follows: float = 0.0
-    noise: float = 0.0
+    left: float  # share of the torque that is left, of the body where it is largest
+    inertia: float  # that the record asks for by itself, in units of the nominal one; 1.0: the model has none
+    inertia_error: float  # its standard error, in the same unit
+    inertia_spread: float  # how far the model file lets it be off, as a share
+    follows: float = 0.0  # share of the squared error of what is left that the strongest curve of one signal takes
+    noise: float = 0.0  # share of what is left that is noise
+    # largest misfit of free runs on test data, over what noise and the values' uncertainty account for
     missed: float = 0.0
 
     @property
@@ -127,36 +104,25 @@ class RecordEvidence:
 
 @dataclass(frozen=True)
 class EffectEvidence:
-    """What speaks for one effect: beside those that take more than it, or beside all others, whichever is more.
-
-    Attributes:
-        t: paired gain over its standard error.
-        gain: share of the squared error that it takes of what is left without it.
-        share: share of the missing torque that it explains: what comes back without it, all of it at most.
-        size_t: its sizes over their errors.
-        family: labels that the record does not tell from it.
-        foreign_family: one of them is of another kind.
-        possible: a machine can have such values.
-        motion_share: share of the misfit of free runs on test data that comes back without it; nan: not run.
-        test_torque: the same of what the torque balance leaves of test data, block by block; None: not worked out.
-        runs_hold: free runs of the final model stay by the test data; else they drift, and the torque decides.
-        asked: it was asked for, and stays in the model whatever its grade.
-        left_where_it_acts: of a limit, what is left there over its own torque (rms), if it is more than elsewhere.
-    """
+    """What speaks for one effect: beside those that take more than it, or beside all others, whichever is more."""
 
     label: str
     kind: str
-    t: float
-    gain: float
-    share: float
-    size_t: float
-    family: tuple[str, ...]
-    foreign_family: bool
-    possible: bool
+    t: float  # paired gain over its standard error
+    gain: float  # share of the squared error that it takes of what is left without it
+    share: float  # share of the missing torque that it explains: what comes back without it, all of it at most
+    size_t: float  # its sizes over their errors
+    family: tuple[str, ...]  # labels that the record does not tell from it
+    foreign_family: bool  # one of them is of another kind
+    possible: bool  # a machine can have such values
+    # share of the misfit of free runs on test data that comes back without it; nan: not run
     motion_share: float = np.nan
+    # the same of what the torque balance leaves of test data, block by block; None: not worked out
     test_torque: ScoreComparison | None = None
+    # free runs of the final model stay by the test data; else they drift, and the torque decides
     runs_hold: bool = True
-    asked: bool = False
+    asked: bool = False  # it was asked for, and stays in the model whatever its grade
+    # of a limit, what is left there over its own torque (rms), if it is more than elsewhere
     left_where_it_acts: float = 0.0
 
 

@@ -35,15 +35,11 @@ class Score:
     No model is known better than to ``least_gain`` of its error: with more rows than say so, each counts for less. The
     parameters have the prior of the fit, an effect has the probability ``effect_probability``, which its starts share,
     since each is a law of its own.
-
-    Attributes:
-        rows: (blocks,) independent rows of each block.
-        tempering: by what they count for less.
     """
 
     problem: FitProblem
-    rows: Array
-    tempering: float
+    rows: Array  # (blocks,) independent rows of each block
+    tempering: float  # by what they count for less
     settings: SelectionSettings
 
     @staticmethod
