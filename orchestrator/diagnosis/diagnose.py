@@ -60,13 +60,9 @@ def diagnose(
 ) -> Diagnosis:
     """Compare records of one machine with a model and name what it lacks.
 
-    Args:
-        records: at least 200 rows each; one encoder or two.
-        effects: labels of exactly those that the fitted model has, and none is looked for; None: they are looked for.
-        time_limit: seconds after which the search ends with what it has; None: none.
-
-    Returns:
-        Graded effects, the corrected model, and what is left.
+    ``records``: at least 200 rows each, of one encoder or two; ``test``: one that is test data as a whole; ``effects``:
+    labels of exactly those that the fitted model has, and none is looked for; ``time_limit``: seconds after which the
+    search ends with what it has.
     """
     given = [records] if isinstance(records, Record) else list(records)
     whole = [part for record in given for part in record.parts_between_holes()]

@@ -52,22 +52,10 @@ def diagnose_fmu(
     time_limit: float | None = None,
     progress: Progress = lambda what: None,
 ) -> FmuDiagnosis:
-    """Compare records of one machine with an FMU, or several, and name what is missing around it.
+    """Compare records of one machine, at one sample time, with an FMU, or several, and name what is missing around it.
 
-    Args:
-        records: at one sample time.
-        test: a record that is test data as a whole; None: the last rows of each record are.
-        search: False: parameters are re-fitted and the model is judged as it stands.
-        effects: labels of exactly those that are fitted around it, and none is looked for; None: they are looked for.
-        time_limit: seconds after which the search ends with what it has; None: the map's budget.
-        progress: called with what was fitted.
-
-    Returns:
-        Graded effects, the corrected model, and what is left; whoever has it ends the FMU's processes by its workings.
-
-    Raises:
-        FmuError: the FMU cannot be used.
-        SlaveError: it fails again and again.
+    Arguments are those of a plant of ours; ``time_limit`` None: the map's budget. Whoever has the result ends the FMU's
+    processes by its workings. Raises FmuError where the FMU cannot be used, SlaveError where it fails again and again.
     """
     until = time.monotonic() + (given.options.budget if time_limit is None else time_limit)
     fitted, test_data = split_records(tuple(records), settings.test_share, test)
@@ -178,10 +166,7 @@ def calibrate_fmu(
 ) -> FmuCalibration:
     """Return the parameters of an FMU, or of several, that explain records of one machine, and how much they explain.
 
-    Raises:
-        ScenarioError: the map makes no parameter uncertain.
-        FmuError: the FMU cannot be used.
-        SlaveError: it does not run over a record.
+    Raises what a diagnosis does, and ScenarioError where the map makes no parameter uncertain.
     """
     if not given.uncertain:
         raise ScenarioError(f"{given.source}: $.parameters must give an uncertainty to at least one, but gives none")

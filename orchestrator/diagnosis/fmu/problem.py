@@ -40,27 +40,16 @@ class FmuModel:
 
 @dataclass
 class FmuProblem:
-    """Simulates models of one record.
-
-    Attributes:
-        m: communication steps in a sample.
-        noise: (outputs,) standard deviations.
-        sign: of each port and cut, the direction in which its effort acts.
-        short: share by which a communication step is cut short, for an FMU that goes by a clock of its own.
-        late: by how much such an FMU takes its inputs late [s]; outputs of ``data`` are as late.
-        n, h: number of samples, and time from one to the next [s].
-        inputs, outputs: names of the variables that the record drives and measures.
-        units: of all variables that have one.
-    """
+    """Simulates models of one record: of ``n`` samples, ``h`` [s] apart."""
 
     data: FmuRecord
     map: Map
     runner: Runner
-    m: int
-    noise: Array
-    sign: dict[str, float] = field(default_factory=dict)
-    short: float = 0.0
-    late: float = 0.0
+    m: int  # communication steps in a sample
+    noise: Array  # (outputs,) standard deviations
+    sign: dict[str, float] = field(default_factory=dict)  # of each port and cut, the direction in which its effort acts
+    short: float = 0.0  # share by which a step is cut short, for an FMU that goes by a clock of its own
+    late: float = 0.0  # by how much such an FMU takes its inputs late [s]; outputs of ``data`` are as late
     _tables: dict[tuple[int, int], Array] = field(init=False, default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

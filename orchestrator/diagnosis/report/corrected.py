@@ -35,27 +35,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """The test part, measured and co-simulated with the nominal and the corrected values.
+    """The test part, measured and co-simulated with the nominal and the corrected values."""
 
-    Attributes:
-        time: (n,) s.
-        u: (n,) N.m.
-        measured, before, after: (n, channels) rad.
-        difference: largest difference between the corrected FMU and the compiled simulation of the same equations.
-        restarts: times at which a free run starts anew [s], the first included.
-        rows: where each run begins.
-        starts: start values of the corrected FMU in each run.
-    """
-
-    time: Array
-    u: Array
-    measured: Array
+    time: Array  # (n,) s
+    u: Array  # (n,) N.m
+    measured: Array  # (n, channels) rad, as both of the next
     before: Array
     after: Array
-    difference: float
-    restarts: tuple[float, ...] = ()
-    rows: tuple[int, ...] = ()
-    starts: tuple[dict[str, float], ...] = ()
+    difference: float  # largest one between the corrected FMU and the compiled simulation of the same equations
+    restarts: tuple[float, ...] = ()  # times at which a free run starts anew [s], the first included
+    rows: tuple[int, ...] = ()  # where each run begins
+    starts: tuple[dict[str, float], ...] = ()  # start values of the corrected FMU in each run
 
 
 def fmu_name(plant: str, source: str) -> str:

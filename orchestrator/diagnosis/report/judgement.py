@@ -22,10 +22,8 @@ def form_verdict(
 ) -> str:  # fmt: skip
     """Return the verdict. ``test``: misfits on test data, with how far the values' uncertainty lets free runs drift.
 
-    Returns:
-        "effects": one at least is likely; "unknown": something is missing and nothing is likely; "none" or
-        "parameters": the model explains the record as given, or re-fitted. A possible effect is a hint, as a curve is:
-        either tells that something is missing by what it surely takes of what is left.
+    A possible effect is a hint, as a curve is: either tells that something is missing by what it surely takes of
+    what is left.
     """
     if any(effect.grade >= Grade.LIKELY for effect in effects):
         return "effects"

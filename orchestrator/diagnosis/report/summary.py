@@ -16,14 +16,13 @@ SIGNALS = {"theta_m": "the motor", "theta_l": "the load"}
 ENCODERS = {"motor": "theta_m", "load": "theta_l"}
 # Experiments that tell effects apart, by their kind.
 EXPERIMENTS = {
-    "friction": "constant speeds in both directions, from a crawl to the highest",
-    "speed": "constant speeds in both directions, from a crawl to the highest",
-    "position": "slow turns at constant speed, there and back, over the whole travel",
-    "constant": "slow turns at constant speed, there and back, over the whole travel",
-    "wave": "slow turns at constant speed, there and back, over the whole travel",
+    **dict.fromkeys(("friction", "speed"), "constant speeds in both directions, from a crawl to the highest"),
+    **dict.fromkeys(
+        ("position", "constant", "wave"), "slow turns at constant speed, there and back, over all the travel"
+    ),
+    "encoder": "turns at two constant speeds, one of them several times the other",
     "gap": "torque reversals with the load held, slowly and then fast",
-    "timing": "torque steps of several sizes in both directions",
-    "limit": "torque steps of several sizes in both directions",
+    **dict.fromkeys(("timing", "limit"), "torque steps of several sizes in both directions"),
     "resonance": "a torque that sweeps slowly through all frequencies",
 }
 SLIGHT = 0.02  # share of the misfit on test data, a hundredth in rms, that is not worth a number
