@@ -1,11 +1,16 @@
 """What is left and the signals that it follows."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from orchestrator.diagnosis.diagnose import balance_of, diagnose
 from orchestrator.diagnosis.inference.problem import fit_problem
+from orchestrator.diagnosis.model.interface import ModelPoint, NoiseSources
 from orchestrator.diagnosis.model.law_arguments import law_arguments
+from orchestrator.diagnosis.selection.evidence import noise_share
 from orchestrator.diagnosis.selection.remaining import find_dependences, formula_of, hats, knots_of
 from orchestrator.diagnosis.selection.search import search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings, SelectionSettings
@@ -49,3 +54,25 @@ def test_a_complete_model_leaves_nothing_that_follows():
     found = diagnose(record_from_columns(columns, "record"), MODEL)
     assert all(one.comparison.gain < SETTINGS.grades.likely_gain for one in found.remaining)
     assert found.law is None
+
+
+def test_noise_that_is_left_is_told_from_a_law() -> None:
+    """White noise of a current is noise; dry friction of a motion of a hertz, in a band of twenty, is none."""
+    time = 0.01 * np.arange(6000)
+    noise = np.random.default_rng(5).standard_normal(time.size)
+    friction = np.sign(np.sin(2.0 * np.pi * 1.03 * time))
+
+    def share(left: np.ndarray) -> float:
+        def sources(frequencies: np.ndarray) -> NoiseSources:
+            none = np.zeros((frequencies.size, 1, 1), dtype=complex)
+            return NoiseSources(none, np.zeros(1), none, np.zeros(1))
+
+        model = SimpleNamespace(
+            residuals=lambda points: [left[None]], step=0.01, size=time.size, cutoffs=(20.0,), noise_sources=sources
+        )
+        problem: Any = SimpleNamespace(models=(model,), record_points=lambda point: [point])
+        return noise_share(problem, ModelPoint(()))
+
+    assert share(noise) > 0.85
+    assert share(friction) < 0.1
+    assert 0.2 < share(friction + noise) < 0.5  # of a white spectrum up to 50 Hz the band holds two fifths

@@ -23,7 +23,7 @@ from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParamete
 from orchestrator.diagnosis.report.estimates import add_test_evidence, parameter_estimates, report_effects
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.result import TestMisfit
-from orchestrator.diagnosis.selection.evidence import leave_out_refuted, record_evidence, torque_shares
+from orchestrator.diagnosis.selection.evidence import leave_out_refuted, noise_share, record_evidence, torque_shares
 from orchestrator.diagnosis.selection.outcome import EffectEvidence, SearchResult
 from orchestrator.diagnosis.selection.remaining import find_dependences
 from orchestrator.diagnosis.selection.search import fit_effects, search_effects
@@ -128,7 +128,8 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, arguments, settings.selection)
     left = torque_shares(found.problem, found.final.point)
-    record = replace(record, left=float(left.max()))  # that of the model as it is reported
+    noise = noise_share(found.problem, found.final.point)
+    record = replace(record, left=float(left.max()), noise=noise)  # those of the model as it is reported
     # How far values' uncertainty lets an FMU drift is not worked out: a miss alone is no evidence.
     verdict = form_verdict(found, graded, remaining, record, (), settings)
     trust = judge_trust(verdict, graded, searched.searched, record, test, parameters, problem.map.uncertain, settings)

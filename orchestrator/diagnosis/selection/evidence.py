@@ -151,7 +151,7 @@ def noise_share(problem: FitProblem, point: ModelPoint) -> float:
         for one, encoders, cutoff in zip(power, own, model.cutoffs, strict=True):
             band, top = frequencies < cutoff, (frequencies < cutoff) & (frequencies > 0.5 * cutoff)
             floor = max(float(np.median(one[top] - encoders[top])), 0.0) if top.any() else 0.0
-            shares.append(float(np.sum(np.minimum(encoders + floor, one)[band]) / (np.sum(one[band]) + 1e-300)))
+            shares.append(min(float(np.sum(encoders[band] + floor) / (np.sum(one[band]) + 1e-300)), 1.0))
     return min(shares)
 
 
