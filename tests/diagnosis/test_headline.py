@@ -99,7 +99,9 @@ def test_a_value_far_below_what_is_stated_is_outside_as_one_above_is() -> None:
         (Column(), "mm", ("N", "kg", "N.s/m")),
     ],
 )
-def test_sizes_are_in_the_unit_of_a_log_that_nothing_converts(torque: Column, angle: str, units: tuple[str]) -> None:
+def test_sizes_are_in_the_unit_of_a_log_that_nothing_converts(
+    torque: Column, angle: str, units: tuple[str, ...]
+) -> None:
     model = replace(default_model(), columns={"u": torque, "theta_m": Column(unit=angle)})
     assert tuple(unit_in(unit, model) for unit in ("N.m", "kg.m2", "N.m.s/rad")) == units
     assert unit_in("rad", model, "phase") == "rad"
