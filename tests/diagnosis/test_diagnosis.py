@@ -109,13 +109,14 @@ def test_a_late_load_encoder_is_of_the_log() -> None:
 
 @pytest.mark.parametrize("body", ["motor", "load"])
 def test_an_encoder_off_its_centre_is_of_the_log(body: str) -> None:
-    found = diagnose(record_of({f"enc_{body[0]}": 0.02, f"enc_{body[0]}_ph": 0.9}, 48, 20.0), MODEL)
+    found = diagnose(record_of({f"enc_{body[0]}": 0.02, f"enc_{body[0]}_ph": 0.9}, 48), MODEL)
     assert likely(found) == []
     (nuisance,) = found.nuisances
-    assert (nuisance.name, nuisance.grade) == (f"{body}_encoder_eccentricity", Grade.CERTAIN)
+    assert nuisance.name == f"{body}_encoder_eccentricity"
+    assert nuisance.grade >= Grade.LIKELY
     low, high = nuisance.parameters["amplitude"].interval
-    assert low < 0.02 < high < 1.05 * low
-    assert nuisance.parameters["phase"].value == pytest.approx(0.9, abs=0.02)
+    assert low < 0.02 < high < 1.1 * low
+    assert nuisance.parameters["phase"].value == pytest.approx(0.9, abs=0.05)
     assert f"`theta_{body[0]}` is off by up to 0.0" in "".join(summarise(found))
 
 

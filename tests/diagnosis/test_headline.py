@@ -127,7 +127,7 @@ def test_what_test_data_say_of_a_torque_is_said_with_its_uncertainty() -> None:
     torque = SimpleNamespace(gain=0.24, t=1.4)
     effect: Any = SimpleNamespace(evidence=SimpleNamespace(motion_share=-0.03, test_torque=torque))
     said = words_on_test_data(effect)
-    assert said.endswith("takes 24 % of the torque that is left without it, 1.4 times its uncertainty")
+    assert said.endswith("removes 24 % of the torque that remains without it, 1.4 times its uncertainty")
 
 
 def test_every_next_step_is_on_the_page_at_once() -> None:

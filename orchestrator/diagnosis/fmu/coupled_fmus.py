@@ -126,10 +126,7 @@ def _is_plain(transfers: Sequence[NativeTransfer]) -> bool:
 class MemberFmu:
     """An instance of one FMU that is reset, or made anew, before every run.
 
-    Args:
-        inputs, tunables: variables that are set at every step, the latter only where a run asks for it.
-        reads: variables that are read after every step.
-        tolerance: of the FMU's own solver; None: its own.
+    ``inputs`` and, where a run asks for it, ``tunables`` are set at every step; ``reads`` are read after it.
     """
 
     def __init__(

@@ -49,8 +49,7 @@ def quantise(fine: Array, quantum: float) -> Array:
 def delay_output(rows: Array, step: float, delay: float, m: int = 1) -> Array:
     """Return samples of an output that is read ``delay`` [s] late, by cubics through four of its samples.
 
-    Args:
-        m: parts of a sample of the inputs: where it is 3 or more, no cubic reaches beyond a jump of these.
+    Where inputs have ``m`` parts of a sample, 3 or more, no cubic reaches beyond a jump of these.
     """
     n = len(rows)
     place = np.clip(np.arange(n) - delay / step, 0.0, n - 1.0)

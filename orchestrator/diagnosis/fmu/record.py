@@ -169,11 +169,7 @@ def _convert(
 
 
 def _even(time: Array, motion: Array, path: Path, uneven: float) -> tuple[Array, NDArray[np.int64], list[str]]:
-    """Return uniform times [s], the row of each row of the file on them, and a note where the stamps jitter.
-
-    Args:
-        motion: (n,) an output.
-    """
+    """Return uniform times [s], the row of each row of the file on them, and a note where the stamps jitter."""
     if len(time) < LEAST_ROWS:
         raise RecordError(f"{path}: must have at least {LEAST_ROWS} rows, but has {len(time)}")
     if not np.all(np.diff(time) > 0.0):

@@ -38,11 +38,7 @@ SMALL = 0.01  # seconds of work below which a second process is not asked
 class Runner:
     """An FMU, or several, in child processes behind walls.
 
-    Args:
-        inputs, reads: what is set before and read after every step.
-        tunables: parameters that are set at every step in runs that ask for it.
-        tolerance: of the FMU's own solver; None: its own.
-        workers: children (default: one a core, two at most).
+    ``inputs`` are set before and ``reads`` read after every step, ``tunables`` set at every step where runs ask.
 
     Attributes:
         fresh: make a new instance for every run instead of a reset; may be changed between batches.

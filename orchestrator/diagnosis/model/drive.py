@@ -20,8 +20,7 @@ SHORT_LAG = 0.3  # of a sample: a lag below it is a delay as long, which no tria
 def logged_torque(plant: Plant, p: Array, held: Array, smoothing: Array) -> Array:
     """Return the requests (n,) [N.m]: as they are ``held``, or on the way to a smooth signal.
 
-    Args:
-        smoothing: (n,) what a smooth signal differs by [N.m]; empty: the torque's rows are not rarer than the angles'.
+    ``smoothing``: (n,) what a smooth signal differs by [N.m]; empty: the torque's rows are not rarer than the angles'.
     """
     share = plant.value(p, SAMPLED.name) if SAMPLED.name in plant.names else 0.0
     return held + share * smoothing if smoothing.size and share else held

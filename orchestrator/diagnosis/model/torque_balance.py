@@ -60,9 +60,7 @@ _POOL = ThreadPoolExecutor(2)
 class TorqueBalance(ResidualModel):
     """A plant of ours beside one record: a :class:`ResidualModel`.
 
-    Args:
-        model: nominal values and how far each may be off.
-        signals: of the record; with as many angles as the plant has bodies.
+    ``signals`` have as many angles as the plant has bodies with an encoder.
     """
 
     def __init__(self, model: Model, signals: Signals, settings: BalanceSettings, angular: bool = True) -> None:
@@ -197,8 +195,7 @@ class TorqueBalance(ResidualModel):
     def balance(self, p: Array, initial: float = 0.0) -> Array:
         """Return the torques (channels, n) [N.m] that are missing at each body.
 
-        Args:
-            initial: torque of the drive at the first row [N.m].
+        ``initial``: torque of the drive at the first row [N.m].
         """
         plant, step = self.plant, self.step
         angles, speeds, accelerations = self._motion(p)

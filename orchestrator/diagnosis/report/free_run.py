@@ -188,9 +188,7 @@ def drift_variance(
 ) -> Array:
     """Return the variance (channels,) [rad^2] that uncertain values give to free runs whose start is chosen anew.
 
-    Args:
-        p: values of the plant.
-        moved: the same, each moved along one axis of the values' uncertainty by one standard deviation.
+    ``moved``: values ``p``, each time moved along one axis of their uncertainty by one standard deviation.
     """
     model, places = Simulation(plant, p, signals), state_places(plant, p)
     total = np.zeros(signals.channels)
