@@ -1,5 +1,6 @@
 """The check of one FMU: static first, then dynamic, unless the FMU cannot be read or has nothing that runs here."""
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -66,7 +67,7 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     finally:
         if result.files is not None:
             result.files.close()
-    facts = result.facts | ({"walls": _walls(options.trust)} if executions else {})
+    facts = result.facts | _digest(path) | ({"walls": _walls(options.trust)} if executions else {})
     version = "" if result.description is None else result.description.dialect.version
     return FmuFindings(str(path), shown, version, result.stages, executions, reason, facts)
 
@@ -78,6 +79,14 @@ def _obstacle(result: StaticResult) -> str:
     if result.description is None:
         return "its modelDescription.xml cannot be read, or is of a version that is not covered"
     return obstacle(result.description, result.files)
+
+
+def _digest(path: Path) -> dict[str, str]:
+    """Return the hash of an FMU's file, for the reader to know which one was checked; none of an unpacked one."""
+    if not path.is_file():
+        return {}
+    with path.open("rb") as stream:
+        return {"sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
 
 
 def _walls(trust: bool) -> str:

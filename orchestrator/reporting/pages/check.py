@@ -1,9 +1,11 @@
 """The page of ``check``: each FMU, and what was found in it."""
 
-from orchestrator.reporting.model import Findings, Remark, Report, Section, Severity
+from orchestrator.reporting.model import Facts, Findings, Fold, Remark, Report, Section, Severity
 from orchestrator.reporting.source import ResultDocument, plain, words
 from orchestrator.shared.results import CheckedFmu, CheckFound, FindingFound, read
 from orchestrator.shared.results.fields import ReportTable, TableColumn
+
+HASH = "sha256"
 
 
 def build(source: ResultDocument) -> Report:
@@ -11,7 +13,8 @@ def build(source: ResultDocument) -> Report:
     results = read(source.results, CheckFound)
     fmus, counts = results.fmus, results.counts
     good = sum(fmu.ok for fmu in fmus)
-    sections: list[Section] = [_overview(fmus), *(_findings(fmu) for fmu in fmus if _new(fmu)), *_facts(fmus)]
+    findings = (_findings(fmu) for fmu in fmus if _new(fmu))
+    sections: list[Section] = [_overview(fmus), *findings, *_facts(fmus), *_unrun(fmus)]
     return Report(
         title="FMI compliance check",
         summary=(
@@ -45,10 +48,28 @@ def _overview(fmus: list[CheckedFmu]) -> ReportTable:
 
 def _facts(fmus: list[CheckedFmu]) -> list[Section]:
     """Return what the FMUs say of themselves, and the walls that they ran behind."""
-    facts = list(dict.fromkeys(name for fmu in fmus for name in fmu.facts))
+    facts = list(dict.fromkeys(name for fmu in fmus for name in fmu.facts if name != HASH))
     rows = tuple((_name(fmu), *(plain(fmu.facts.get(name)) for name in facts)) for fmu in fmus)
     columns = (TableColumn("FMU"), *(TableColumn(words(name)) for name in facts))
-    return [ReportTable("What they are", columns, rows)] if facts else []
+    hashes = tuple((_name(fmu), plain(fmu.facts[HASH])) for fmu in fmus if HASH in fmu.facts)
+    return [
+        *([ReportTable("What they are", columns, rows)] if facts else []),
+        *([Facts("SHA-256 of the files", hashes)] if hashes else []),
+    ]
+
+
+def _unrun(fmus: list[CheckedFmu]) -> list[Section]:
+    """Return the rules that were not run, with the reason and the FMUs."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for fmu in fmus:
+        for rule in fmu.rules:
+            if rule.outcome == "not run":
+                found.setdefault((rule.rule, rule.reason), []).append(_name(fmu))
+    if not found:
+        return []
+    rows = tuple((*why, "all" if len(names) == len(fmus) else ", ".join(names)) for why, names in sorted(found.items()))
+    columns = (TableColumn("rule"), TableColumn("why"), TableColumn("FMUs"))
+    return [Fold("Rules that were not run", (ReportTable("Rules and reasons", columns, rows),))]
 
 
 def _findings(fmu: CheckedFmu) -> Findings:
