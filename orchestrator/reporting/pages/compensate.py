@@ -1,12 +1,14 @@
-"""The page of ``compensate``: time against impact of every traversal, and one of each law beside the bound."""
+"""The page of ``compensate``: the law to take, time against impact of every traversal, and one of each law."""
 
-from statistics import median
+from collections.abc import Sequence
 
-from orchestrator.reporting.model import Facts, Plot, Report, Series
+from orchestrator.reporting.model import Badge, Plot, Report, Series, Text
 from orchestrator.reporting.pages.regulator import rest_facts
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
-from orchestrator.shared.results.compensate import CompensateFound, laws_tables
+from orchestrator.shared.results.compensate import CompensateFound, LawFound, laws_tables
+
+SOFT = 1.5  # of the impact speed that was asked for: what still counts as soft, as in the command's own doubts
 
 
 def build(source: ResultDocument) -> Report:
@@ -16,22 +18,17 @@ def build(source: ResultDocument) -> Report:
     clouds = tuple(Series(law.law, law.times, law.impacts, "points") for law in results.laws if law.times)
     paths = tuple(Series(law.law, law.path_times, law.path) for law in results.laws if law.path)
     quickest = Series("bound from rest", results.path_times, results.path)
-    last = results.laws[-1]
-    time = f"takes {median(last.times):.3f} s (median)" if last.times else "does not occur"
-    impact, plain = (
-        "not known" if law.impact is None else f"{law.impact:.3g} rad/s" for law in (last, results.laws[0])
-    )
+    badge, summary = _recommend(results.laws, results.impact_speed)
+    least = f"The shortest from rest with an impact of {results.impact_speed:g} rad/s takes {results.bound:.3g} s."
+    more = "Traversals that start in motion or from a twisted shaft may be faster."
+    label = "twist, from the flank at the start [rad]"
     return Report(
         title="Control laws across the gap",
-        summary=(
-            f"With the {last.law}, a traversal {time}. The shortest possible traversal from rest with an impact speed "
-            f"of {results.impact_speed:g} rad/s takes {results.bound:.4f} s. The largest impact is {impact} with the "
-            f"{last.law} and {plain} with the {results.laws[0].law}."
-        ),
+        summary=summary,
+        badge=("warn", badge[1]) if results.doubts and badge[0] == "good" else badge,
         sections=(
+            *([Text("Doubts", results.doubts)] if results.doubts else []),
             *laws_tables("Medians over plants", results.laws),
-            *([Facts("Doubts", tuple(("", doubt) for doubt in results.doubts))] if results.doubts else []),
-            *rest_facts(results.forecast, "The plain LQR"),
             Plot(
                 "Traversals",
                 "time [s]",
@@ -39,15 +36,28 @@ def build(source: ResultDocument) -> Report:
                 (bound, *clouds),
                 log_x=True,
                 log_y=True,
-                note="Traversals that start in motion or from a twisted shaft may be faster than the bound from rest.",
+                note=f"{least} {more}",
             ),
-            Plot(
-                "The first traversal of each law",
-                "time [s]",
-                "twist, from the flank at the start [rad]",
-                (quickest, *paths),
-            ),
+            Plot("The first traversal of each law", "time [s]", label, (quickest, *paths)),
+            *rest_facts(results.forecast, "The plain LQR"),
         ),
         origin=source.origin(),
         downloads=source.downloads(),
     )
+
+
+def _recommend(laws: Sequence[LawFound], speed: float) -> tuple[tuple[Badge, str], str]:
+    """Return the law to take: of those that are stable and land softly the most accurate, else the softest."""
+    stable = [
+        (law.impact, law.error, law.law)
+        for law in laws
+        if not law.unstable and law.impact is not None and law.error is not None
+    ]
+    if not stable:
+        return ("bad", "none is stable"), "No law is stable on every plant, so none is recommended."
+    soft = [(impact, error, name) for impact, error, name in stable if impact <= SOFT * speed]
+    impact, error, best = min(soft, key=lambda law: law[1]) if soft else min(stable)
+    why = f"it follows best of those that land with at most {SOFT:g} times the {speed:g} rad/s asked for"
+    why = why if soft else f"it lands most softly, but harder than the {speed:g} rad/s asked for"
+    numbers = f"In the median over plants its largest impact is {impact:.3g} rad/s and its error {error:.3g} rad rms."
+    return ("good" if soft else "warn", f"take the {best}"), f"Take the {best}: {why}. {numbers}"
