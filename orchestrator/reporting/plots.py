@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from orchestrator.reporting.model import POINT_LIMIT, Numbers, Plot, Series
 
-SCRIPTS = ("scale.js", "units.js", "svg.js", "columns.js", "marks.js", "figure.js", "plot.js")
+SCRIPTS = ("scale.js", "units.js", "svg.js", "columns.js", "marks.js", "export.js", "figure.js", "plot.js")
 TIME = "time [s]"
 CURVE_LIMIT = 500_000
 """Rows of all curves of a page together that it holds as they are: 2.7 MB."""

@@ -2,6 +2,7 @@
 
 import base64
 import json
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -139,6 +140,68 @@ def test_the_mouse_reads_values_zooms_and_resets(opened):
     assert ticks(opened, "#section-3") != before
     chain.double_click(svg).perform()
     assert ticks(opened, "#section-3") == before
+
+
+def touch(driver, kind, *places):
+    points = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(places)]
+    driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
+def test_one_finger_moves_a_plot_and_two_stretch_it(opened):
+    browsers.set_screen(opened, 390, 800, "light")
+    opened.execute_script("Plot.all[1].svg.scrollIntoView({ block: 'center', behavior: 'instant' })")
+    found = "const plot = Plot.all[1], box = plot.svg.getBoundingClientRect(); "
+    left, top, width = opened.execute_script(
+        f"{found} return [box.left + plot.x.from, box.top + 60, plot.x.to - plot.x.from]"
+    )
+    shown = f"{found} return [...plot.range.x, ...plot.range.y]"
+    low, high, bottom, most = opened.execute_script(shown)
+    opened.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
+    try:
+        touch(opened, "touchStart", (left + 0.75 * width, top))
+        for share in (0.7, 0.6, 0.5):
+            touch(opened, "touchMove", (left + share * width, top))
+        touch(opened, "touchEnd")
+        moved = opened.execute_script(shown)
+        touch(opened, "touchStart", (left + 0.4 * width, top), (left + 0.6 * width, top))
+        for share in (0.35, 0.3):
+            touch(opened, "touchMove", (left + share * width, top), (left + (1 - share) * width, top))
+        touch(opened, "touchEnd")
+        stretched = opened.execute_script(shown)
+    finally:
+        opened.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+    span = high - low
+    assert moved == pytest.approx([low + 0.25 * span, high + 0.25 * span, bottom, most], abs=0.02 * span)
+    assert stretched[1] - stretched[0] == pytest.approx(0.5 * span, rel=0.05)
+    assert sum(stretched[:2]) == pytest.approx(sum(moved[:2]), abs=0.05 * span)
+
+
+def saved(driver, number, name):
+    """What a plot's button saves."""
+    driver.execute_script(
+        "URL.createObjectURL = (blob) => { window.saved = blob; return '#'; };"
+        "HTMLAnchorElement.prototype.click = () => {};"
+        "const all = document.querySelectorAll('figure.plot')[arguments[0]].querySelectorAll('.buttons button');"
+        "[...all].find((one) => one.textContent === arguments[1]).click()", number, name)  # fmt: skip
+    return driver.execute_async_script("window.saved.text().then(arguments[0])")
+
+
+def test_a_plot_saves_its_picture_and_the_numbers_in_view(opened):
+    opened.execute_script(
+        "const p = Plot.all[1]; p.legend.querySelectorAll('button')[2].click(); p.go([1.0, 1.05], p.range.y)"
+    )
+    lines = saved(opened, 1, "CSV").splitlines()
+    assert lines[0] == '"curve","time [s]","position [rad]","low","high"'
+    assert [line.split(",")[:2] for line in lines[1:]] == [
+        [f'"{name}"', f"{1 + n / 100:.12g}"] for name in ("with backlash", "without") for n in range(6)
+    ]
+    picture = ElementTree.fromstring(saved(opened, 1, "SVG"))
+    texts = ["".join(one.itertext()) for one in picture.iter("{http://www.w3.org/2000/svg}text")]
+    assert texts[:3] == ["Load position", "with backlash", "without"]
+    assert "var(" not in ElementTree.tostring(picture, encoding="unicode").replace("clip-path", "")
+    curves = [one for one in picture.iter("{http://www.w3.org/2000/svg}path") if one.get("class") == "curve"]
+    assert len(curves) == 2
+    assert all("stroke: rgb(" in one.get("style") for one in curves)
 
 
 def test_the_legend_hides_a_curve(opened):

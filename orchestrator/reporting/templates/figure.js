@@ -51,7 +51,9 @@ class PlotFigure {
       this.button("−", "Zoom out", () => this.zoom(2)),
       this.button("◀", "Move left", () => this.move(-0.25)),
       this.button("▶", "Move right", () => this.move(0.25)),
-      this.button("Reset", "Reset", () => this.reset()));
+      this.button("Reset", "Reset", () => this.reset()),
+      this.button("SVG", "Save the picture as SVG", () => savePicture(this)),
+      this.button("CSV", "Save the numbers in view as CSV", () => saveNumbers(this)));
     this.svg = shape("svg", { tabindex: 0, role: "img", "aria-label": this.description() });
     this.tip = element("div", { class: "tip", hidden: "" });
     this.spoken = element("div", { class: "quiet", "aria-live": "polite" });

@@ -5,6 +5,7 @@ class Marks {
   constructor(plot) {
     this.x = plot.x;
     this.y = plot.y;
+    this.several = plot.data.series.length > 1;
   }
 
   // Elements of a series.
@@ -13,7 +14,7 @@ class Marks {
     if (series.low) made.push(shape("path", { d: this.whiskers(series), stroke, "stroke-width": 1, fill: "none" }));
     if (series.kind === "points") made.push(shape("path", { d: this.dots(series), fill: stroke }));
     else if (series.kind === "bars") made.push(shape("path", { d: this.bars(series), fill: stroke, "fill-opacity": 0.75 }));
-    else made.push(shape("path", { d: this.curve(series), stroke, class: "curve" }));
+    else made.push(shape("path", { d: this.curve(series), stroke, class: series.name === "measured" && this.several ? "curve broad" : "curve" }));
     return made;
   }
 
@@ -53,7 +54,7 @@ class Marks {
 
   blocks(series, { size, low, high }, first, end) {
     const parts = [];
-    let pen = false;
+    let [pen, last] = [false, 0];
     for (let block = Math.floor(first / size); block * size < end; block++) {
       const [least, most] = [low[block], high[block]];
       if (Number.isNaN(most) || (this.y.logarithmic && most <= 0)) {
@@ -61,11 +62,11 @@ class Marks {
         continue;
       }
       const bottom = this.y.logarithmic && least <= 0 ? this.y.low : least;
-      const from = round(this.y.pixel(block & 1 ? most : bottom));
-      const to = round(this.y.pixel(block & 1 ? bottom : most));
+      const ends = [bottom, most].map((value) => round(this.y.pixel(value)));
+      const [from, to] = Math.abs(ends[0] - last) <= Math.abs(ends[1] - last) ? ends : ends.reverse(); // a slope has no teeth
       parts.push(pen ? "L" : "M", round(this.x.pixel(series.x[block * size])), " ", from);
       if (to !== from || !pen) parts.push("V", to);
-      pen = true;
+      [pen, last] = [true, to];
     }
     return parts.join("");
   }

@@ -1,13 +1,15 @@
-// A plot with a cursor that reads values, and moved by mouse, buttons and keys.
+// A plot with a cursor that reads values, and moved by fingers, mouse, buttons and keys.
 class Plot extends PlotFigure {
   static all = [];
   static count = 0;
+
+  pointers = new Map();  // that hold the plot, by number: where they are along x
 
   listen() {
     this.svg.addEventListener("pointermove", (event) => this.moved(event));
     this.svg.addEventListener("pointerdown", (event) => this.pressed(event));
     this.svg.addEventListener("pointerup", (event) => this.released(event));
-    this.svg.addEventListener("pointercancel", () => this.drop());
+    this.svg.addEventListener("pointercancel", (event) => this.drop(event));
     this.svg.addEventListener("pointerleave", () => this.leave());
     this.svg.addEventListener("blur", () => this.leave());
     this.svg.addEventListener("dblclick", () => this.reset());
@@ -23,32 +25,49 @@ class Plot extends PlotFigure {
 
   moved(event) {
     const [px, py] = this.place(event);
-    if (this.held) this.go(this.held.moved((this.heldAt - px) / (this.x.to - this.x.from)), this.range.y, false);
+    if (this.pointers.has(event.pointerId)) this.pull(event.pointerId, px);
     else if (this.start) this.stretch(px, py);
     else this.seek(px, py);
   }
 
   pressed(event) {
     this.seek(...this.place(event));
-    if (event.pointerType === "touch" || event.button !== 0) return;
-    if (event.shiftKey) [this.held, [this.heldAt]] = [this.x, this.place(event)];
+    if (event.button !== 0) return;
+    if (event.shiftKey || event.pointerType === "touch") this.grip(this.pointers.set(event.pointerId, this.place(event)[0]));
     else this.start = this.place(event);
     this.svg.setPointerCapture(event.pointerId);
   }
 
+  // Note where the plot is held: one pointer moves it, two fingers stretch it, too.
+  grip(pointers) {
+    this.held = { x: this.x, ...Plot.reach(pointers) };
+  }
+
+  static reach(pointers) {
+    const at = [...pointers.values()], [first, last] = [at[0], at.at(-1)];
+    return { middle: (first + last) / 2, wide: Math.max(20, Math.abs(last - first)) };
+  }
+
+  pull(pointer, px) {
+    const { x, middle, wide } = this.held, now = Plot.reach(this.pointers.set(pointer, px));
+    const stretched = new Scale(...x.zoomed(wide / now.wide, x.value(middle)), x.from, x.to, x.logarithmic);
+    this.go(stretched.moved((middle - now.middle) / (x.to - x.from)), this.range.y, false);
+  }
+
   released(event) {
-    if (!this.start) return this.drop();
+    if (!this.start) return this.drop(event);
     const [[ax, ay], [bx, by]] = [this.start, this.place(event)];
-    this.drop();
+    this.drop(event);
     const between = (scale, a, b) => [scale.value(a), scale.value(b)].sort((m, n) => m - n);
     if (Math.abs(bx - ax) < 8) return;
     const tall = Math.abs(by - ay) > 24;
     this.go(between(this.x, ax, bx), tall ? between(this.y, ay, by) : this.range.y);
   }
 
-  drop() {
+  drop({ pointerId }) {
     this.start = null;
-    this.held = null;
+    this.pointers.delete(pointerId);
+    this.grip(this.pointers);
     this.selection?.remove();
   }
 
