@@ -66,18 +66,8 @@ def _show_scenario(driver: Any, served: Served) -> None:
         time.sleep(1.0)  # the variables of this one
         _press(driver, "Add it to the scenario")
         _wait(driver, f"[data-port^='{name.lower()}.']")
-    for ends in (("drivetrain.theta_m", "kalmanestimator.theta_m"), ("drivetrain.theta_l", "kalmanestimator.theta_l")):
-        _drag(driver, *ends)
+    _press(driver, "Connect what has the same name")
     _save(driver, "fmus", 1180)
-
-
-def _drag(driver: Any, first: str, second: str) -> None:
-    """Drag an output to an input."""
-    from selenium.webdriver.common.action_chains import ActionChains
-
-    set_screen(driver, WIDTH, 3000, "light")
-    ends = [driver.find_element("css selector", f"[data-port='{name}'] circle") for name in (first, second)]
-    ActionChains(driver).click_and_hold(ends[0]).move_to_element(ends[1]).release().perform()
 
 
 def _wait(driver: Any, css: str) -> Any:

@@ -1,7 +1,7 @@
 import { fileAddress, post } from "./api.js";
 import { check, choice, field, fill, make, numberInput } from "./dom.js";
 import { interfaceOf } from "./fmus.js";
-import { Graph, fits, inputsOf, outputsOf, place } from "./graph.js";
+import { Graph, fits, inputsOf, outputsOf } from "./graph.js";
 import { action, fileChoice, message } from "./parts.js";
 import { choices, choose, refresh, start, watch } from "./state.js";
 
@@ -20,12 +20,12 @@ const EMPTY = { nodes: {}, connections: [], sources: [], unwanted: [], run: { st
 export class Scenario {
   constructor(panel, options, show) {
     Object.assign(this, structuredClone(EMPTY), { options, show, last: "", restoring: false });
-    [this.said, this.graphSaid] = [message(), message()];
+    this.said = message();
     this.editor = make("div", {});
     this.written = make("p", { class: "note", role: "status" });
-    this.graph = new Graph((from, to) => this.connect(from, to), () => this.keep());
+    this.graph = new Graph();
     this.element = make("div", {},
-      make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Graph of the scenario" }, this.graph.svg), this.graphSaid.element, this.editor, this.said.element,
+      make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Graph of the scenario" }, this.graph.svg), this.editor, this.said.element,
       make("div", { class: "row" }, action("Write it as TOML", this.said, () => this.write()), action("Run the scenario", this.said, () => this.simulate(), "main")), this.written);
     panel.addEventListener("change", () => this.keep());
     watch(() => this.follow());
@@ -70,7 +70,7 @@ export class Scenario {
     const stem = fmu.split("/").at(-1).replace(/\.fmu$/i, "").replace(/[^A-Za-z0-9_]+/g, "_").toLowerCase();
     let name = stem;
     for (let n = 2; this.nodes[name]; n++) name = `${stem}${n}`;
-    this.nodes[name] = { fmu, parameters: {}, ...place(Object.keys(this.nodes).length), variables };
+    this.nodes[name] = { fmu, parameters: {}, variables };
     this.draw();
   }
 
@@ -84,9 +84,6 @@ export class Scenario {
   }
 
   connect(from, to) {
-    this.graphSaid.say("");
-    const [out, into] = [this.variable(from), this.variable(to)];
-    if (!fits(out, into)) { this.graphSaid.say(`${from} [${out.unit || out.type}] and ${to} [${into.unit || into.type}] do not measure the same`); return; }
     this.connections = this.connections.filter((one) => one.to !== to).concat({ from, to });
     this.draw();
   }
@@ -103,7 +100,6 @@ export class Scenario {
 
   draw() {
     this.keep();
-    this.graphSaid.say("");
     this.graph.draw(this.nodes, this.connections);
     const [outs, ins] = [this.keys(outputsOf), this.keys(inputsOf)], names = Object.keys(this.nodes);
     const feed = () => { this.sources.push({ to: ins.find((key) => !this.sources.some((one) => one.to === key)) ?? ins[0], kind: "constant", value: 0 }); this.draw(); };
