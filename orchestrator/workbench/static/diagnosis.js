@@ -1,15 +1,10 @@
 /* global Units */
-import { plain } from "./advice.js";
-import { check, digits, fill, make, table, withInterval } from "./dom.js";
-import { inputs, needLog, reading, trustTag } from "./gap.js";
+import { check, digits, fill, make } from "./dom.js";
+import { inputs, needLog, reading } from "./gap.js";
 import { action, fileChoice, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, jobOf, modelOfLog, start } from "./state.js";
 
-const SIZES = { alpha: "half-gap" }, SIGNALS = { theta_m: "motor angle", theta_l: "load angle" };
-const GRADES = { certain: "good", likely: "good", possible: "warn" };
-
-// The verdict in a sentence: the summary's first line without the verdict's word.
-const headline = (found) => plain(found.summary?.[0]?.split(". ").slice(1).join(". ") || `Verdict: ${found.verdict}`);
+const SIGNALS = { theta_m: "motor angle", theta_l: "load angle" };
 
 export function build(panel, go) {
   const said = message(), read = reading("diagnosis");
@@ -26,13 +21,7 @@ export function build(panel, go) {
     const from = jobOf(choices.before[job.name]), earlier = from ? await resultOf(from) : null;
     const back = earlier ? action(`Back to ${from.name}`, said, () => view.show(from.name)) : null;
     if (!found) { fill(place, earlier ? refit(from, earlier) : null, back); return; }
-    fill(place,
-      make("p", { class: "answer" }, `${headline(found)} `, trustTag(found.trust)),
-      (found.trust?.reasons ?? []).map((reason) => make("p", { class: "note" }, plain(reason))),
-      found.effects?.length || found.nuisances?.length ? effects(found) : null,
-      ...misfits(found, earlier),
-      refit(job, found), back,
-      (found.notes ?? []).length ? make("div", {}, make("h3", {}, "To know"), found.notes.map((text) => make("p", {}, plain(text)))) : null);
+    fill(place, earlier ? misfits(found, earlier) : null, refit(job, found), back);
   }
 
   // The model fitted again by `diagnose --effects`, with exactly the effects that are ticked.
@@ -70,27 +59,12 @@ export function build(panel, go) {
     view.element);
 }
 
-function effects(found) {
-  const words = (label) => found.library?.[label]?.words ?? label.replaceAll("_", " ").replace("@", " at ");
-  const size = ([key, one]) => {
-    const { factor, name } = Units.shown(one.unit, found.angle_unit);
-    const [value, between] = withInterval(one.value, one.interval, factor);
-    return `${SIZES[key] ?? key.replaceAll("_", " ")} ${value} ${name && name !== "1" ? name : ""}${between ? ` (${between})` : ""}`;
-  };
-  const inLog = (found.nuisances ?? []).map((one) => ({ ...one, said: `${one.name.replaceAll("_", " ")} (in the log)` }));
-  return table("Effects", ["effect", "grade", "size, 95 %", "not told apart from"], [...found.effects, ...inLog].map((one) => [
-    one.said ?? words(`${one.name}@${one.site ?? ""}`), make("td", { "data-label": "grade" }, make("span", { class: `tag ${GRADES[one.grade] ?? ""}` }, one.grade)),
-    Object.entries(one.parameters).map(size).join("; "), (one.family ?? []).map(words).join(", ") || "none"]));
-}
-
-// Rms of free runs on test data, beside that of the model before effects were ticked.
+// What the ticks have changed: the misfit on test data before and now; the page below says all else.
 function misfits(found, earlier) {
-  const rows = found.test.flatMap((test, n) => Object.entries(test.misfit).map(([signal, one]) => {
-    const { factor, name } = Units.shown(one.unit, found.angle_unit);
-    const before = earlier?.test[n]?.misfit[signal]?.final;
-    const cells = [one.nominal, one.parameters, ...(earlier ? [before] : []), one.final, one.noise];
-    return [SIGNALS[signal] ?? signal, ...cells.map((value) => (value === null || value === undefined ? "none" : `${digits(factor * value)} ${name}`))];
+  const said = found.test.flatMap((test, n) => Object.entries(test.misfit).map(([signal, one]) => {
+    const { factor, name } = Units.shown(one.unit, found.angle_unit), before = earlier.test[n]?.misfit[signal]?.final ?? null;
+    const [was, is] = [before, one.final].map((value) => (value === null ? "none" : digits(factor * value)));
+    return `${SIGNALS[signal] ?? signal} ${was} → ${is} ${name}`;
   }));
-  const heads = ["signal", "as given", "re-fitted", ...(earlier ? ["before"] : []), "with effects", "noise"];
-  return rows.length ? [make("h3", {}, "Misfit on test data (rms)"), table("Misfit on test data", heads, rows)] : [];
+  return make("p", { class: "answer" }, `Misfit on test data (rms): ${said.join("; ")}`);
 }

@@ -80,12 +80,3 @@ export function table(name, heads, rows, kind = "stack") {
 
 export const digits = (value, most = 4) =>
   value === null || value === undefined ? "none" : String(Number(Number(value).toPrecision(most)));
-
-// A value and its interval in words, with as many digits as tell the ends apart; an end that is null is open.
-export function withInterval(value, interval, factor = 1) {
-  const ends = (interval ?? []).map((end) => (end === null ? null : factor * end));
-  const width = ends.length === 2 && ends.every(Number.isFinite) ? ends[1] - ends[0] : 0;
-  const most = width > 0 ? Math.min(12, Math.max(4, 2 + Math.ceil(Math.log10(Math.max(...ends.map(Math.abs)) / width)))) : 4;
-  const words = ends.map((end) => (end === null ? "any size" : digits(end, most)));
-  return [value === null ? "none" : digits(factor * value, most), words.join(" to ")];
-}

@@ -1,7 +1,5 @@
-/* global Units */
-import { plain } from "./advice.js";
-import { check, digits, field, make, numberIn, numberInput, withInterval } from "./dom.js";
-import { action, fileChoice, jobView, kept, message, resultOf } from "./parts.js";
+import { check, field, make, numberIn, numberInput } from "./dom.js";
+import { action, fileChoice, jobView, kept, message } from "./parts.js";
 import { choices, choose, modelOfLog, start, watch } from "./state.js";
 import { unsaved } from "./machine.js";
 
@@ -35,38 +33,12 @@ export function reading(tab) {
 
 export const needLog = () => { if (!choices.log) throw new Error("choose a log first, or drop one in the tab Log"); };
 
-export function trustTag(trust) {
-  return trust ? make("span", { class: `tag ${{ green: "good", amber: "warn", red: "bad" }[trust.level]}` }, `trust: ${trust.level}`) : null;
-}
-
-// What an estimate says, in a line, with angles in the log's unit.
-export function answerOf(found) {
-  const alpha = found.alpha ?? null, { factor, name } = Units.shown("rad", found.record?.angle_unit);
-  if (alpha === null) return plain(found.not_applicable ?? found.message ?? "no half-gap");
-  const [size, between] = withInterval(alpha, found.interval, factor);
-  if (found.visible === false && between) return `No gap is seen: the half-gap is, with 95 %, ${between} ${name}`;
-  return `Half-gap ${size} ${name}${between ? `, 95 %: ${between} ${name}` : ""}`;
-}
-
 export function build(panel) {
   const said = message();
   const read = reading("gap"), motorOnly = check("leave the load encoder out", false, () => {});
   kept("gap.motor_only", motorOnly.querySelector("input"), false);
   const options = async () => ({ model: await modelOfLog(), motor_only: motorOnly.querySelector("input").checked, ...read.options() });
-  const view = jobView("gap", (job) => {
-    const place = make("div", {});
-    resultOf(job).then((found) => {
-      if (!found) return;
-      if (found.design) {
-        const best = found.design[0];
-        place.append(make("p", { class: "answer" }, best ? `Best: ${best.name}, bound ${digits(best.bound)} rad, up to ${digits(best.peak_torque)} N.m` : "no excitation within these limits shows it"));
-      }
-      if (!found.record && found.design) return;
-      place.append(make("p", { class: "answer" }, answerOf(found), " ", trustTag(found.trust)));
-      for (const reason of found.trust?.reasons ?? []) place.append(make("p", { class: "note" }, plain(reason)));
-    });
-    return place;
-  });
+  const view = jobView("gap");
 
   // An experiment that would show the gap better, by the command's own design.
   const limits = [["size", "Half-gap to be seen [rad]", "the estimate"], ["torque_limit", "Largest torque [N.m]", "250"], ["speed_limit", "Largest motor speed [rad/s]", "50"], ["duration", "Length [s]", "10"]]

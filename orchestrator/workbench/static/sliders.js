@@ -14,23 +14,25 @@ export async function sliders(job) {
   Units.choose(result?.record?.angle_unit ?? result?.angle_unit ?? "rad");
   const values = {}, said = make("p", { class: "note", role: "status" });
   const plots = Object.entries(model.measured).map(([name, y]) => {
-    const figure = make("figure", { class: "plot", "aria-label": TITLES[name] ?? name });
-    const title = TITLES[name] ?? name;
-    return { name, figure, title, said: make("p", { class: "note" }), measured: { name: "measured", x: model.time, y } };
+    const title = TITLES[name] ?? name, titles = [title, `${title}: simulated minus measured`];
+    const views = titles.map((text) => ({ title: text, figure: make("figure", { class: "plot", "aria-label": text }) }));
+    return { name, title, views, said: make("p", { class: "note" }), measured: { name: "measured", x: model.time, y } };
   });
   let busy = false, again = false, begun = 0;
 
   // The curves, what is between them, and its rms beside that of the result's own values.
-  function draw(curves) {
+  function draw(found) {
     for (const one of plots) {
-      const y = curves[one.name], error = y.map((value, n) => (value === null || one.measured.y[n] === null ? null : value - one.measured.y[n]));
+      const y = found[one.name], error = y.map((value, n) => (value === null || one.measured.y[n] === null ? null : value - one.measured.y[n]));
       const known = error.filter((value) => value !== null), rms = Math.sqrt(known.reduce((sum, value) => sum + value * value, 0) / known.length);
-      const series = [one.measured, { name: "simulated", x: model.time, y }, { name: "simulated minus measured", x: model.time, y: error }];
+      const curves = [[one.measured, { name: "simulated", x: model.time, y }], [{ name: "simulated minus measured", x: model.time, y: error }]];
       const { factor, name } = Units.shown("rad");
       one.first ??= rms;
       one.said.textContent = `Rms of simulated minus measured: ${digits(factor * rms)} ${name}; with the result's values: ${digits(factor * one.first)} ${name}`;
-      if (one.plot) one.plot.show(series);
-      else one.plot = new Plot(one.figure, { title: one.title, xLabel: "time [s]", yLabel: "angle [rad]", series, link: "sliders" });
+      one.views.forEach((view, n) => {
+        if (view.plot) view.plot.show(curves[n]);
+        else view.plot = new Plot(view.figure, { title: view.title, xLabel: "time [s]", yLabel: "angle [rad]", series: curves[n], link: "sliders" });
+      });
     }
   }
 
@@ -57,7 +59,7 @@ export async function sliders(job) {
     make("div", { class: "row" }, field("Angles in", units),
       make("button", { type: "button", onclick: () => { controls.forEach(({ home }) => home()); run(); } }, "Back to the result"), said),
     make("div", { class: "cards sliders" }, controls.map(({ element }) => element)),
-    plots.map(({ title, figure, said: words }) => [make("h3", {}, title), words, figure]).flat());
+    plots.map(({ title, views, said: words }) => [make("h3", {}, title), words, ...views.map(({ figure }) => figure)]).flat());
   await run();
   return place;
 }
