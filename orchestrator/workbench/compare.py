@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.errors import InputError
 from orchestrator.records.units import ANGLES
-from orchestrator.reporting import Facts, Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting import Plot, Report, ReportTable, Series, TableColumn
 from orchestrator.reporting.plots import Array, as_column
 from orchestrator.reporting.source import ResultDocument, load
 from orchestrator.workbench.session import is_name
@@ -99,12 +99,10 @@ def compare_results(first: Path, second: Path) -> Report:
     )
     summary = f"Changed: {changed}. {summary}" if changed else summary
     badge = _badge(bool(sure), bool(compared), [curve.name for curve in apart])
-    how = tuple((name, _how(document)) for name, document in zip(names, documents, strict=True))
-    facts = Facts("What is compared", how)
     return Report(
         f"{names[0]} and {names[1]}",
         summary,
-        (*(t for t in tables if t.rows), *plots, facts),
+        (*(t for t in tables if t.rows), *plots),
         badge,  # type: ignore[arg-type]
         angle_unit=_angle_unit(documents[0].get("results")),
     )
@@ -223,12 +221,6 @@ def _texts(names: tuple[str, str], documents: Sequence[Mapping[str, Any]]) -> Re
         if left.get(name) != right.get(name)
     ]
     return ReportTable("Words that differ", (TableColumn("what"), *(TableColumn(n) for n in names)), tuple(rows))
-
-
-def _how(document: Mapping[str, Any]) -> str:
-    arguments = document.get("arguments") or {}
-    given = ", ".join(f"{name} = {value}" for name, value in arguments.items() if value) if arguments else ""
-    return f"{document.get('command')} {document.get('version')}; {given}"
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ def is_name(text: str) -> bool:
 
 
 def kind_of(path: Path) -> str:
-    """Return what an upload is: "log", "model", "settings", "scenario" or "fmu"; "other" what a page only keeps."""
+    """Return what an upload is: a log, model, map, settings, scenario or fmu; "other" what a page only keeps."""
     ending = path.suffix.lower()
     if ending in (".fmu", ".ssp"):
         return "fmu"
@@ -141,6 +141,8 @@ def _kind_of_toml(path: Path, changed: int) -> str:
         found = read_toml(path, MEBIBYTE).keys()
     except ScenarioError:
         return "model"  # where it is chosen, its reader says what is wrong
+    if "outputs" in found:
+        return "map"
     if not found or found & _MODEL_KEYS:
         return "model"
     return "scenario" if "instances" in found else "settings"

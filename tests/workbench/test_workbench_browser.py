@@ -192,16 +192,6 @@ def test_channels_that_look_alike_become_a_button_each(page: Any, served: Served
     assert call(page, "advice.js", "rivalsOf", problem) is None
 
 
-def test_an_estimate_says_whether_a_gap_is_seen(page: Any, served: Served) -> None:
-    open_workbench(page, served)
-    found = {"alpha": 0.006, "interval": [0.005, 0.007], "visible": True, "record": {"angle_unit": "deg"}}
-    assert call(page, "gap.js", "answerOf", found) == "Half-gap 0.3438 deg, 95 %: 0.2865 to 0.4011 deg"
-    unseen = found | {"alpha": 0.0, "interval": [0.0, 0.0001], "visible": False}
-    said = "No gap is seen: the half-gap is, with 95 %, 0 to 0.00573 deg"
-    assert call(page, "gap.js", "answerOf", unseen) == said
-    assert call(page, "gap.js", "answerOf", {"alpha": None, "message": "no `u`"}) == "no “u”"
-
-
 def test_a_file_dropped_in_another_tab_is_told_where_it_goes(page: Any, served: Served, tmp_path: Path) -> None:
     open_workbench(page, served)
     for tab, name in (("log", "axis.toml"), ("log", "axis.fmu"), ("machine", "axis.trc"), ("fmus", "axis2.toml")):
@@ -311,9 +301,7 @@ def test_a_diagnosis_is_stopped_from_the_page(inspected: Any, served: Served) ->
     wait(inspected, lambda d: d.switch_to.active_element.get_attribute("id") == "tab-diagnosis")
 
 
-def test_outputs_are_dragged_to_inputs_of_the_same_quantity(inspected: Any, served: Served) -> None:
-    from selenium.webdriver.common.action_chains import ActionChains
-
+def test_outputs_are_connected_to_inputs_of_the_same_quantity(inspected: Any, served: Served) -> None:
     choose_tab(inspected, "fmus")
     fmus = ensure_built()
     for name in ("Drivetrain", "KalmanEstimator"):
@@ -323,21 +311,20 @@ def test_outputs_are_dragged_to_inputs_of_the_same_quantity(inspected: Any, serv
         wait(inspected, lambda d, n=name: find(d, "#panel-fmus select").get_attribute("value") == f"files/{n}.fmu")
         press(inspected, "Add it to the scenario")
         find(inspected, f"[data-port^='{name.lower()}.']")
-    set_screen(inspected, 1280, 3000, "light")
-
-    def drag(first: str, second: str) -> None:
-        ends = [find(inspected, f"[data-port='{name}'] circle") for name in (first, second)]
-        ActionChains(inspected).click_and_hold(ends[0]).move_to_element(ends[1]).release().perform()
-
-    drag("drivetrain.theta_m", "kalmanestimator.theta_m")
+    targets = (
+        "[...document.querySelectorAll('#panel-fmus label')].find((one) => one.textContent.startsWith('to an input'))"
+    )
+    found = f"return [...document.getElementById({targets}.htmlFor).options].map((one) => one.value)"
+    assert "kalmanestimator.theta_m" in inspected.execute_script(found)
+    assert "kalmanestimator.u" not in inspected.execute_script(found)  # a torque
+    press(inspected, "Connect what has the same name")
     wait_for_text(inspected, "panel-fmus", "drivetrain.theta_m → kalmanestimator.theta_m")
-    drag("drivetrain.omega_m", "kalmanestimator.u")
-    wait_for_text(inspected, "panel-fmus", "do not measure the same")
     press(inspected, "Write it as TOML")
     written = served.folder / "files" / "scenario.toml"
     wait(inspected, lambda d: written.exists() and "scenario.toml" in d.find_element("id", "panel-fmus").text)
     scenario = load_scenario(written)
-    assert [str(one.source) for one in scenario.system.connections] == ["drivetrain.theta_m"]
+    connected = {str(one.source) for one in scenario.system.connections}
+    assert connected == {"drivetrain.theta_m", "drivetrain.theta_l"}
     press(inspected, "Run the scenario")
     find(inspected, "#panel-fmus iframe")
     assert served.job("simulate-1")["state"] == "done"
@@ -444,7 +431,7 @@ def test_an_ssp_file_is_a_tree(inspected: Any, served: Served) -> None:
     said = "System of 2 FMUs until 1 s: drivetrain (Drivetrain), kalmanestimator (KalmanEstimator)"
     wait_for_text(inspected, "panel-fmus", said)
     branches = wait(inspected, lambda d: [one.text for one in d.find_elements("css selector", "#panel-fmus summary")])
-    assert "Connections (1)" in branches
+    assert "Connections (2)" in branches
     assert any(text.startswith("drivetrain (") for text in branches)
 
 

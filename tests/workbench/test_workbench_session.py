@@ -41,7 +41,8 @@ def test_files_are_offered_for_what_they_hold(tmp_path: Path) -> None:
     texts = {
         "machine.toml": "[parameters.k]\nvalue = 1.0\n", "strict.toml": "[selection]\nleast_gain = 0.02\n",
         "loop.toml": "stop = 1.0\n[instances.a]\nfmu = 'a.fmu'\n", "broken.toml": "[", "axis.csv": "1", "a.FMU": "1",
-        "page.html": "", "deep.toml": "a = " + 5000 * "[",
+        "page.html": "", "map.toml": "[outputs]\nq = 'q'\n[parameters.J]\nuncertainty = '5 %'\n",
+        "deep.toml": "a = " + 5000 * "[",
     }  # fmt: skip
     kinds = {}
     for name, text in texts.items():
@@ -49,7 +50,7 @@ def test_files_are_offered_for_what_they_hold(tmp_path: Path) -> None:
         kinds[name] = kind_of(tmp_path / name)
     assert kinds == {
         "machine.toml": "model", "strict.toml": "settings", "loop.toml": "scenario", "broken.toml": "model",
-        "axis.csv": "log", "a.FMU": "fmu", "page.html": "other", "deep.toml": "model",
+        "axis.csv": "log", "a.FMU": "fmu", "page.html": "other", "map.toml": "map", "deep.toml": "model",
     }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 import { plain } from "./advice.js";
 import { get, post } from "./api.js";
 import { field, fill, make, numberIn, numberInput } from "./dom.js";
-import { action, dropZone, fileChoice, isFmu, isLog, jobView, kept, message } from "./parts.js";
+import { action, dropZone, fileChoice, isFmu, isLog, isModel, jobView, kept, message } from "./parts.js";
 import { Scenario } from "./scenario.js";
 import { choices, choose, refresh, start, watch } from "./state.js";
 import { drawTree } from "./tree.js";
@@ -26,17 +26,33 @@ class FmuTab {
     this.ran = jobView("fmus");
     this.scenario = new Scenario(panel, () => ({ time_limit: numberIn(this.limit) }), (job) => this.ran.show(job));
     panel.append(
-      dropZone("Drop FMUs, SSP files or tables here", (name) => isFmu(name) || isLog(name), (file) => isFmu(file) && this.pick(file), true),
+      dropZone("Drop FMUs, SSP files, logs or maps here", (name) => isFmu(name) || isLog(name) || isModel(name), (file) => isFmu(file) && this.pick(file), true),
       make("div", { class: "row" }, fileChoice("FMU or SSP file", "fmu", () => this.fmu, (file) => this.pick(file)), field("Time limit [s]", this.limit)),
       this.said.element, this.head,
       make("div", { class: "row" },
         action("Run this FMU", this.said, () => this.run(), "main"),
         action("Check this FMU", this.said, async () => this.checked.show(await start("check", [this.needed()], { time_limit: numberIn(this.limit) }))),
         action("Add it to the scenario", this.said, async () => this.scenario.add(this.needed(/\.fmu$/i, "an FMU")))),
-      this.tree, this.checked.element,
+      this.measured(), this.tree, this.checked.element,
       make("h2", {}, "Scenario of several FMUs"), this.scenario.element, this.ran.element);
     watch(() => this.follow());
     this.follow();
+  }
+
+  // What a log says of this FMU; a map connects columns with variables.
+  measured() {
+    const map = () => choices.fields["fmus.map"] ?? "";
+    const run = (command, draft_map = false) => async () => {
+      const fmu = this.needed(/\.fmu$/i, "an FMU");
+      if (!choices.log) throw new Error("choose a log first, or drop one above");
+      if (!draft_map && !map()) throw new Error("choose a map first: “Draft a map” writes one to complete");
+      this.checked.show(await start(command, [choices.log], { fmu, ...(draft_map ? { draft_map } : { map: map() }) }));
+    };
+    return make("details", {}, make("summary", {}, "Compare it with a log"),
+      make("div", { class: "row" }, fileChoice("Log", "log", () => choices.log, (log) => choose({ log })),
+        fileChoice("Map", "map", map, (file) => choose({ fields: { "fmus.map": file || null } }))),
+      make("div", { class: "row" }, action("Draft a map", this.said, run("diagnose", true)),
+        action("Fit its parameters", this.said, run("calibrate")), action("Find what it lacks", this.said, run("diagnose"))));
   }
 
   needed(kind = /\.(fmu|ssp)$/i, what = "an FMU or SSP file") {

@@ -6,7 +6,7 @@ import { choices, choose, session, watch } from "./state.js";
 const ENCODERS = { theta_m: "motor encoder", theta_l: "load encoder" };
 const TAGS = { assumed: "warn", "from the record": "", yours: "good", "the FMU's own": "" };
 const HEADS = ["parameter", "value", "off by at most", "where it is from"];
-const ELSEWHERE = { settings: "settings of a diagnosis: it is chosen in the tab Diagnosis", scenario: "a scenario, and no model" };
+const ELSEWHERE = { map: "a map for any FMU: it is chosen in the tab FMUs", settings: "settings of a diagnosis: it is chosen in the tab Diagnosis", scenario: "a scenario, and no model" };
 
 // What was changed of the chosen model file and is not saved, in words.
 export function unsaved() {

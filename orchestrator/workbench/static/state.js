@@ -123,7 +123,7 @@ export async function stop(name) {
 const PLACES = {
   inspect: ["log", "log"], estimate: ["gap", "gap"], diagnose: ["diagnosis", "diagnosis"],
   check: ["fmus", "fmu"], ssp: ["fmus", "fmu"], simulate: ["fmus", "fmus"],
-  compensate: ["model", "control"], regulator: ["model", "control"],
+  calibrate: ["fmus", "fmu"], compensate: ["model", "control"], regulator: ["model", "control"],
 };
 
 // Show a result in its tab, beside the log and the model file that it was made of.
