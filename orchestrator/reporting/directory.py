@@ -1,6 +1,7 @@
 """From a result directory to its page."""
 
 import importlib
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -38,7 +39,7 @@ def report_from_directory(directory: Path, command: str | None = None) -> Report
     source = load(directory, command or found[0])
     try:
         report: Report = _page_of(source.command).build(source)
-        return report
+        return replace(report, about=source.about())
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         reason = f"{type(error).__name__}: {error}"
         raise ScenarioError(f"{directory / source.command}.json must hold results of this version ({reason})") from None

@@ -127,6 +127,7 @@ class Report:
         origin: what was run and with what (command, version, seed, arguments).
         angle_unit: in which angles are shown first: rad, deg, arcmin or turns.
         downloads: files to hand on with the page; small ones are embedded, others linked beside it.
+        about: what the title says besides: the files that went in, the day, and who made it.
     """
 
     title: str
@@ -136,6 +137,7 @@ class Report:
     origin: tuple[tuple[str, Cell], ...] = ()
     downloads: tuple[Path, ...] = field(default=())
     angle_unit: str = "rad"
+    about: tuple[str, ...] = ()
 
     def all_sections(self) -> Iterator[Section]:
         """Yield the sections in the order of the page, those of folds in their place."""

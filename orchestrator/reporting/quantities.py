@@ -1,5 +1,6 @@
 """Sentences as HTML: angles marked so that the page's switch of units reaches them, and code."""
 
+import math
 import re
 
 from markupsafe import Markup, escape
@@ -20,6 +21,15 @@ BRACKETED = re.compile(r"(?P<name>.*)\[(?P<unit>rad(?:/s2?)?)\]$", re.S)
 
 
 _MARKED = Markup('<span data-unit="{}">{}</span>')
+
+
+def interval_words(value: float | None, low: float | None, high: float | None) -> tuple[str, str, str]:
+    """Return a value and the ends of its interval, down to the second digit of half the interval's width."""
+    digits = 5
+    if low is not None and high is not None and high > low:
+        digits = 2 + math.ceil(math.log10(max(abs(low), abs(high)) / (0.5 * (high - low))))
+    value_text, *ends = ("any size" if v is None else f"{v:.{min(max(digits, 2), 12)}g}" for v in (value, low, high))
+    return value_text, ends[0], ends[1]
 
 
 def mark_prose(text: str) -> Markup:

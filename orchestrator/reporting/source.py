@@ -3,10 +3,12 @@
 import csv
 import json
 import math
+import os
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from datetime import date
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,10 @@ from orchestrator.shared.results import as_plain
 from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn
 
 Array = NDArray[np.float64]
+AUTHOR = "BACKLASH_COSIM_AUTHOR"
+"""Environment variable with the line of who makes pages, such as a name and a company."""
+INPUTS = ("record", "records", "fmu", "fmus", "map", "scenario", "file", "model")
+"""Arguments whose files a page names in its title."""
 DATA_SUFFIXES = (".csv", ".json", ".npz", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")
 
 UNITS = {  # of arguments
@@ -54,6 +60,11 @@ class ResultDocument:
         """The document's results."""
         results = self.document.get("results")
         return results if isinstance(results, Mapping) else {}
+
+    @property
+    def arguments(self) -> Mapping[str, Any]:
+        """What the command was asked for."""
+        return self.document.get("arguments") or {}
 
     def rows(self, name: str) -> Iterator[list[Cell]]:
         """Yield the heading and then the rows of a CSV file of the directory; nothing when there is no such file.
@@ -100,11 +111,19 @@ class ResultDocument:
 
     def origin(self, *made: tuple[str, Cell]) -> tuple[tuple[str, Cell], ...]:
         """Return what was run and with what."""
-        arguments = self.document.get("arguments") or {}
-        given = {n: plain(v) for n, v in arguments.items() if n != "out" and v not in (None, False, [], {})}
+        asked = {n: v for n, v in self.arguments.items() if n != "out" and v not in (None, False, [], {})}
+        given = {name: plain(_file_names(value)) for name, value in asked.items()}
         head = {"command": self.command, "version": self.document.get("version"), "seed": self.document.get("seed")}
         known = tuple((_with_unit(name), value) for name, value in (head | given).items() if value is not None)
-        return (*known, *((name, value) for name, value in made if value not in (None, "")))
+        return (*known, *((name, plain(_file_names(value))) for name, value in made if value not in (None, "")))
+
+    def about(self) -> tuple[str, ...]:
+        """Return what a title says besides: the files that went in, the day of the result, and who made the page."""
+        given = filter(None, (_file_names(self.arguments.get(name)) for name in INPUTS))
+        names = (f"{f[0]} and {len(f) - 1} more" if isinstance(f, list) and len(f) > 2 else plain(f) for f in given)
+        written = (self.directory / f"{self.command}.json").stat().st_mtime
+        day, author = date.fromtimestamp(written).isoformat(), os.environ.get(AUTHOR, "").strip()
+        return (*dict.fromkeys(map(str, names)), day, *([f"by {author}"] if author else []))
 
     def downloads(self) -> tuple[Path, ...]:
         """Return the data files of the directory, by name."""
@@ -152,6 +171,15 @@ def _cell(text: str) -> Cell:
     except ValueError:
         return text or None
     return value if math.isfinite(value) else None
+
+
+def _file_names(value: Any) -> Any:
+    """Return paths without their folders, which are those of whoever ran the command; all else as it is."""
+    if isinstance(value, list):
+        return [_file_names(one) for one in value]
+    path = PureWindowsPath(value if isinstance(value, str) else "")
+    ending = path.suffix[1:]
+    return path.name if len(path.parts) > 1 and ending.isalnum() and not ending.isdigit() else value
 
 
 def plain(value: Any) -> Cell:

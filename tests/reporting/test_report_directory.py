@@ -1,6 +1,7 @@
 """From a result directory to its page: every command, damaged input, the `report` command."""
 
 import json
+import os
 from dataclasses import asdict, dataclass
 
 import msgspec
@@ -28,6 +29,10 @@ SWEEP = """case,noise,repetition,alpha,status,S,estimate,lower,upper,error,error
 2,0.0001,1.0,0.002,done,0.1,0.0019,0.0018,0.0023,1e-4,5.0,
 3,0.0001,1.0,0.05,crash,,,,,,,the worker process died
 """
+
+REGULATOR = """{"gains": {"K[1]": 1, "K[2]": 1, "K[3]": 1, "K[4]": 1, "K[5]": 1}, "sample_time": 0.001, "delay": 0,
+"forecast": {"cycles": false, "twist": 1.89, "load": 2.26, "frequency": 1.84, "phase_margin": 1.1, "rank": 5,
+"delay_margin": 0.0324, "upper_gain": 86.2}, "frequencies": [1, 2, 3], "response": [10, 1, 0.1], "phases": [0, 0, 0]}"""
 
 
 @pytest.fixture
@@ -65,6 +70,64 @@ def test_the_page_of_a_sweep_shows_statistics_estimates_and_failures(sweep):
     assert [p.name for p in report.downloads] == ["sweep.csv", "sweep.json"]
 
 
+def test_a_title_names_files_the_day_and_who_made_it_and_no_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("BACKLASH_COSIM_AUTHOR", "A. Engineer <b>, Drives Ltd")
+    files = {"record": "/home/me/axis.csv", "records": ["/home/me/axis.csv"], "model": r"C:\work\axis7.toml"}
+    asked = files | {"vary": ["k=1/2.5"], "columns": "N.m/rad", "rate": 100.0}
+    write_result(tmp_path, "regulator", asked, None, json.loads(REGULATOR))
+    os.utime(tmp_path / "regulator.json", (1_000_036_800.0, 1_000_036_800.0))
+    report = report_from_directory(tmp_path)
+    assert report.about == ("axis.csv", "axis7.toml", "2001-09-09", "by A. Engineer <b>, Drives Ltd")
+    assert {"record": "axis.csv", "vary": "k=1/2.5", "columns": "N.m/rad"}.items() <= dict(report.origin).items()
+    page = write_report(tmp_path).read_text().split("<footer>")[0]
+    assert "axis.csv, axis7.toml, 2001-09-09, by A. Engineer &lt;b&gt;, Drives Ltd</title>" in page
+    assert "/home/me" not in page
+
+
+@pytest.mark.parametrize(
+    ("changes", "badge", "said"),
+    [
+        ({}, ("good", "it comes to rest"), "phase margin of 1.1 rad, a gain margin of 38.7 dB"),
+        (
+            {"cycles": True},
+            ("warn", "limit cycle at 1.84 Hz"),
+            "limit cycle at 1.84 Hz, amplitude 2.26 half-gaps at the load",
+        ),
+        ({"upper_gain": 1.9}, ("bad", "small margins"), "a gain margin of 5.58 dB"),
+        ({"lower_gain": 0.6}, ("bad", "small margins"), "comes to rest"),
+        ({"phase_margin": 0.5}, ("bad", "small margins"), "phase margin of 0.5 rad"),
+    ],
+)
+def test_the_page_of_a_regulator_judges_its_margins(tmp_path, changes, badge, said):
+    results = json.loads(REGULATOR)
+    results["forecast"] |= changes
+    write_result(tmp_path, "regulator", {}, None, results)
+    report = report_from_directory(tmp_path)
+    assert (report.badge, report.angle_unit) == (badge, "deg")
+    assert said in report.summary
+    (gain, phase) = sections(report, Plot)
+    assert (gain.y_label, phase.y_label) == ("gain [dB]", "phase [rad]")
+    assert gain.series[0].y == [20.0, 0.0, -20.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "badge"),
+    [
+        ({}, ("good", "take the compensator")),
+        ({"compensator": {"unstable": 1}}, ("warn", "take the LQR")),
+        ({"shifted": {"impact": 0.14}}, ("good", "take the shifted")),
+        ({key: {"unstable": 2} for key in ("LQR", "shifted", "compensator")}, ("bad", "none is stable")),
+    ],
+)
+def test_the_page_of_laws_recommends_what_is_stable_soft_and_accurate(tmp_path, changes, badge):
+    numbers = {"LQR": (0.19, 0.12), "shifted": (0.55, 0.0017), "compensator": (0.12, 0.0027)}
+    more = {"rest": None, "contacts": None, "unstable": 0}
+    laws = [{"law": n, "impact": i, "error": e} | more | changes.get(n, {}) for n, (i, e) in numbers.items()]
+    results = {"alpha": 0.02, "tau": 0.005, "impact_speed": 0.1, "bound": 0.036, "laws": laws}
+    write_result(tmp_path, "compensate", {}, None, results)
+    assert report_from_directory(tmp_path).badge == badge
+
+
 def test_the_page_of_a_check_lists_what_was_found(tmp_path):
     rule = next(name for name, rule in RULES.items() if rule.severity == "error")
     found = CheckReport("a/bad.fmu", (CheckFinding(rule, "modelDescription.xml", "A unit must be defined."),))
@@ -77,9 +140,10 @@ def test_the_page_of_a_check_lists_what_was_found(tmp_path):
     assert report.summary.startswith("1 of 2 FMUs pass.")
     (findings,) = sections(report, Findings)
     assert (findings.title, findings.items[0].text) == ("bad.fmu", "A unit must be defined.")
-    table, facts = sections(report, ReportTable)
+    table, facts, unrun = sections(report, ReportTable)
     assert [row[0] for row in table.rows] == ["bad.fmu", "good.fmu"]
     assert facts.rows == (("bad.fmu", None), ("good.fmu", "2.0"))
+    assert [row[2] for row in unrun.rows if row[0] == rule] == ["good.fmu"]
 
 
 def test_the_page_of_a_check_puts_findings_of_one_rule_together(tmp_path):

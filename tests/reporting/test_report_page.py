@@ -19,7 +19,7 @@ from orchestrator.reporting.plots import (
     rows_of_a_curve,
     thin_series,
 )
-from orchestrator.reporting.quantities import mark_prose
+from orchestrator.reporting.quantities import interval_words, mark_prose
 from orchestrator.shared.numbers import cell_text
 from tests.support.report import example
 
@@ -231,3 +231,16 @@ def test_angles_in_sentences_are_marked_or_left_alone(text, marked):
 
 def test_what_stands_in_backticks_is_code_and_stays_harmless():
     assert mark_prose("use `--a <b>` now, `") == "use <code>--a &lt;b&gt;</code> now, `"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ((0.0137166, 0.0136887, 0.0137444), ("0.013717", "0.013689", "0.013744")),
+        ((0.02, 0.0199999, 0.0200001), ("0.02", "0.0199999", "0.0200001")),
+        ((0.8, 0.1, 3.0), ("0.8", "0.1", "3")),
+        ((0.0137166, None, 0.02), ("0.013717", "any size", "0.02")),
+    ],
+)
+def test_a_value_has_the_digits_that_its_interval_allows(given, words):
+    assert interval_words(*given) == words

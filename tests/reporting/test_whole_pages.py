@@ -3,6 +3,7 @@
 After a change that is meant ``python -m tests.reporting.test_whole_pages`` writes the outlines anew: read what differs.
 """
 
+import os
 import tempfile
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from orchestrator.reporting import report_from_directory
 from orchestrator.shared.output import write_result
 from tests.support.page_results import PAGES, outline
 
+NOON = 1_000_036_800.0  # of 9 September 2001
 FOLDER = Path(__file__).parent / "outlines"
 
 
@@ -19,6 +21,7 @@ def page_outline(name, folder):
     """The outline of a page."""
     command, arguments, results, files = PAGES[name]
     write_result(folder, command, arguments, 5, results)
+    os.utime(folder / f"{command}.json", (NOON, NOON))
     for file, text in files.items():
         (folder / file).write_text(text)
     lines = [line for line in outline(report_from_directory(folder)) if "version" not in line]

@@ -1,6 +1,6 @@
 """The page of a diagnosis of any FMU: what is missing around it, how far the misfit shrinks, what is left."""
 
-from orchestrator.reporting.model import Facts, Fold, Plot, Report, Section, Series, Span, Text
+from orchestrator.reporting.model import Facts, Plot, Report, Section, Series, Span, Text
 from orchestrator.reporting.pages.diagnosis_answer import (
     answer_table,
     headline,
@@ -14,7 +14,7 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     evidence_table,
     parameter_table,
 )
-from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.pages.generic import folds_of, sections_of
 from orchestrator.reporting.source import Array, ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
@@ -53,12 +53,12 @@ def build(source: ResultDocument) -> Report:
         summary=headline(found.summary) or f"{label[:1].upper()}{label[1:]}.",
         badge=trust_badge(found.trust, label, badge),
         sections=(
-            *answer_table(found.effects),
+            *answer_table(found.effects, found.test),
             *trust_section(found.trust),
             *worth_on_test_data(found.test, _test_part(found, table), ("nominal", "corrected")),
             *next_steps(found.summary),
             *([fields_table("Corrected system", found.delivery)] if found.delivery else []),
-            *(Fold(title, tuple(inside)) for title, inside in folds.items() if inside),
+            *folds_of(folds),
         ),
         origin=source.origin(*made),
         downloads=source.downloads(),

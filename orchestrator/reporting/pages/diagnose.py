@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.effects.words import place_words
-from orchestrator.reporting.model import Facts, Fold, Plot, Report, Section, Series, Text
+from orchestrator.reporting.model import Facts, Plot, Report, Section, Series, Text
 from orchestrator.reporting.pages import any_fmu
 from orchestrator.reporting.pages.diagnosis_answer import (
     SIGNALS,
@@ -26,7 +26,8 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     evidence_table,
     parameter_table,
 )
-from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.pages.generic import folds_of, sections_of
+from orchestrator.reporting.pages.meanings import with_meanings
 from orchestrator.reporting.pages.record import signal_plots
 from orchestrator.reporting.source import ResultDocument, words
 from orchestrator.reporting.trust import trust_badge, trust_section
@@ -56,7 +57,7 @@ def build(source: ResultDocument) -> Report:
     table, live = source.signals("diagnose.csv"), results.live
     restarts = live.rows if live else ()
     sections: list[Section] = [
-        *answer_table(results.effects, results.nuisances),
+        *answer_table(results.effects, results.test, results.nuisances),
         *trust_section(results.trust),
         *worth_on_test_data(results.test, table, ("before", "after"), restarts),
         *next_steps(results.summary, _on_the_corrected_model(results)),
@@ -74,13 +75,13 @@ def build(source: ResultDocument) -> Report:
         "Test data": [*_tests(results), *signal_plots(table, restarts, metric)],
         "What remains unexplained": [*_residual_sections(results.remaining), *_law_sections(results.learned_law)],
         "Values, search and analysis": [
-            parameter_table(results.parameters),
+            with_meanings(parameter_table(results.parameters), live),
             *candidate_table(results.candidates),
             *_analysis(results),
             *sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"}),
         ],
     }
-    sections += [Fold(title, tuple(inside)) for title, inside in folds.items() if inside]
+    sections += folds_of(folds)
     return Report(
         title="Diagnosis",
         summary=headline(results.summary) or " ".join(filter(None, [sentence, _effect_names(results.effects)])),

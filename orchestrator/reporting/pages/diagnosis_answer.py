@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.effects.words import place_words
 from orchestrator.reporting.model import Plot, Section, Series, Span, Text
+from orchestrator.reporting.pages.diagnosis_tables import label_words
+from orchestrator.reporting.quantities import interval_words
 from orchestrator.reporting.source import Array, words
 from orchestrator.shared.results.diagnose import EffectFound, NuisanceFound, SignalMisfitFound, TestFound, ValueFound
-from orchestrator.shared.results.fields import ReportTable, TableColumn
+from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn
 
 SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
 SIZES = {"alpha": "half-gap"}
@@ -19,12 +21,30 @@ def headline(summary: Sequence[str]) -> str:
     return summary[0].partition(". ")[2] if summary else ""
 
 
-def answer_table(effects: Sequence[EffectFound], nuisances: Sequence[NuisanceFound] = ()) -> list[Section]:
-    """Return a table of what is missing, how sure and how large; empty where nothing is."""
-    rows = [(place_words(e.name, e.site), e.grade, _sizes(e.parameters)) for e in effects]
-    rows += [(f"{words(n.name)} (in the log)", n.grade, _sizes(n.parameters)) for n in nuisances]
-    columns = (TableColumn("effect"), TableColumn("how sure"), TableColumn("how large"))
-    return [ReportTable("What is missing", columns, tuple(rows))] if rows else []
+def answer_table(
+    effects: Sequence[EffectFound], tests: Sequence[TestFound], nuisances: Sequence[NuisanceFound] = ()
+) -> list[Section]:
+    """Return a table of what is missing, how sure and how large, above it how far the misfit goes down."""
+    rows: list[tuple[Cell, ...]] = [
+        (
+            place_words(e.name, e.site), e.grade, _sizes(e.parameters),
+            ", ".join(label_words(label) for label in e.family) or "none",
+        )
+        for e in effects
+    ]  # fmt: skip
+    rows += [(f"{words(n.name)} (in the log)", n.grade, _sizes(n.parameters), None) for n in nuisances]
+    columns = tuple(TableColumn(name) for name in ("effect", "how sure", "how large", "not told apart from"))
+    said = _misfits(tests)
+    if not rows:
+        return [Text("Misfit on test data", (said,))] if said else []
+    return [ReportTable("What is missing", columns, tuple(rows), said)]
+
+
+def _misfits(tests: Sequence[TestFound]) -> str:
+    """Return how far the misfit on test data goes down, in sentences."""
+    said = [_misfit_sentence(signal, one) for signal, one in tests[0].misfit.items()] if tests else []
+    said += ["The corrected model does worse than re-fitted parameters."] if tests and tests[0].worse else []
+    return " ".join(filter(None, said))
 
 
 def worth_on_test_data(
@@ -41,12 +61,9 @@ def worth_on_test_data(
     if not tests or not tests[0].misfit:
         return []
     name, misfit = max(tests[0].misfit.items(), key=lambda item: _share(item[1]))
-    said = [_misfit_sentence(signal, one) for signal, one in tests[0].misfit.items()]
-    said += ["The corrected model does worse than re-fitted parameters."] * tests[0].worse
-    note = " ".join(filter(None, said))
     columns = [f"{name}_{ending}" for ending in runs]
     if "time" not in table or name not in table or not any(column in table for column in columns):
-        return [Text(WORTH, (note,))] if note else []
+        return []
     time = table["time"]
     series = tuple(
         Series(label, time, table[column] - table[name])
@@ -55,10 +72,7 @@ def worth_on_test_data(
     )
     moments = tuple(Span(float(time[row]), float(time[row]), "free run starts anew") for row in restarts)
     label = f"error of the {SIGNALS.get(name, name)} [{misfit.unit or '1'}]"
-    return [Plot(WORTH, "time [s]", label, series, moments, note=note)]
-
-
-WORTH = "What the corrected model is worth on test data"
+    return [Plot("What the corrected model is worth on test data", "time [s]", label, series, moments)]
 
 
 def next_steps(summary: Sequence[str], more: str = "") -> list[Section]:
@@ -81,7 +95,8 @@ def quantity(p: ValueFound) -> str:
     unit = "" if p.unit in (None, "1") else f" {p.unit}"
     low, high = p.interval or (None, None)
     if low is not None and high is not None:
-        return f"{p.value:.5g}{unit} (95 %: {low:.5g} to {high:.5g})"
+        value, lower, upper = interval_words(p.value, low, high)
+        return f"{value}{unit} (95 %: {lower} to {upper})"
     error = f" ± {p.standard_error:.2g}" if p.standard_error is not None else ""
     return f"{p.value:.5g}{error}{unit}"
 

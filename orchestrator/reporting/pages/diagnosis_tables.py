@@ -22,15 +22,13 @@ def evidence_table(effects: Sequence[EffectFound], of: str = "missing torque") -
     reasons = tuple(
         (
             place_words(e.name, e.site), e.grade, percent(e.gain), e.t, percent(e.explains.torque),
-            percent(e.explains.motion), "yes" if e.in_model else "no",
-            ", ".join(label_words(label) for label in e.family) or None, ", ".join(e.lowered_by) or None,
+            percent(e.explains.motion), "yes" if e.in_model else "no", ", ".join(e.lowered_by) or None,
         )
         for e in effects
     )  # fmt: skip
     titles = (
         "effect", "grade", f"{TAKES} [%]", "over its uncertainty", f"explains of the {of} [%]",
-        "of the misfit on test data [%]", "in the corrected model", "not distinguished from",
-        "rules that lower the grade",
+        "of the misfit on test data [%]", "in the corrected model", "rules that lower the grade",
     )  # fmt: skip
     note = "The corrected model has the effects that are certain or likely, and those that you chose."
     return [ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons, note)]

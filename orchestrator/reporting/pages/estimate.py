@@ -6,9 +6,11 @@ import numpy as np
 
 from orchestrator.effects.words import list_words, place_words
 from orchestrator.reporting.model import Badge, Facts, Plot, Report, Section, Series, Text
-from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.pages.generic import folds_of, sections_of
 from orchestrator.reporting.pages.location import build_location
-from orchestrator.reporting.pages.record import one_step_errors, record_plots
+from orchestrator.reporting.pages.meanings import fitted_parameters
+from orchestrator.reporting.pages.record import measured_and_fitted
+from orchestrator.reporting.quantities import interval_words
 from orchestrator.reporting.source import ResultDocument, numbers, words
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import TrustFound, read
@@ -17,7 +19,6 @@ from orchestrator.shared.results.estimate import (
     ExcitationFound,
     MethodFound,
     methods_table,
-    parameters_table,
 )
 from orchestrator.shared.results.fields import ReportTable, TableColumn, fields_table
 
@@ -34,23 +35,18 @@ def build(source: ResultDocument) -> Report:
     if results.location is not None:
         return build_location(source, results, results.location)
     found = {name: e for name, e in results.estimates.items() if e.not_applicable is None}
-    sections: list[Section] = trust_section(results.trust)
-    sections += [*_diagnosis_sections(results), *_repeats(results)]
-    if results.estimates:
-        sections += [methods_table("Estimates", found), *_remarks(results.estimates), *_comparison(found)]
-    limit = (results.diagnostics or {}).get("profile_limit") or CHI_SQUARE_95
-    sections += [
-        *_flanks(source),
-        *_profile(source, limit),
-        *_online(source),
-        *record_plots(source, "estimate.csv"),
-        *one_step_errors(source.signals("estimate.csv")),
-    ]
-    parameters = (results.diagnostics or {}).get("parameters")
-    if parameters:
-        sections.append(parameters_table("Parameters fitted with the gap", parameters))
-    sections += _design(source, results.design or ())
-    sections += _diagnostics(found)
+    sections: list[Section] = [*([methods_table("Estimates", found)] if results.estimates else [])]
+    sections += [*trust_section(results.trust), *_diagnosis_sections(results), *_remarks(results.estimates)]
+    sections += [*_repeats(results), *_flanks(source), *_online(source), *_design(source, results.design or ())]
+    diagnostics = results.diagnostics or {}
+    fitted = diagnostics.get("parameters")
+    sections += folds_of(
+        {
+            "Measured and fitted": measured_and_fitted(source, "estimate.csv"),
+            "How sharp the estimate is": _profile(source, diagnostics.get("profile_limit") or CHI_SQUARE_95),
+            "Values of the fit": [*fitted_parameters(fitted, results.live), *_diagnostics(found)],
+        }
+    )
     badge, summary = _answer(results)
     unit = results.record.angle_unit if results.record else "rad"
     return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads(), unit)
@@ -91,8 +87,8 @@ def _answer(results: EstimateFound) -> tuple[tuple[Badge, str] | None, str]:
         if results.estimates:
             return ("bad", "no estimate"), "No method can be applied to this record."
         return None, "An excitation that shows the gap."
-    low, high = results.interval or (None, None)
-    interval = f"with 95 % confidence between {_number(low)} and {_number(high)} rad"
+    alpha, low, high = interval_words(results.alpha, *(results.interval or (None, None)))
+    interval = f"with 95 % confidence between {low} and {high} rad"
     record = results.record
     source = f" (record {record.source}, {record.rows} rows)" if record and record.source else ""
     message = results.message or ""
@@ -101,12 +97,8 @@ def _answer(results: EstimateFound) -> tuple[tuple[Badge, str] | None, str]:
         if "confidence" not in message and results.alpha is not None:
             said = f"No gap is seen: it is {interval}. {said}".strip()
         return trust_badge(results.trust, "no gap is seen"), f"{said}{source}."
-    summary = f"The half-gap is {results.alpha:.6g} rad, {interval}{source}."
+    summary = f"The half-gap is {alpha} rad, {interval}{source}."
     return trust_badge(results.trust, "the gap is seen", "good"), " ".join(filter(None, [summary, message]))
-
-
-def _number(value: float | None) -> str:
-    return "any size" if value is None else f"{value:.6g}"
 
 
 def _remarks(estimates: Methods) -> list[Section]:
@@ -122,19 +114,6 @@ def _remarks(estimates: Methods) -> list[Section]:
         reasons = [reason for reason in trust.reasons if reason not in message]
         said += [f"{words(name)} is {trust.level}: {'; '.join(reasons)}."] if reasons else []
     return [Text("Remarks", tuple(text[:1].upper() + text[1:] for text in said))] if said else []
-
-
-def _comparison(results: Methods) -> list[Section]:
-    results = {name: e for name, e in results.items() if e.visible}
-    if len(results) < 2:
-        return []
-    alpha = [e.alpha or 0.0 for e in results.values()]
-    low, high = zip(*(e.interval or (None, None) for e in results.values()), strict=True)
-    series = Series("half-gap", list(range(len(results))), alpha, "points", low, high)
-    positive = [v for v in alpha if v > 0.0]
-    wide = bool(positive) and max(positive) > 5.0 * min(positive)
-    names = tuple(words(name) for name in results)
-    return [Plot("Estimates by method", "method", "half-gap [rad]", (series,), log_y=wide, categories=names)]
 
 
 def _profile(source: ResultDocument, limit: float) -> list[Section]:
@@ -201,7 +180,7 @@ def _design(source: ResultDocument, candidates: Sequence[ExcitationFound]) -> li
 def _diagnostics(results: Methods) -> list[Section]:
     made: list[Section] = []
     for name, estimate in results.items():
-        given = {k: v for k, v in (estimate.diagnostics or {}).items() if k != "parameters"}
+        given = {k: v for k, v in (estimate.diagnostics or {}).items() if k not in {"parameters", "lacking"}}
         facts = [s for s in sections_of(f"Diagnostics of {words(name)}", given) if isinstance(s, Facts)]
         made += facts[:1]
     return made

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestrator.reporting.model import Facts, Report, Section
+from orchestrator.reporting.model import Facts, Fold, Report, Section
 from orchestrator.reporting.source import ResultDocument, plain, table_of, words
 
 
@@ -37,6 +37,11 @@ def sections_of(title: str, value: Mapping[str, Any], units: Mapping[str, str] |
             unit = (units or {}).get(name, "1")
             facts.append((heading if unit == "1" else f"{heading} [{unit}]", plain(item)))
     return [*([Facts(title, tuple(facts))] if facts else []), *further]
+
+
+def folds_of(folds: Mapping[str, Sequence[Section]]) -> list[Section]:
+    """Return sections that are closed at first, by title; none that is empty."""
+    return [Fold(title, tuple(inside)) for title, inside in folds.items() if inside]
 
 
 def sentence(text: str) -> str:

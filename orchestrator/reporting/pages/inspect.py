@@ -3,7 +3,7 @@
 from typing import Any
 
 from orchestrator.reporting.model import Badge, Facts, Plot, Report, Section, Series, Text
-from orchestrator.reporting.pages.record import record_plots
+from orchestrator.reporting.pages.record import signal_plots
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
 from orchestrator.shared.results.fields import fields_table
@@ -15,11 +15,11 @@ RECORD = "inspect_record.npz"
 def build(source: ResultDocument) -> Report:
     """Return the page."""
     results = read(source.results, InspectFound)
-    sections: list[Section] = [Text("What the record can show", results.verdict)]
+    sections: list[Section] = [Text("What the record can show", results.verdict[1:])] if results.verdict[1:] else []
     if results.assumed:
         sections.append(Text("Assumed: put right in the model file", results.assumed))
     sections.append(Text("How the file was read", results.record.notes))
-    sections += record_plots(source, RECORD)
+    sections += signal_plots(source.signals(RECORD))
     sections += _spectrum(results)
     sections += [_facts(results), *inspect_tables(results)]
     sections += _better(results)

@@ -1,10 +1,14 @@
 """The page of ``estimate`` for a train of two stages: where the gap is, and the motion that says so."""
 
 from orchestrator.reporting.model import Plot, Report, Section, Series
-from orchestrator.reporting.pages.record import one_step_errors, record_plots
+from orchestrator.reporting.pages.generic import folds_of
+from orchestrator.reporting.pages.meanings import fitted_parameters
+from orchestrator.reporting.pages.record import measured_and_fitted
+from orchestrator.reporting.quantities import interval_words
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
-from orchestrator.shared.results.estimate import EstimateFound, LocationFound, location_tables, parameters_table
+from orchestrator.shared.results import GapFound
+from orchestrator.shared.results.estimate import EstimateFound, LocationFound, location_tables
 
 STAGES = {"1": "stage 1", "2": "stage 2"}
 
@@ -15,16 +19,24 @@ def build_location(source: ResultDocument, results: EstimateFound, location: Loc
         *trust_section(results.trust),
         *location_tables(location),
         *_twists(source, location),
-        *record_plots(source, "stages.csv"),
-        *one_step_errors(source.signals("stages.csv")),
-        parameters_table("Parameters fitted with the gaps", location.parameters),
+        *folds_of(
+            {
+                "Measured and fitted": measured_and_fitted(source, "stages.csv"),
+                "Values of the fit": fitted_parameters(location.parameters),
+            }
+        ),
     ]
+    sizes = [f"The half-gap of {STAGES[n]} is {_size(location.stages[n])}." for n in location.answers if n in STAGES]
+    summary = " ".join([results.message or "", *sizes])
     said = f"in {location.answer}" if location.answers else "nowhere seen"
     badge = trust_badge(results.trust, said, "good" if len(location.answers) == 1 else "warn")
     unit = results.record.angle_unit if results.record else "rad"
-    return Report(
-        "Where the gap is", results.message or "", tuple(sections), badge, source.origin(), source.downloads(), unit
-    )
+    return Report("Where the gap is", summary, tuple(sections), badge, source.origin(), source.downloads(), unit)
+
+
+def _size(gap: GapFound) -> str:
+    value, low, high = interval_words(gap.alpha, gap.lower, gap.upper)
+    return f"{value} rad at its gear's output (95 %: {low} to {high})"
 
 
 def _twists(source: ResultDocument, location: LocationFound) -> list[Section]:

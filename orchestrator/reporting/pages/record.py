@@ -33,19 +33,12 @@ def metric_words(text: str, metric: bool) -> str:
     return " ".join(METRIC.get(word, word) for word in text.split()) if metric else text
 
 
-def record_plots(
-    source: ResultDocument, name: str, restarts: Sequence[int] = (), metric: bool = False
-) -> list[Section]:
-    """Return plots against ``time`` of a file with measured columns (``theta_m``) and simulated (``theta_m_after``).
-
-    For each signal with simulated columns a plot of simulated minus measured comes first. Empty where there is no
-    such file, or no column ``time``. ``metric``: the axis moves in metres.
-    """
-    return list(signal_plots(source.signals(name), restarts, metric))
-
-
 def signal_plots(table: Table, restarts: Sequence[int] = (), metric: bool = False) -> Iterator[Plot]:
-    """Yield the plots of a table; see ``record_plots``."""
+    """Yield plots against ``time`` of measured columns (``theta_m``) and simulated ones (``theta_m_after``).
+
+    For each signal with simulated columns a plot of simulated minus measured comes first. None without a column
+    ``time``. ``metric``: the axis moves in metres.
+    """
     if "time" not in table:
         return
     time = table["time"]
@@ -63,16 +56,18 @@ def signal_plots(table: Table, restarts: Sequence[int] = (), metric: bool = Fals
         if found:
             kind: Kind = "steps" if signal in HELD else "line"
             curves = tuple(Series(name, time, values, kind) for name, values in found.items())
-            yield Plot(
-                title, "time [s]", f"{signal} [{unit}]", curves, (*spans, *(moments if simulated else ())), note=note
-            )
+            label = f"{title.lower()} {signal if signal != 'twist' else ''}".strip()
+            shaded = (*spans, *(moments if simulated else ()))
+            yield Plot(title, "time [s]", f"{label} [{unit}]", curves, shaded, note=note)
 
 
-def one_step_errors(table: Table) -> list[Section]:
-    """Return what is left of each encoder one sample ahead; nothing where the table does not have it."""
+def measured_and_fitted(source: ResultDocument, name: str) -> list[Section]:
+    """Return the plots of a file's signals, and what is left of each encoder one sample ahead where the file has it."""
+    table = source.signals(name)
     curves = tuple(Series(label, table["time"], table[name]) for name, label in ERRORS.items() if name in table)
     note = "Measured minus predicted one sample ahead: noise when the model is right."
-    return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)] if curves else []
+    errors = [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)] if curves else []
+    return [*signal_plots(table), *errors]
 
 
 def _words(column: str, signal: str) -> str:

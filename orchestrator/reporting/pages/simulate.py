@@ -21,7 +21,7 @@ def build(source: ResultDocument) -> Report:
     """Return the page."""
     table = source.signals(f"{source.command}.csv")
     results = source.results
-    file = Path(str((source.document.get("arguments") or {}).get("file") or results.get("file") or "")).name
+    file = Path(str(source.arguments.get("file") or results.get("file") or "")).name
     if not table:
         return _page_of_export(source, file) if source.command == "ssp" and file else generic.build(source)
     if "alpha" in results:
@@ -64,7 +64,6 @@ def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[l
             f"The half-gap of {alpha:g} rad is estimated as {_digits(estimate.alpha)} rad "
             f"(interval {_digits(estimate.lower)} to {_digits(estimate.upper)} rad)."
         )
-        facts += [(f"estimate: {name} [rad]", getattr(estimate, name)) for name in ("alpha", "lower", "upper")]
     else:
         summary = f"Two loops, one with a half-gap of {alpha:g} rad. No estimate: {results.no_estimate}."
     time = table["time"]

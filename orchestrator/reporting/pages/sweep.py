@@ -1,7 +1,6 @@
 """The page of ``sweep``: how close the estimates are, and every case."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from orchestrator.errors import ScenarioError
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
@@ -21,6 +20,7 @@ EXPERIMENT_UNITS = {
 MOST_PLOTS = 12
 OWN = frozenset({"alpha", "noise", "repetition"})
 SUMMARIES = frozenset({"last", "min", "max", "mean", "rms"})
+NAMES = {"alpha": "half-gap", "lower": "95 % from", "upper": "to", "error_percent": "error"}
 FIRST = ("case", "alpha", "estimate", "lower", "upper", "error_percent", "noise")
 
 
@@ -35,7 +35,7 @@ def build(source: ResultDocument) -> Report:
     sections: list[Section] = trust_section(results.trust)
     sections += [_cases("Failed cases", failures, UNITS | units, failed)] if failed else []
     if statistics:
-        sections.append(fields_table("Errors by noise level", statistics))
+        sections.append(fields_table("Errors by noise level", statistics, COVERAGE))
     if {"alpha", "noise", "estimate", "lower", "upper", "error_percent"} <= set(table):
         sections += [*_plots(table), *_influences(table, units)]
     else:
@@ -44,7 +44,7 @@ def build(source: ResultDocument) -> Report:
     sections += _provenance(results)
     return Report(
         title="Backlash sweep" if statistics else f"Sweep of {name}" if name else "Sweep",
-        summary=_summary(statistics, total, failed) if statistics else _count(source.document, results),
+        summary=_summary(statistics, total, failed) if statistics else _count(source, results),
         badge=_badge(results.trust, failed, total),
         sections=tuple(sections),
         origin=source.origin(),
@@ -59,10 +59,10 @@ def _badge(trust: TrustFound | None, failed: int, total: int) -> tuple[Badge, st
     return trust_badge(trust, f"all {total} cases done", "good")
 
 
-def _count(document: Mapping[str, Any], results: SweepFound) -> str:
+def _count(source: ResultDocument, results: SweepFound) -> str:
     """Return how many cases are done, over what, and what FMUs had to say."""
     total, failed = results.cases, results.failed
-    varied = ", ".join(str(text) for text in (document.get("arguments") or {}).get("vary") or ())
+    varied = ", ".join(str(text) for text in source.arguments.get("vary") or ())
     remarks = f" {results.remarked} have remarks; the first: {results.first_remark}." if results.remarked else ""
     return f"{total - failed} of {total} cases are done" + (f", over {varied}." if varied else ".") + remarks
 
@@ -192,7 +192,7 @@ def _cases(title: str, table: Columns, units: Mapping[str, str], total: int) -> 
     """Return rows as a table, without the columns that are empty in all of them."""
     names = [n for n in dict.fromkeys((*FIRST, *table)) if n in table and any(v is not None for v in table[n])]
     rows = zip(*(table[n] for n in names), strict=True)
-    columns = tuple(TableColumn(words(n), units.get(n, ""), 6) for n in names)
+    columns = tuple(TableColumn(NAMES.get(n, words(n)), units.get(n, ""), 6) for n in names)
     return ReportTable(title, columns, tuple(_row(names, row) for row in rows), total=total)
 
 
@@ -221,4 +221,5 @@ def _provenance(results: SweepFound) -> list[Section]:
     return made
 
 
+COVERAGE = "Intervals that hold the size: cases whose 95 % interval has the actual half-gap in it; 95 % are due."
 CALIBRATION_NOTE = "The monotone map from S to the half-gap, made from runs that no sweep uses."
