@@ -54,10 +54,10 @@ def rest_facts(f: ForecastFound | None, loop: str) -> tuple[Facts, ...]:
     items: tuple[tuple[str, Cell], ...] = (
         ("phase margin without a gap [rad]", f.phase_margin),
         ("delay margin without a gap [ms]", f.delay_margin and 1e3 * f.delay_margin),
-        ("largest rise of the gain without a gap [dB]", upper),
-        ("largest fall of the gain without a gap [dB]", lower),
-        ("cycles with the gap, without friction and load", f.cycles),
-        ("frequency of the cycle [Hz]", f.frequency or None),
+        ("upper gain margin without a gap [dB]", upper),
+        ("lower gain margin without a gap [dB]", lower),
+        ("limit cycle without friction and load", f.cycles),
+        ("frequency of the limit cycle [Hz]", f.frequency or None),
         ("amplitude of the twist [half-gaps]", f.twist or None),
         ("amplitude of the load [half-gaps]", f.load or None),
     )
