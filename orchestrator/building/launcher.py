@@ -14,7 +14,8 @@ from orchestrator.shared.machine_code import local_compiler
 from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.tool_runs import run_tool
 
-NATIVE = Path(__file__).parent / "native"
+_HERE = Path(__file__).parent
+FILES = (*sorted((_HERE / "native").iterdir()), *(_HERE / "native_fmu" / n for n in ("fmi2_types.h", "slave_types.h")))
 SOURCE = "launcher.c"
 
 
@@ -68,7 +69,7 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
         found = os.stat(compiler)
     except OSError as error:
         raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
-    files = (part for path in sorted(NATIVE.iterdir()) for part in (path.name, path.read_bytes()))
+    files = (part for path in FILES for part in (path.name, path.read_bytes()))
     made_by = f"{toolchain.compiler} {found.st_size} {found.st_mtime_ns} {toolchain.identity}"
     return remember("launcher", (made_by, wrapper, *files), lambda: _compile(toolchain, compiler, wrapper))
 
@@ -76,7 +77,8 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
 def _compile(toolchain: Toolchain, compiler: str, wrapper: str) -> bytes:
     with Scratch("compile") as scratch:
         folder = scratch.path
-        shutil.copytree(NATIVE, folder, dirs_exist_ok=True)
+        for path in FILES:
+            shutil.copy(path, folder)
         library = str(toolchain.libpython) if toolchain.libpython else ""
         command = [
             compiler,

@@ -106,7 +106,7 @@ def plain_c(
     classes = {part.instance: slave_class(part.recipe) for part in parts}
     structs = (
         _struct(f"{name}_Inputs", inputs),
-        _struct(f"{name}_Outputs", {output: _said(classes, source) for output, source in outputs.items()}),
+        _struct(f"{name}_Outputs", {output: _describe_output(classes, source) for output, source in outputs.items()}),
     )
     runtime = (RUNTIME / "translated.h").read_text(encoding="utf-8")
     kinds = KINDS.search(runtime)
@@ -168,7 +168,7 @@ def _run(classes: Mapping[str, Any], part: LoopPart, hooks: Sequence[str]) -> li
     return lines + [f"if (!fault.kind)\n        {cls.__name__}_{hook}(&{instance}, &fault);" for hook in had]
 
 
-def _said(classes: Mapping[str, Any], source: str) -> str:
+def _describe_output(classes: Mapping[str, Any], source: str) -> str:
     instance, _, output = source.rpartition(".")
     variable = next(row for row in classes[instance].table if row.name == output)
     return f"{variable.description} [{variable.unit}]"

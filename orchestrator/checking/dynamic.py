@@ -1,4 +1,4 @@
-"""The dynamic checks: what a child process is asked to run, and how its ending becomes a finding."""
+"""The dynamic checks: what a child process is asked to run, and how its end becomes a finding."""
 
 import contextlib
 import os
@@ -89,7 +89,7 @@ _PROBES: dict[str, probes.Probe] = {
     "reference": probes_reference.reference,
     "memory": probes.memory,
     "promises": probes_promises.promises,
-    "end": probes_life.ending,
+    "end": probes_life.end,
     "silence": probes_life.silence,
     "another start": probes_life.another_start,
     "misuse": probes_misuse.misuse,

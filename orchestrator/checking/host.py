@@ -283,8 +283,7 @@ class Host:
         size = c_size_t(len(buffer))
         return self._status(function, component, numbers, c_size_t(len(references)), buffer, size)
 
-    def call(self, instance: int, function: str, arguments: Sequence[Sequence[Any]]) -> Returned:
-        """Call a function."""
+    def _call(self, instance: int, function: str, arguments: Sequence[Sequence[Any]]) -> Returned:
         self._messages, self._errors, self._function, self._left = [], 0, function, ""
         made = [self._argument(*a) for a in arguments]
         values = [value for group, _ in made for value in group]
@@ -292,16 +291,17 @@ class Host:
         found = [read() for _, read in made if read is not None]
         return Returned(status, found, self._messages, self._errors, self._left)
 
-    def call_in_thread(self, instance: int, function: str, arguments: Sequence[Sequence[Any]]) -> Returned:
-        """Call a function in a thread of its own, which has ended then."""
-        with ThreadPoolExecutor(1) as thread:
-            return thread.submit(self.call, instance, function, arguments).result()
-
-    def calls(self, instance: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]) -> list[Returned]:
-        """Call several functions, up to the first that fails; return what ``call`` does of each."""
-        done = []
-        for function, arguments in requests:
-            done.append(self.call(instance, function, arguments))
+    def call(
+        self, instance: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]], threaded: bool
+    ) -> list[Returned]:
+        """Call functions, up to the first that fails; each in a thread of its own, which has ended then, if asked."""
+        done: list[Returned] = []
+        for request in requests:
+            if threaded:
+                with ThreadPoolExecutor(1) as thread:
+                    done.append(thread.submit(self._call, instance, *request).result())
+            else:
+                done.append(self._call(instance, *request))
             if done[-1].status not in (0, 1):
                 break
         return done

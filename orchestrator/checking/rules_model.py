@@ -201,7 +201,7 @@ def _display_units(d: Description) -> Iterator[Finding]:
             if right is None or not stated.factor or stated.is_close(right):
                 continue
             what = f"`{inner.get('name')}` of the unit `{name}`"
-            if stated.turned_round().is_close(right):
+            if stated.reverse().is_close(right):
                 turned.append((inner, f"{what} has {stated} where {right} is right"))
             else:
                 message = f"DisplayUnit {what} must have {right} to be what the names say, but has {stated}"

@@ -5,39 +5,25 @@ import math
 from collections.abc import Callable, Sequence
 from ctypes import c_double, c_size_t
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from orchestrator.errors import SlaveError
-from orchestrator.fmi.events_alone import EventsAlone
-from orchestrator.fmi.instance_clocks import ClockedSlave, InstanceClocks, next_event
+from orchestrator.fmi.instance_clocks import ClockedSlave
 from orchestrator.fmi.intermediate import IntermediateUpdates
 from orchestrator.fmi.messages import ERROR
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave3 import NEAR, TERMINATES, Fmu3Slave
-from orchestrator.master.protocol import EventSlave, EventUpdate, StepOutcome
+from orchestrator.master.protocol import StepOutcome
 
 
-class _State(NamedTuple):
-    """A saved state of the FMU, and what is known here of the time it was saved at."""
-
-    handle: Any
-    next_event: float
-    reached: float | None
-
-
-class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
+class EventFmuSlave(ClockedSlave, Fmu3Slave):
     """See ``FmuSlave`` and ``EventSlave``. Early return is always allowed: without it an FMU passes over its events."""
+
+    LEAVE = "EnterStepMode"
 
     def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
         self._updates = IntermediateUpdates(name)
         super().__init__(name, path, description)
-        self._clocks = InstanceClocks(name, description, self._call)
-        self._in_event_mode = False
-        self._next_event = math.inf
-
-    def _necessary_functions(self) -> list[str]:
-        modes = ["EnterEventMode", "EnterStepMode", "UpdateDiscreteStates"]
-        return [*super()._necessary_functions(), *modes, *InstanceClocks.necessary_functions(self._description)]
 
     def _intermediate(self) -> tuple[Any, Any]:
         if not self.model.inputs_inside_steps:
@@ -46,16 +32,6 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
         return (ctypes.c_uint * len(references))(*references), self._updates.callback
 
     # A run ---------------------------------------------------------------------------------------------------
-
-    def start(self) -> None:
-        super().start()
-        self._in_event_mode = True
-        self._next_event = math.inf
-
-    def reset(self) -> None:
-        super().reset()
-        self._in_event_mode = False
-        self._next_event = math.inf
 
     def step(self, time: float, step: float) -> StepOutcome:
         if self._worst >= ERROR:
@@ -87,26 +63,6 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
             raise SlaveError(f"{self.name}: its clocks ({names}) must be ticked, but this run knows no events")
         super().do_step(time, step)
 
-    def _due(self) -> float:
-        return min(self._next_event, self._clocks.next_time())
-
-    # Event mode ------------------------------------------------------------------------------------------------
-
-    def enter_event_mode(self) -> None:
-        self._call("EnterEventMode")
-        self._in_event_mode = True
-        self._clocks.enter_event_mode(self._reached or 0.0)
-
-    def update_discrete_states(self) -> EventUpdate:
-        again, ends_run, _, self._next_event = self._end_instant()
-        ticks = self._clocks.end_instant(self._reached or 0.0)
-        return EventUpdate(again or ticks, next_event(self._next_event, self._clocks), ends_run)
-
-    def leave_event_mode(self) -> None:
-        self._clocks.leave_event_mode()
-        self._call("EnterStepMode")
-        self._in_event_mode = False
-
     # Values ------------------------------------------------------------------------------------------------------
 
     def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
@@ -133,15 +89,3 @@ class EventFmuSlave(EventsAlone, ClockedSlave, Fmu3Slave, EventSlave):
             c_size_t(total),
         )
         return [values[firsts[access.reference] + access.element] for access in accesses]
-
-    # Saved states --------------------------------------------------------------------------------------------------
-
-    def get_state(self) -> Any:
-        return _State(super().get_state(), self._next_event, self._reached)
-
-    def set_state(self, state: Any) -> None:
-        super().set_state(state.handle)
-        self._next_event, self._reached = state.next_event, state.reached
-
-    def free_state(self, state: Any) -> None:
-        super().free_state(state.handle)

@@ -3,7 +3,8 @@
 import ctypes
 import math
 
-from orchestrator.fmi.model_exchange import ExchangeSlave, Instant
+from orchestrator.fmi.event_mode import Instant
+from orchestrator.fmi.model_exchange import ExchangeSlave
 from orchestrator.fmi.slave2 import Fmu2Instance
 
 

@@ -7,10 +7,10 @@ events are asked for by the FMU after steps of the integrator. In between inputs
 import ctypes
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double, c_void_p
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 from orchestrator.errors import SlaveError
 from orchestrator.fmi.addresses import native_calls
 from orchestrator.fmi.equations import Equations
-from orchestrator.fmi.events_alone import EventsAlone
+from orchestrator.fmi.event_mode import EventInstance
 from orchestrator.fmi.integrator import IntegrationError, Integrator
 from orchestrator.fmi.messages import ERROR, OK
 from orchestrator.fmi.model_description import FmuDescription
-from orchestrator.fmi.slave import FmuSlave
-from orchestrator.master.protocol import EventSlave, EventUpdate, NativeCalls, Signals, StepOutcome, Transfer
+from orchestrator.master.protocol import NativeCalls, Signals, StepOutcome, Transfer
 from orchestrator.master.result import RunRemark
 
 TOLERANCE = 1e-8
@@ -35,27 +34,10 @@ MOST_STATES = 1_000_000
 _STEP = ctypes.CFUNCTYPE(ctypes.c_int, c_void_p, c_double, c_double, ctypes.c_int)
 
 
-class Instant(NamedTuple):
-    """What the FMU said at an instant in event mode."""
-
-    again: bool
-    ends: bool
-    rescaled: bool
-    next_event: float  # s; infinity for none
-
-
-class _State(NamedTuple):
-    """A saved state of the FMU, and what is known here of the time it was saved at."""
-
-    handle: Any
-    next_event: float
-    reached: float | None
-    signs: NDArray[np.float64]
-
-
-class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
+class ExchangeSlave(EventInstance):
     """See ``EventSlave``."""
 
+    LEAVE = "EnterContinuousTimeMode"
     RATES: str  # the function that gives the derivatives of the states, without its prefix
     FLAG: Any  # type of a truth value in C
 
@@ -63,20 +45,14 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         super().__init__(name, path, description)
         self._equations = Equations(self._library, self._component, self.PREFIX, self.RATES, self._check)
         self._integrator = Integrator(self._equations)
-        self._forget()
-        self._rescaled, self._nominals = True, np.empty(0)
+        self._goes_on = False  # the integrator may take up where it left off
+        self._nominals = np.empty(0)
         self._useless_nominals: dict[str, int] = {}  # how many, by what is said of them
         self._failure: BaseException | None = None  # of a step that was done from machine code
         self._native: Any = None
         inputs = [v.name for v in self.model.variables.values() if v.causality == "input" and v.type != "String"]
         self._discrete = [name for name in inputs if name not in description.inputs]
         self._watch(inputs)
-
-    def _forget(self) -> None:
-        """Be as new."""
-        self._in_event_mode = True
-        self._goes_on = False  # the integrator may take up where it left off
-        self._next_event = math.inf
 
     def _watch(self, names: Sequence[str]) -> None:
         """Let the integrator begin anew where these have changed."""
@@ -86,10 +62,8 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
     # A run ---------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Exit initialisation mode, into event mode."""
         super().start()
-        self._forget()
-        self._rescaled = True
+        self._goes_on, self._rescaled = False, True
         counts = self._counts()
         if max(counts) > MOST_STATES:
             text = f"must have at most {MOST_STATES:,} continuous states and event indicators, but says that it has"
@@ -103,10 +77,7 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
 
     def reset(self) -> None:
         super().reset()
-        self._forget()
-
-    def _due(self) -> float:
-        return self._next_event
+        self._goes_on = False
 
     def step(self, time: float, step: float) -> StepOutcome:
         end = time + step
@@ -178,8 +149,8 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
     # Event mode ------------------------------------------------------------------------------------------------
 
     def enter_event_mode(self) -> None:
-        self._call("EnterEventMode")
-        self._in_event_mode, self._goes_on = True, False
+        super().enter_event_mode()
+        self._goes_on = False
 
     def tick(self, clocks: Sequence[str]) -> None:
         """Refuse, for FMI 2.0 knows no clocks."""
@@ -189,19 +160,8 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         """Return none."""
         return frozenset()
 
-    def update_discrete_states(self) -> EventUpdate:
-        found = self._update()
-        self._next_event, self._rescaled = found.next_event, self._rescaled or found.rescaled
-        coming = found.next_event if math.isfinite(found.next_event) else None
-        return EventUpdate(found.again, coming, found.ends)
-
-    @abstractmethod
-    def _update(self) -> Instant:
-        """End an instant."""
-
     def leave_event_mode(self) -> None:
-        self._call("EnterContinuousTimeMode")
-        self._in_event_mode = False
+        super().leave_event_mode()
         self._integrator.signs = self._equations.read_signs()
 
     # Values ------------------------------------------------------------------------------------------------------
@@ -240,18 +200,12 @@ class ExchangeSlave(EventsAlone, FmuSlave, EventSlave):
         """Refuse, for derivatives of outputs are not known."""
         raise SlaveError(f"{self.name}: derivatives of {', '.join(names)} must be known, but are not")
 
-    # Saved states --------------------------------------------------------------------------------------------------
+    def _moment(self) -> dict[str, Any]:
+        return {**super()._moment(), "signs": self._integrator.signs}
 
-    def get_state(self) -> Any:
-        return _State(super().get_state(), self._next_event, self._reached, self._integrator.signs)
-
-    def set_state(self, state: Any) -> None:
-        super().set_state(state.handle)
-        self._next_event, self._reached, self._goes_on = state.next_event, state.reached, False
-        self._integrator.signs = state.signs
-
-    def free_state(self, state: Any) -> None:
-        super().free_state(state.handle)
+    def _return_to(self, moment: Mapping[str, Any]) -> None:
+        super()._return_to(moment)
+        self._goes_on, self._integrator.signs = False, moment["signs"]
 
     # The compiled loops ------------------------------------------------------------------------------------------
 

@@ -38,7 +38,7 @@ class PythonModules:
 
     def __init__(self, folder: Path) -> None:
         self._folder = os.path.realpath(folder)
-        self._offered = _offered_names(folder)
+        self._offered = _names_of_modules(folder)
         self._modules: dict[str, ModuleType] = {}
         self._paths: list[str] = []
         self._placed = False
@@ -108,7 +108,7 @@ def _top(name: str) -> str:
     return name.partition(".")[0]
 
 
-def _offered_names(folder: Path) -> frozenset[str]:
+def _names_of_modules(folder: Path) -> frozenset[str]:
     """Return the names of modules and packages in a folder, but those of packages with machine code.
 
     The latter, such as a copy of NumPy, can be loaded once per process: what this process has of them is shared.

@@ -72,13 +72,7 @@ class _Host:
         self.send(number, values)  # variables of clocks keep their values between ticks
         return self._transfers[number][1]
 
-    def do_step(self, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
-        return self._advance("do_step", time, step)
-
-    def step(self, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
-        return self._advance("step", time, step)
-
-    def _advance(self, method: str, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
+    def advance(self, method: str, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
         try:
             return getattr(self._slave, method)(time, step), None
         except StepDiscardedError as error:
@@ -94,6 +88,15 @@ class _Host:
 
     def free_state(self, number: int) -> None:
         self._slave.free_state(self._states.pop(number))
+
+
+def _remote(method: str, answer: type = NOTHING) -> Callable[..., Any]:
+    """Return a method of a slave that its process carries out."""
+
+    def ask(slave: "RemoteSlave", *arguments: Any) -> Any:
+        return slave._ask(answer, method, *arguments)
+
+    return ask
 
 
 class RemoteSlave(Slave):
@@ -141,38 +144,21 @@ class RemoteSlave(Slave):
 
         return receive
 
-    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        self._ask(NOTHING, "begin", start, stop, tolerance)
-
-    def start(self) -> None:
-        self._ask(NOTHING, "start")
+    begin, start, terminate, reset = map(_remote, ("begin", "start", "terminate", "reset"))
+    get_state = _remote("get_state", int)
+    set_state, free_state = map(_remote, ("set_state", "free_state"))
 
     def do_step(self, time: float, step: float) -> None:
         self._advance("do_step", time, step)
 
     def _advance(self, method: str, time: float, step: float) -> StepOutcome | None:
         """Do a step; return its outcome, where it has one."""
-        outcome, undone = self._ask(tuple[StepOutcome | None, Undone | None], method, time, step)
+        outcome, undone = self._ask(tuple[StepOutcome | None, Undone | None], "advance", method, time, step)
         if undone is None:
             return outcome
         if undone.how:
             raise RunEndedError(undone.text, self.name, undone.time, undone.how)
         raise StepDiscardedError(undone.text, self.name, undone.time, undone.reached)
-
-    def get_state(self) -> int:
-        return self._ask(int, "get_state")
-
-    def set_state(self, state: int) -> None:
-        self._ask(NOTHING, "set_state", state)
-
-    def free_state(self, state: int) -> None:
-        self._ask(NOTHING, "free_state", state)
-
-    def terminate(self) -> None:
-        self._ask(NOTHING, "terminate")
-
-    def reset(self) -> None:
-        self._ask(NOTHING, "reset")
 
     def take_remarks(self) -> list[RunRemark]:
         """Return warnings since this was last asked."""
@@ -191,20 +177,12 @@ class EventRemoteSlave(RemoteSlave, EventSlave):
             raise SlaveError(f"{self.name}: its process must say how a step went, but does not")
         return outcome
 
-    def enter_event_mode(self) -> None:
-        self._ask(NOTHING, "enter_event_mode")
+    enter_event_mode, leave_event_mode = map(_remote, ("enter_event_mode", "leave_event_mode"))
+    update_discrete_states = _remote("update_discrete_states", EventUpdate)
+    active_clocks = _remote("active_clocks", frozenset[str])
 
     def tick(self, clocks: Sequence[str]) -> None:
         self._ask(NOTHING, "tick", list(clocks))
-
-    def active_clocks(self) -> frozenset[str]:
-        return self._ask(frozenset[str], "active_clocks")
-
-    def update_discrete_states(self) -> EventUpdate:
-        return self._ask(EventUpdate, "update_discrete_states")
-
-    def leave_event_mode(self) -> None:
-        self._ask(NOTHING, "leave_event_mode")
 
     def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
         if values is not None:

@@ -279,15 +279,23 @@ class FmuSlave(Slave):
     def get_state(self) -> Any:
         state = ctypes.c_void_p()
         self._call(f"Get{self.STATE}", ctypes.byref(state))
-        return state
+        return state, self._moment()
 
     def set_state(self, state: Any) -> None:
-        self._call(f"Set{self.STATE}", state)
+        self._call(f"Set{self.STATE}", state[0])
+        self._return_to(state[1])
 
     def free_state(self, state: Any) -> None:
         """Give a handle back; after a failure it is left to the FMU."""
         if not self._closed and self._worst < ERROR:
-            self._call(f"Free{self.STATE}", ctypes.byref(state))
+            self._call(f"Free{self.STATE}", ctypes.byref(state[0]))
+
+    def _moment(self) -> dict[str, Any]:
+        """Return what is known here of the time that a state is saved at, beside the FMU's state."""
+        return {}
+
+    def _return_to(self, moment: Mapping[str, Any]) -> None:
+        """Take up again what was known when a state was saved."""
 
     def terminate(self) -> None:
         self._call("Terminate")

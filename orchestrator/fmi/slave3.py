@@ -55,18 +55,6 @@ class Fmu3Instance(FmuSlave):
         super().reset()
         self._configure()
 
-    def _end_instant(self) -> tuple[bool, bool, bool, float]:
-        """End an instant in event mode.
-
-        Returns:
-            Whether another one is needed, the end of the run is asked for, and nominal values of states have changed;
-            and the time of the next event [s], infinity for none.
-        """
-        flags, time = (c_bool * 5)(), c_double()  # again, end, nominals, values, next event
-        first = ctypes.addressof(flags)
-        self._call("UpdateDiscreteStates", *(c_void_p(first + k) for k in range(5)), ctypes.byref(time))
-        return flags[0], flags[1], flags[2], self._require_time(time.value) if flags[4] else math.inf
-
     def _instantiate(self) -> tuple[Any, c_void_p]:
         folder, description = extract_fmu(self.path), self._description
         path = library_of(self.name, self.path, folder, description.identifier, description.version)

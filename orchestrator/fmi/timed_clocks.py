@@ -2,19 +2,12 @@
 
 import ctypes
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from orchestrator.errors import SlaveError
 
 NOT_YET_KNOWN, UNCHANGED, CHANGED = range(3)  # fmi3IntervalQualifier
-
-
-class Call(Protocol):
-    """Calls a function of the FMU, named without its prefix, and raises where it fails."""
-
-    def __call__(self, function: str, *arguments: object) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -36,41 +29,45 @@ class TimedClocks:
     Args:
         instance: its name, for messages.
         clocks: value reference and kind (``fixed``, ``tunable``, ``changing`` or ``countdown``) by name.
+        call: calls a function of the FMU, named without its prefix, and raises where it fails.
+
+    Attributes:
+        ticks: the next one of each clock, by value reference; what a saved state has to keep.
     """
 
-    def __init__(self, instance: str, clocks: Mapping[str, tuple[int, str]], call: Call) -> None:
+    def __init__(self, instance: str, clocks: Mapping[str, tuple[int, str]], call: Callable[..., None]) -> None:
         self._instance = instance
         self._kinds = dict(clocks.values())
         self._names = {reference: name for name, (reference, _) in clocks.items()}
         self._call = call
-        self._ticks: dict[int, _Tick] = {}
+        self.ticks: dict[int, _Tick] = {}
 
     def begin(self, start: float) -> None:
         """Ask for the first ticks, at the end of initialisation, of a run from ``start`` [s]."""
-        self._ticks = {}
+        self.ticks = {}
         for reference, kind in self._kinds.items():
             interval, qualifier = self._interval(reference)
             if kind in {"fixed", "tunable"}:
-                self._ticks[reference] = _Tick(start + self._shift(reference), interval)
+                self.ticks[reference] = _Tick(start + self._shift(reference), interval)
             elif qualifier != NOT_YET_KNOWN:
-                self._ticks[reference] = _Tick(start + interval, interval)
+                self.ticks[reference] = _Tick(start + interval, interval)
 
     def next_time(self) -> float:
         """Return when the next clock ticks [s]; infinity for none."""
-        return min((tick.time for tick in self._ticks.values()), default=math.inf)
+        return min((tick.time for tick in self.ticks.values()), default=math.inf)
 
     def take(self, time: float) -> list[int]:
         """Return the clocks that tick at ``time`` [s], and forget that they do."""
         near = time + 1e-12 * max(1.0, abs(time))
-        due = [reference for reference, tick in self._ticks.items() if tick.time <= near]
+        due = [reference for reference, tick in self.ticks.items() if tick.time <= near]
         for reference in due:
-            tick = self._ticks[reference]
+            tick = self.ticks[reference]
             if self._kinds[reference] in {"fixed", "tunable"}:
-                self._ticks[reference] = replace(tick, count=tick.count + 1)
+                self.ticks[reference] = replace(tick, count=tick.count + 1)
             elif self._kinds[reference] == "changing":  # as before, unless the FMU says another interval
-                self._ticks[reference] = _Tick(time + tick.interval, tick.interval)
+                self.ticks[reference] = _Tick(time + tick.interval, tick.interval)
             else:
-                del self._ticks[reference]
+                del self.ticks[reference]
         return due
 
     def ask(self, time: float, ticked: Sequence[int]) -> None:
@@ -79,15 +76,7 @@ class TimedClocks:
             if kind == "countdown" or (kind == "changing" and reference in ticked):
                 interval, qualifier = self._interval(reference)
                 if qualifier == CHANGED:
-                    self._ticks[reference] = _Tick(time + interval, interval)
-
-    def state(self) -> dict[int, object]:
-        """Return what belongs to a saved state."""
-        return dict(self._ticks)
-
-    def restore(self, saved: Mapping[int, object]) -> None:
-        """Return to a saved state."""
-        self._ticks = {reference: tick for reference, tick in saved.items() if isinstance(tick, _Tick)}
+                    self.ticks[reference] = _Tick(time + interval, interval)
 
     def _interval(self, reference: int) -> tuple[float, int]:
         interval, qualifier = ctypes.c_double(math.inf), ctypes.c_int(NOT_YET_KNOWN)

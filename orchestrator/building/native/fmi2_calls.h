@@ -1,24 +1,9 @@
-/* What the launcher must know of FMI 2.0: types, and one line for each function that it only hands on. */
+/* What the launcher must know of FMI 2.0: one line for each function that it only hands on. */
 
 #ifndef FMI2_CALLS_H
 #define FMI2_CALLS_H
 
-#include <stddef.h>
-
-/* FMI 2.0 types, as in fmi2TypesPlatform.h and fmi2FunctionTypes.h. */
-typedef void *Component;
-typedef void *State;
-typedef unsigned int Reference;
-typedef int Boolean;
-typedef enum { OK, WARNING, DISCARD, ERROR, FATAL, PENDING } Status;
-typedef void (*Logger)(void *environment, const char *instance, Status status, const char *category, const char *message, ...);
-typedef struct {
-    Logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void (*finished)(void *, Status);
-    void *environment;
-} Callbacks;
+#include "fmi2_types.h"
 
 #define VALUES (n == 0 || (r && v))
 /* X(function, parameters, arguments, what must hold of the pointers) */
@@ -38,11 +23,11 @@ typedef struct {
     X(fmi2SetBoolean, (Component c, const Reference r[], size_t n, const Boolean v[]), (s->inner, r, n, v), VALUES) \
     X(fmi2SetString, (Component c, const Reference r[], size_t n, const char *const v[]), \
       (s->inner, r, n, v), VALUES && all_there(v, n)) \
-    X(fmi2GetFMUstate, (Component c, State *x), (s->inner, x), x) \
-    X(fmi2SetFMUstate, (Component c, State x), (s->inner, x), x) \
-    X(fmi2SerializedFMUstateSize, (Component c, State x, size_t *n), (s->inner, x, n), x && n) \
-    X(fmi2SerializeFMUstate, (Component c, State x, char b[], size_t n), (s->inner, x, b, n), x && b) \
-    X(fmi2DeSerializeFMUstate, (Component c, const char b[], size_t n, State *x), (s->inner, b, n, x), b && x) \
+    X(fmi2GetFMUstate, (Component c, FmuState *x), (s->inner, x), x) \
+    X(fmi2SetFMUstate, (Component c, FmuState x), (s->inner, x), x) \
+    X(fmi2SerializedFMUstateSize, (Component c, FmuState x, size_t *n), (s->inner, x, n), x && n) \
+    X(fmi2SerializeFMUstate, (Component c, FmuState x, char b[], size_t n), (s->inner, x, b, n), x && b) \
+    X(fmi2DeSerializeFMUstate, (Component c, const char b[], size_t n, FmuState *x), (s->inner, b, n, x), b && x) \
     X(fmi2GetDirectionalDerivative, \
       (Component c, const Reference u[], size_t n, const Reference k[], size_t m, const double dk[], double du[]), \
       (s->inner, u, n, k, m, dk, du), 1) \

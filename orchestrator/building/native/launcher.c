@@ -29,14 +29,13 @@
 #ifndef WRAPPER
 #define WRAPPER "libpythonfmu-export.so"
 #endif
-#define EXPORT __attribute__((visibility("default")))
 
 #define TABLE_ENTRY(name, parameters, arguments, condition) Status(*name) parameters;
 static struct {
     FORWARDED(TABLE_ENTRY)
     Component (*fmi2Instantiate)(const char *, int, const char *, const char *, const Callbacks *, Boolean, Boolean);
     void (*fmi2FreeInstance)(Component);
-    Status (*fmi2FreeFMUstate)(Component, State *);
+    Status (*fmi2FreeFMUstate)(Component, FmuState *);
 } wrapper;
 
 typedef struct {
@@ -50,7 +49,6 @@ typedef struct {
     char **categories;
     char *name;
 } Shell;
-
 
 static int is_wrapper(struct dl_phdr_info *info, size_t size, void *found) {
     (void)size;
@@ -277,7 +275,7 @@ static int all_there(const char *const texts[], size_t n) {
     }
 FORWARDED(FORWARD)
 
-EXPORT Status fmi2FreeFMUstate(Component c, State *x) {
+EXPORT Status fmi2FreeFMUstate(Component c, FmuState *x) {
     Shell *s = c;
     if (!s)
         return ERROR;

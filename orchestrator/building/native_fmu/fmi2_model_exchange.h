@@ -11,11 +11,14 @@ typedef struct {
     double next_event_time;
 } EventInfo;
 
-EXPORT Status FMI(fmi2EnterEventMode)(Component c)
-{
-    ENTER_EXCHANGE(fmi2EnterEventMode, 1)
-    return s->worst;
-}
+#define EXCHANGE_CALL(name, parameters, condition, status) \
+    EXPORT Status FMI(name) parameters \
+    { \
+        ENTER_EXCHANGE(name, condition) \
+        return status; \
+    }
+
+EXCHANGE_CALL(fmi2EnterEventMode, (Component c), 1, s->worst)
 
 EXPORT Status FMI(fmi2NewDiscreteStates)(Component c, EventInfo *info)
 {
@@ -27,11 +30,7 @@ EXPORT Status FMI(fmi2NewDiscreteStates)(Component c, EventInfo *info)
     return s->worst;
 }
 
-EXPORT Status FMI(fmi2EnterContinuousTimeMode)(Component c)
-{
-    ENTER_EXCHANGE(fmi2EnterContinuousTimeMode, 1)
-    return s->worst;
-}
+EXCHANGE_CALL(fmi2EnterContinuousTimeMode, (Component c), 1, s->worst)
 
 EXPORT Status FMI(fmi2CompletedIntegratorStep)(Component c, Boolean no_return, Boolean *enter_event_mode, Boolean *end)
 {
@@ -44,41 +43,14 @@ EXPORT Status FMI(fmi2CompletedIntegratorStep)(Component c, Boolean no_return, B
     return s->worst;
 }
 
-EXPORT Status FMI(fmi2SetTime)(Component c, double time)
-{
-    ENTER_EXCHANGE(fmi2SetTime, 1)
-    s->course.time = time;
-    return OK;
-}
-
-EXPORT Status FMI(fmi2SetContinuousStates)(Component c, const double x[], size_t n)
-{
-    ENTER_EXCHANGE(fmi2SetContinuousStates, x != NULL && n == CONTINUOUS_STATES)
-    return set_states(s, 0, x, CONTINUOUS_STATES);
-}
-
-EXPORT Status FMI(fmi2GetContinuousStates)(Component c, double x[], size_t n)
-{
-    ENTER_EXCHANGE(fmi2GetContinuousStates, x != NULL && n == CONTINUOUS_STATES)
-    memcpy(x, STATES(&s->slave), n * sizeof *x);
-    return OK;
-}
-
-EXPORT Status FMI(fmi2GetNominalsOfContinuousStates)(Component c, double x[], size_t n)
-{
-    ENTER(fmi2GetNominalsOfContinuousStates, x != NULL && n == CONTINUOUS_STATES)
-    memcpy(x, nominals, n * sizeof *x);
-    return OK;
-}
-
-EXPORT Status FMI(fmi2GetDerivatives)(Component c, double derivatives[], size_t n)
-{
-    ENTER_EXCHANGE(fmi2GetDerivatives, derivatives != NULL && n == CONTINUOUS_STATES)
-    return derivatives_of(s, derivatives);
-}
-
-EXPORT Status FMI(fmi2GetEventIndicators)(Component c, double values[], size_t n)
-{
-    ENTER_EXCHANGE(fmi2GetEventIndicators, values != NULL && n == INDICATORS)
-    return indicators_of(s, values);
-}
+EXCHANGE_CALL(fmi2SetTime, (Component c, double time), 1, (s->course.time = time, OK))
+EXCHANGE_CALL(fmi2SetContinuousStates, (Component c, const double x[], size_t n), x != NULL && n == CONTINUOUS_STATES,
+              set_states(s, 0, x, CONTINUOUS_STATES))
+EXCHANGE_CALL(fmi2GetContinuousStates, (Component c, double x[], size_t n), x != NULL && n == CONTINUOUS_STATES,
+              (memcpy(x, STATES(&s->slave), n * sizeof *x), OK))
+CALL(fmi2GetNominalsOfContinuousStates, (Component c, double x[], size_t n), x != NULL && n == CONTINUOUS_STATES,
+     (memcpy(x, nominals, n * sizeof *x), OK))
+EXCHANGE_CALL(fmi2GetDerivatives, (Component c, double x[], size_t n), x != NULL && n == CONTINUOUS_STATES,
+              derivatives_of(s, x))
+EXCHANGE_CALL(fmi2GetEventIndicators, (Component c, double x[], size_t n), x != NULL && n == INDICATORS,
+              indicators_of(s, x))

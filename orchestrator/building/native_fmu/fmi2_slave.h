@@ -47,59 +47,24 @@ EXPORT Component FMI(fmi2Instantiate)(const char *name, int type, const char *gu
 
 EXPORT void FMI(fmi2FreeInstance)(Component c) { free_instance(c); }
 
-EXPORT Status FMI(fmi2SetDebugLogging)(Component c, Boolean on, size_t n, const char *const categories[])
-{
-    ENTER(fmi2SetDebugLogging, 1)
-    set_logging(s, on != 0, n, categories);
-    return OK;
-}
+CALL(fmi2SetDebugLogging, (Component c, Boolean on, size_t n, const char *const categories[]), 1,
+     set_logging(s, on != 0, n, categories))
 
 /* --- Life cycle ------------------------------------------------------------------------------------------------------ */
 
-EXPORT Status FMI(fmi2SetupExperiment)(Component c, Boolean has_tolerance, double tolerance, double start, Boolean has_stop,
-                                       double stop)
-{
-    ENTER(fmi2SetupExperiment, 1)
-    (void)has_tolerance;
-    (void)tolerance;
-    if (expects(s, INSTANTIATED))
-        set_times(s, start, has_stop != 0, stop);
-    return s->worst;
-}
-
-EXPORT Status FMI(fmi2EnterInitializationMode)(Component c)
-{
-    ENTER(fmi2EnterInitializationMode, 1)
-    if (expects(s, INSTANTIATED))
-        enter_initialization(s);
-    return s->worst;
-}
-
-EXPORT Status FMI(fmi2ExitInitializationMode)(Component c)
-{
-    ENTER(fmi2ExitInitializationMode, 1)
-    return exit_initialization(s);
-}
-
-EXPORT Status FMI(fmi2Terminate)(Component c)
-{
-    ENTER(fmi2Terminate, 1)
-    return terminate(s);
-}
-
-EXPORT Status FMI(fmi2Reset)(Component c)
-{
-    ENTER(fmi2Reset, 1)
-    begin_anew(s);
-    return OK;
-}
+CALL(fmi2SetupExperiment,
+     (Component c, Boolean has_tolerance, double tolerance, double start, Boolean has_stop, double stop), 1,
+     ((void)has_tolerance, (void)tolerance, set_times(s, start, has_stop != 0, stop)))
+CALL(fmi2EnterInitializationMode, (Component c), 1, enter_initialization(s))
+CALL(fmi2ExitInitializationMode, (Component c), 1, exit_initialization(s))
+CALL(fmi2Terminate, (Component c), 1, terminate(s))
+CALL(fmi2Reset, (Component c), 1, (begin_anew(s), OK))
 
 EXPORT Status FMI(fmi2DoStep)(Component c, double time, double step, Boolean no_return)
 {
-    Fault fault;
     ENTER(fmi2DoStep, 1)
     (void)no_return;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     if (!may_step(s, time, step))
         return refuse_step(s, time, step);
     advance_slave(s, time, step, &fault);
@@ -120,10 +85,9 @@ static Status refuse_read(Instance *s, const Reference r[], size_t n, bool real,
 
 EXPORT Status FMI(fmi2GetReal)(Component c, const Reference r[], size_t n, double v[])
 {
-    Fault fault;
     bool all = true;
     ENTER(fmi2GetReal, VALUES_GIVEN)
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     recompute(s, &fault);
     for (size_t k = 0; k < n; k++) {
         const bool there = HAS(r[k], REAL_VALUE);
@@ -137,10 +101,9 @@ EXPORT Status FMI(fmi2GetReal)(Component c, const Reference r[], size_t n, doubl
 
 EXPORT Status FMI(fmi2GetInteger)(Component c, const Reference r[], size_t n, int v[])
 {
-    Fault fault;
     bool all = true;
     ENTER(fmi2GetInteger, VALUES_GIVEN)
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     recompute(s, &fault);
     for (size_t k = 0; k < n; k++) {
         const bool there = IS_WHOLE(r[k]);
@@ -168,33 +131,21 @@ EXPORT Status FMI(fmi2SetInteger)(Component c, const Reference r[], size_t n, co
     return s->worst;
 }
 
-EXPORT Status FMI(fmi2GetBoolean)(Component c, const Reference r[], size_t n, Boolean v[])
-{
-    ENTER(fmi2GetBoolean, VALUES_GIVEN)
-    for (size_t k = 0; k < n; k++)
-        v[k] = 0;
-    return refuse_types(s, r, n);
-}
+/* No variable is of that type. */
+#define NO_VALUES(name, type, none) \
+    EXPORT Status FMI(fmi2Get##name)(Component c, const Reference r[], size_t n, type v[]) \
+    { \
+        ENTER(fmi2Get##name, VALUES_GIVEN) \
+        for (size_t k = 0; k < n; k++) \
+            v[k] = none; \
+        return refuse_types(s, r, n); \
+    } \
+    CALL(fmi2Set##name, (Component c, const Reference r[], size_t n, type const v[]), VALUES_GIVEN, refuse_types(s, r, n))
+NO_VALUES(Boolean, Boolean, 0)
+NO_VALUES(String, const char *, "")
 
-EXPORT Status FMI(fmi2GetString)(Component c, const Reference r[], size_t n, const char *v[])
-{
-    ENTER(fmi2GetString, VALUES_GIVEN)
-    for (size_t k = 0; k < n; k++)
-        v[k] = "";
-    return refuse_types(s, r, n);
-}
 
-EXPORT Status FMI(fmi2SetBoolean)(Component c, const Reference r[], size_t n, const Boolean v[])
-{
-    ENTER(fmi2SetBoolean, VALUES_GIVEN)
-    return refuse_types(s, r, n);
-}
 
-EXPORT Status FMI(fmi2SetString)(Component c, const Reference r[], size_t n, const char *const v[])
-{
-    ENTER(fmi2SetString, VALUES_GIVEN)
-    return refuse_types(s, r, n);
-}
 
 /* --- Saved states ------------------------------------------------------------------------------------------------------ */
 
@@ -202,23 +153,16 @@ SAVED_STATE_CALLS(fmi2GetFMUstate, fmi2SetFMUstate, fmi2FreeFMUstate, fmi2Serial
                   fmi2DeSerializeFMUstate, char)
 
 #ifdef DIRECTIONAL
-EXPORT Status FMI(fmi2GetDirectionalDerivative)(Component c, const Reference unknown[], size_t n, const Reference known[],
-                                                size_t m, const double seed[], double sensitivity[])
-{
-    ENTER(fmi2GetDirectionalDerivative, (n == 0 || (unknown && sensitivity)) && (m == 0 || (known && seed)))
-    return directional_derivative(s, unknown, n, known, m, seed, sensitivity);
-}
+CALL(fmi2GetDirectionalDerivative,
+     (Component c, const Reference unknown[], size_t n, const Reference known[], size_t m, const double seed[],
+      double sensitivity[]),
+     (n == 0 || (unknown && sensitivity)) && (m == 0 || (known && seed)),
+     directional_derivative(s, unknown, n, known, m, seed, sensitivity))
 #endif
 
 /* --- Not supported ----------------------------------------------------------------------------------------------------- */
 
-#define UNSUPPORTED(status, function, parameters) \
-    EXPORT Status FMI(function) parameters \
-    { \
-        ENTER(function, 1) \
-        say(s, status, "FMI function not supported: %s", #function); \
-        return s->worst; \
-    }
+#define UNSUPPORTED(status, name, parameters) CALL(name, parameters, 1, refuse_call(s, status))
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic push

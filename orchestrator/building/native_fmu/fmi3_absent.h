@@ -2,25 +2,13 @@
 
 #include "fmi3_modes.h"
 
-#define UNSUPPORTED(call, parameters) \
-    EXPORT Status FMI(call) parameters \
-    { \
-        ENTER(call, 1) \
-        say(s, ERROR, "FMI function not supported: %s", s->function); \
-        return s->worst; \
-    }
+#define UNSUPPORTED(name, parameters) CALL(name, parameters, 1, refuse_call(s, ERROR))
 /* No variable is of that type. */
 #define NO_SUCH_TYPE(name, type) \
-    EXPORT Status FMI(fmi3Get##name)(Component c, const Reference r[], size_t n, type v[], size_t total) \
-    { \
-        ENTER(fmi3Get##name, n == 0 || r) \
-        return refuse_types(s, r, n); \
-    } \
-    EXPORT Status FMI(fmi3Set##name)(Component c, const Reference r[], size_t n, const type v[], size_t total) \
-    { \
-        ENTER(fmi3Set##name, n == 0 || r) \
-        return refuse_types(s, r, n); \
-    }
+    CALL(fmi3Get##name, (Component c, const Reference r[], size_t n, type v[], size_t total), n == 0 || r, \
+         refuse_types(s, r, n)) \
+    CALL(fmi3Set##name, (Component c, const Reference r[], size_t n, const type v[], size_t total), n == 0 || r, \
+         refuse_types(s, r, n))
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic push
@@ -37,18 +25,11 @@ NO_SUCH_TYPE(UInt64, uint64_t)
 NO_SUCH_TYPE(Boolean, bool)
 NO_SUCH_TYPE(String, String)
 
-EXPORT Status FMI(fmi3GetBinary)(Component c, const Reference r[], size_t n, size_t sizes[], const Byte *v[], size_t total)
-{
-    ENTER(fmi3GetBinary, n == 0 || r)
-    return refuse_types(s, r, n);
-}
-
-EXPORT Status FMI(fmi3SetBinary)(Component c, const Reference r[], size_t n, const size_t sizes[], const Byte *const v[],
-                                 size_t total)
-{
-    ENTER(fmi3SetBinary, n == 0 || r)
-    return refuse_types(s, r, n);
-}
+CALL(fmi3GetBinary, (Component c, const Reference r[], size_t n, size_t sizes[], const Byte *v[], size_t total), n == 0 || r,
+     refuse_types(s, r, n))
+CALL(fmi3SetBinary,
+     (Component c, const Reference r[], size_t n, const size_t sizes[], const Byte *const v[], size_t total), n == 0 || r,
+     refuse_types(s, r, n))
 
 UNSUPPORTED(fmi3GetNumberOfVariableDependencies, (Component c, Reference r, size_t *n))
 UNSUPPORTED(fmi3GetVariableDependencies, (Component c, Reference r, size_t of[], Reference by[], size_t elements[],
@@ -71,17 +52,8 @@ UNSUPPORTED(fmi3SetShiftFraction, (Component c, const Reference r[], size_t n, c
 UNSUPPORTED(fmi3EvaluateDiscreteStates, (Component c))
 UNSUPPORTED(fmi3ActivateModelPartition, (Component c, Reference clock, double time))
 #ifndef SAMPLE_TIME
-EXPORT Status FMI(fmi3GetClock)(Component c, const Reference r[], size_t n, bool v[])
-{
-    ENTER(fmi3GetClock, n == 0 || r)
-    return refuse_types(s, r, n);
-}
-
-EXPORT Status FMI(fmi3SetClock)(Component c, const Reference r[], size_t n, const bool v[])
-{
-    ENTER(fmi3SetClock, n == 0 || r)
-    return refuse_types(s, r, n);
-}
+CALL(fmi3GetClock, (Component c, const Reference r[], size_t n, bool v[]), n == 0 || r, refuse_types(s, r, n))
+CALL(fmi3SetClock, (Component c, const Reference r[], size_t n, const bool v[]), n == 0 || r, refuse_types(s, r, n))
 UNSUPPORTED(fmi3GetIntervalDecimal, (Component c, const Reference r[], size_t n, double v[], IntervalQualifier q[]))
 UNSUPPORTED(fmi3GetShiftDecimal, (Component c, const Reference r[], size_t n, double v[]))
 UNSUPPORTED(fmi3SetIntervalDecimal, (Component c, const Reference r[], size_t n, const double v[]))

@@ -62,8 +62,7 @@ static bool may_set_clocked(Instance *s, const Reference r[], size_t n)
 /* End an instant in which the clock ticks. */
 static void end_tick(Instance *s)
 {
-    Fault fault;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     if (!s->course.at_sample)
         return;
     recompute(s, &fault);

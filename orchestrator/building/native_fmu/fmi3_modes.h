@@ -33,8 +33,7 @@ static bool is_type(Instance *s, Type type)
 
 static bool bring_up_to_date(Instance *s)
 {
-    Fault fault;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     recompute(s, &fault);
     concluded(s, &fault);
     return !fault.kind;

@@ -21,21 +21,23 @@ EXPORT Component FMI(fmi3InstantiateCoSimulation)(String name, String token, Str
 {
     const Host host = {log, environment, update, events, early_return, 0.0, 0.0};
     (void)visible;
+    (void)resources;
     (void)required;
     (void)n;
-    return instantiate(name, CO_SIMULATION, token, "instantiationToken", &host, logging, open_slave(resources));
+    return instantiate(name, CO_SIMULATION, token, "instantiationToken", &host, logging, NULL);
 }
 
 EXPORT Component FMI(fmi3InstantiateModelExchange)(String name, String token, String resources, bool visible, bool logging,
                                                    void *environment, LogMessage log)
 {
     const Host host = {log, environment, NULL, true, false, 0.0, 0.0};
-    const char *problem = "this FMU has no model exchange";
+#ifdef CONTINUOUS_STATES
+    const char *const problem = NULL;
+#else
+    const char *const problem = "this FMU has no model exchange";
+#endif
     (void)visible;
     (void)resources;
-#ifdef CONTINUOUS_STATES
-    problem = open_slave(resources);
-#endif
     return instantiate(name, MODEL_EXCHANGE, token, "instantiationToken", &host, logging, problem);
 }
 
@@ -54,28 +56,14 @@ EXPORT Component FMI(fmi3InstantiateScheduledExecution)(String name, String toke
 
 EXPORT void FMI(fmi3FreeInstance)(Component c) { free_instance(c); }
 
-EXPORT Status FMI(fmi3SetDebugLogging)(Component c, bool on, size_t n, const String categories[])
-{
-    ENTER(fmi3SetDebugLogging, n == 0 || categories)
-    set_logging(s, on, n, categories);
-    return OK;
-}
+CALL(fmi3SetDebugLogging, (Component c, bool on, size_t n, const String categories[]), n == 0 || categories,
+     set_logging(s, on, n, categories))
 
 /* --- Life cycle ------------------------------------------------------------------------------------------------------ */
 
-EXPORT Status FMI(fmi3EnterInitializationMode)(Component c, bool has_tolerance, double tolerance, double start,
-                                               bool has_stop, double stop)
-{
-    ENTER(fmi3EnterInitializationMode, 1)
-    (void)has_tolerance;
-    (void)tolerance;
-    if (!expects(s, INSTANTIATED))
-        return s->worst;
-    set_times(s, start, has_stop, stop);
-    if (s->worst == OK)
-        enter_initialization(s);
-    return s->worst;
-}
+CALL(fmi3EnterInitializationMode,
+     (Component c, bool has_tolerance, double tolerance, double start, bool has_stop, double stop), 1,
+     ((void)has_tolerance, (void)tolerance, set_times(s, start, has_stop, stop) == OK ? enter_initialization(s) : s->worst))
 
 EXPORT Status FMI(fmi3ExitInitializationMode)(Component c)
 {
@@ -87,19 +75,8 @@ EXPORT Status FMI(fmi3ExitInitializationMode)(Component c)
     return s->worst;
 }
 
-EXPORT Status FMI(fmi3Terminate)(Component c)
-{
-    ENTER(fmi3Terminate, 1)
-    return terminate(s);
-}
-
-EXPORT Status FMI(fmi3Reset)(Component c)
-{
-    ENTER(fmi3Reset, 1)
-    begin_anew(s);
-    s->host.interval = s->host.shift = 0.0;
-    return OK;
-}
+CALL(fmi3Terminate, (Component c), 1, terminate(s))
+CALL(fmi3Reset, (Component c), 1, (begin_anew(s), s->host.interval = s->host.shift = 0.0, OK))
 
 /* --- Values ------------------------------------------------------------------------------------------------------------ */
 
@@ -130,8 +107,7 @@ static bool fit(Instance *s, const Reference r[], size_t n, size_t total, ValueT
 
 static Status get_reals(Instance *s, const Reference r[], size_t n, double v[], size_t total)
 {
-    Fault fault;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     if (!fit(s, r, n, total, REAL_VALUE))
         return s->worst;
     for (size_t k = 0; k < n; k++) {
@@ -173,10 +149,9 @@ static inline bool within_limits(Reference r, double value)
 
 EXPORT Status FMI(fmi3GetFloat64)(Component c, const Reference r[], size_t n, double v[], size_t total)
 {
-    Fault fault;
     size_t k = 0;
     ENTER(fmi3GetFloat64, VALUES_GIVEN)
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     recompute(s, &fault);
     if (n == total)
         for (; k < n && IS_SCALAR(r[k], READABLE); k++)

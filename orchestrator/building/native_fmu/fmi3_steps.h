@@ -40,30 +40,20 @@ static Status leave_event_mode(Instance *s, Type type)
     return s->worst;
 }
 
-EXPORT Status FMI(fmi3EnterStepMode)(Component c)
-{
-    ENTER(fmi3EnterStepMode, 1)
-    return leave_event_mode(s, CO_SIMULATION);
-}
-
-EXPORT Status FMI(fmi3EnterContinuousTimeMode)(Component c)
-{
-    ENTER(fmi3EnterContinuousTimeMode, 1)
-    return leave_event_mode(s, MODEL_EXCHANGE);
-}
+CALL(fmi3EnterStepMode, (Component c), 1, leave_event_mode(s, CO_SIMULATION))
+CALL(fmi3EnterContinuousTimeMode, (Component c), 1, leave_event_mode(s, MODEL_EXCHANGE))
 
 /* --- Steps ------------------------------------------------------------------------------------------------------------- */
 
 EXPORT Status FMI(fmi3DoStep)(Component c, double time, double step, bool no_return, bool *event, bool *end,
                               bool *early_return, double *reached)
 {
-    Fault fault;
     double taken = step;
     ENTER(fmi3DoStep, event && end && early_return && reached)
     (void)no_return;
     *event = *end = *early_return = false;
     *reached = s->course.time;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     if (!may_step(s, time, step))
         return refuse_step(s, time, step);
     if (s->course.in_event_mode && !in_mode(s, false))
@@ -92,11 +82,10 @@ EXPORT Status FMI(fmi3DoStep)(Component c, double time, double step, bool no_ret
 EXPORT Status FMI(fmi3GetOutputDerivatives)(Component c, const Reference r[], size_t n, const int32_t orders[], double v[],
                                             size_t total)
 {
-    Fault fault;
     double rates[OUTPUT_RATES];
     char text[64];
     ENTER(fmi3GetOutputDerivatives, n == 0 || (r && orders && v))
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     if (!is_type(s, CO_SIMULATION) || !expects(s, STEPPING))
         return s->worst;
     slave_output_rates(&s->slave, rates, &fault);
@@ -119,79 +108,32 @@ EXPORT Status FMI(fmi3GetOutputDerivatives)(Component c, const Reference r[], si
 
 /* --- Model exchange ---------------------------------------------------------------------------------------------------- */
 
-EXPORT Status FMI(fmi3SetTime)(Component c, double time)
-{
-    ENTER(fmi3SetTime, 1)
-    if (is_type(s, MODEL_EXCHANGE) && in_mode(s, false))
-        s->course.time = time;
-    return s->worst;
-}
+CALL(fmi3SetTime, (Component c, double time), 1,
+     is_type(s, MODEL_EXCHANGE) && in_mode(s, false) ? (s->course.time = time, OK) : s->worst)
 
 #ifdef CONTINUOUS_STATES
-/* A call that needs room for so many numbers. */
-#define ENTER_NUMBERS(name, numbers, count) \
-    ENTER(name, numbers != NULL) \
-    if (n != (count)) { \
-        say(s, ERROR, "%s must be given room for %i numbers, but is for %i", s->function, (int64_t)(count), (int64_t)n); \
-        return s->worst; \
-    } \
-    if (!is_type(s, MODEL_EXCHANGE)) \
-        return s->worst;
-
-EXPORT Status FMI(fmi3GetNumberOfContinuousStates)(Component c, size_t *n)
+static bool takes_numbers(Instance *s, size_t n, size_t count)
 {
-    ENTER(fmi3GetNumberOfContinuousStates, n != NULL)
-    *n = CONTINUOUS_STATES;
-    return OK;
+    if (n != count)
+        say(s, ERROR, "%s must be given room for %i numbers, but is for %i", s->function, (int64_t)count, (int64_t)n);
+    return n == count && is_type(s, MODEL_EXCHANGE);
 }
 
-EXPORT Status FMI(fmi3GetNumberOfEventIndicators)(Component c, size_t *n)
-{
-    ENTER(fmi3GetNumberOfEventIndicators, n != NULL)
-    *n = INDICATORS;
-    return OK;
-}
+/* A call of model exchange that needs room for so many numbers. */
+#define NUMBERS_CALL(name, numbers, count, status) \
+    CALL(name, (Component c, numbers, size_t n), x != NULL, takes_numbers(s, n, count) ? status : s->worst)
 
-EXPORT Status FMI(fmi3SetContinuousStates)(Component c, const double x[], size_t n)
-{
-    ENTER_NUMBERS(fmi3SetContinuousStates, x, CONTINUOUS_STATES)
-    return in_mode(s, false) ? set_states(s, 0, x, CONTINUOUS_STATES) : s->worst;
-}
-
-EXPORT Status FMI(fmi3GetContinuousStates)(Component c, double x[], size_t n)
-{
-    Fault fault;
-    ENTER_NUMBERS(fmi3GetContinuousStates, x, CONTINUOUS_STATES)
-    fault.kind = NO_FAULT;
-    recompute(s, &fault);
-    memcpy(x, STATES(&s->slave), n * sizeof *x);
-    return concluded(s, &fault);
-}
-
-EXPORT Status FMI(fmi3GetNominalsOfContinuousStates)(Component c, double x[], size_t n)
-{
-    ENTER_NUMBERS(fmi3GetNominalsOfContinuousStates, x, CONTINUOUS_STATES)
-    memcpy(x, nominals, n * sizeof *x);
-    return OK;
-}
-
-EXPORT Status FMI(fmi3GetContinuousStateDerivatives)(Component c, double derivatives[], size_t n)
-{
-    ENTER_NUMBERS(fmi3GetContinuousStateDerivatives, derivatives, CONTINUOUS_STATES)
-    return bring_up_to_date(s) ? derivatives_of(s, derivatives) : s->worst;
-}
-
-EXPORT Status FMI(fmi3GetEventIndicators)(Component c, double values[], size_t n)
-{
-    ENTER_NUMBERS(fmi3GetEventIndicators, values, INDICATORS)
-    return bring_up_to_date(s) ? indicators_of(s, values) : s->worst;
-}
-
-EXPORT Status FMI(fmi3CompletedIntegratorStep)(Component c, bool no_return, bool *event, bool *end)
-{
-    ENTER(fmi3CompletedIntegratorStep, event && end)
-    (void)no_return;
-    *event = *end = false;
-    return is_type(s, MODEL_EXCHANGE) && in_mode(s, false) ? completed_step(s, event) : s->worst;
-}
+CALL(fmi3GetNumberOfContinuousStates, (Component c, size_t *n), n != NULL, (*n = CONTINUOUS_STATES, OK))
+CALL(fmi3GetNumberOfEventIndicators, (Component c, size_t *n), n != NULL, (*n = INDICATORS, OK))
+NUMBERS_CALL(fmi3SetContinuousStates, const double x[], CONTINUOUS_STATES,
+             in_mode(s, false) ? set_states(s, 0, x, CONTINUOUS_STATES) : s->worst)
+NUMBERS_CALL(fmi3GetContinuousStates, double x[], CONTINUOUS_STATES,
+             (bring_up_to_date(s), memcpy(x, STATES(&s->slave), n * sizeof *x), s->worst))
+NUMBERS_CALL(fmi3GetNominalsOfContinuousStates, double x[], CONTINUOUS_STATES, (memcpy(x, nominals, n * sizeof *x), OK))
+NUMBERS_CALL(fmi3GetContinuousStateDerivatives, double x[], CONTINUOUS_STATES,
+             bring_up_to_date(s) ? derivatives_of(s, x) : s->worst)
+NUMBERS_CALL(fmi3GetEventIndicators, double x[], INDICATORS, bring_up_to_date(s) ? indicators_of(s, x) : s->worst)
+CALL(fmi3CompletedIntegratorStep, (Component c, bool no_return, bool *event, bool *end), event && end,
+     ((void)no_return, *event = *end = false,
+      is_type(s, MODEL_EXCHANGE) && in_mode(s, false) ? completed_step(s, event) : s->worst))
 #endif

@@ -40,13 +40,6 @@ typedef struct {
     SLAVE slave;
 } Instance;
 
-/* Native slaves have all their state in their memory. */
-#ifndef HIDDEN_TEXT
-#define clear_slave(slave) memset((slave), 0, sizeof *(slave))
-#define release_slave(slave) ((void)(slave))
-#define open_slave(resources) ((void)(resources), (const char *)NULL)
-#endif
-
 static const char *const phase_names[] = {"before initialization", "in initialization mode", "in step mode",
                                           "after termination"};
 
@@ -117,6 +110,11 @@ static bool expects(Instance *s, Phase phase)
     return false;
 }
 
+/* A fault that nothing has raised yet; its message stays unset. */
+#define NEW_FAULT(fault) \
+    Fault fault; \
+    fault.kind = NO_FAULT
+
 /* Every call starts here: a null instance is an error, and so are null pointers where values are promised. */
 #define ENTER(name, condition) \
     Instance *s = c; \
@@ -128,6 +126,20 @@ static bool expects(Instance *s, Phase phase)
         say(s, ERROR, "%s must not be given null pointers", s->function); \
         return ERROR; \
     }
+
+/* A call that is one expression, its status. */
+#define CALL(name, parameters, condition, status) \
+    EXPORT Status FMI(name) parameters \
+    { \
+        ENTER(name, condition) \
+        return status; \
+    }
+
+static Status refuse_call(Instance *s, Status status)
+{
+    say(s, status, "FMI function not supported: %s", s->function);
+    return s->worst;
+}
 
 /* --- The slave ----------------------------------------------------------------------------------------------------- */
 
@@ -212,7 +224,7 @@ static void begin_anew(Instance *s)
 {
     const int32_t type = s->course.type;
     memset(&s->course, 0, sizeof s->course);
-    clear_slave(&s->slave);
+    memset(&s->slave, 0, sizeof s->slave);
     s->course.stop = LARGEST_REAL;
     s->course.type = type;
     s->fresh = s->warned = false;
@@ -246,7 +258,6 @@ static void free_instance(Instance *s)
     if (!s)
         return;
     forget_categories(s);
-    release_slave(&s->slave);
     free(s->name);
     free(s);
 }
@@ -279,7 +290,7 @@ static Instance *instantiate(const char *name, Type type, const char *token, con
     return s;
 }
 
-static void set_logging(Instance *s, bool on, size_t n, const char *const categories[])
+static Status set_logging(Instance *s, bool on, size_t n, const char *const categories[])
 {
     forget_categories(s);
     s->logging = on;
@@ -287,32 +298,38 @@ static void set_logging(Instance *s, bool on, size_t n, const char *const catego
     for (size_t k = 0; s->categories && k < n; k++)
         if (categories[k] && (s->categories[s->category_count] = copied(categories[k])) != NULL)
             s->category_count++;
+    return OK;
 }
 
 /* --- Life cycle ------------------------------------------------------------------------------------------------------ */
 
-static void set_times(Instance *s, double start, bool has_stop, double stop)
+static Status set_times(Instance *s, double start, bool has_stop, double stop)
 {
+    if (!expects(s, INSTANTIATED))
+        return s->worst;
     if (!has_stop)
         stop = LARGEST_REAL;
     if (!(-LARGEST_REAL <= start && start <= LARGEST_REAL && start <= stop)) {
         say(s, ERROR, "start time must be finite and before %r, but is %r; ignored", stop, start);
-        return;
+        return s->worst;
     }
     s->course.start_time = s->course.time = start;
     s->course.stop = stop;
+    return OK;
 }
 
-static void enter_initialization(Instance *s)
+static Status enter_initialization(Instance *s)
 {
-    s->course.phase = INITIALIZING;
-    s->fresh = false;
+    if (expects(s, INSTANTIATED)) {
+        s->course.phase = INITIALIZING;
+        s->fresh = false;
+    }
+    return s->worst;
 }
 
 static Status exit_initialization(Instance *s)
 {
-    Fault fault;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     if (!expects(s, INITIALIZING))
         return s->worst;
     initialise(s, &fault);

@@ -13,9 +13,8 @@
 /* Settle state and mode; the slave does it by itself: one call is enough. Tell whether states have jumped. */
 static Status update_slave(Instance *s, bool *jumped)
 {
-    Fault fault;
     double before[CONTINUOUS_STATES];
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     memcpy(before, STATES(&s->slave), sizeof before);
     slave_update(&s->slave, s->course.time, &fault);
     *jumped = memcmp(before, STATES(&s->slave), sizeof before) != 0;
@@ -25,8 +24,7 @@ static Status update_slave(Instance *s, bool *jumped)
 
 static Status indicators_of(Instance *s, double values[])
 {
-    Fault fault;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     slave_indicators(&s->slave, values, &fault);
     return concluded(s, &fault);
 }
@@ -45,8 +43,7 @@ static Status completed_step(Instance *s, bool *event)
 
 static Status derivatives_of(Instance *s, double derivatives[])
 {
-    Fault fault;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     slave_derivatives(&s->slave, derivatives, &fault);
     return concluded(s, &fault);
 }

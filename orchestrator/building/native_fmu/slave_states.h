@@ -1,8 +1,7 @@
 /* Saved states and directional derivatives; a part of slave_core.h.
  *
  * A handle leads to a size and so many bytes: those are what is serialised. They are a header, the slave's fixed part,
- * then each list as its length and its items. A slave whose hidden state is not in its memory gives it as a text
- * (HIDDEN_TEXT: slave_hidden, slave_take_hidden), which stands last. */
+ * then each list as its length and its items. */
 
 typedef struct {
     char guid[40];
@@ -27,8 +26,7 @@ static size_t saved_size(const Instance *s)
 
 static Status save_state(Instance *s, void **x)
 {
-    Fault fault;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     recompute(s, &fault);
     if (fault.kind)
         return concluded(s, &fault);
@@ -173,8 +171,7 @@ static Status directional_derivative(Instance *s, const Reference unknown[], siz
 {
     double seeds[VARIABLES] = {0.0}, found[VARIABLES];
     char text[64];
-    Fault fault;
-    fault.kind = NO_FAULT;
+    NEW_FAULT(fault);
     if (s->course.phase != INITIALIZING && s->course.phase != STEPPING) {
         say(s, ERROR, "%s must not be called %s", s->function, mode_name(s));
         return s->worst;
@@ -203,16 +200,10 @@ static Status directional_derivative(Instance *s, const Reference unknown[], siz
 #endif
 
 /* The calls of a version of FMI for saved states, by their names there, whose bytes are of its type. */
-#define SAVED_STATE_CALL(name, parameters, condition, result) \
-    EXPORT Status FMI(name) parameters \
-    { \
-        ENTER(name, condition) \
-        return result; \
-    }
 #define SAVED_STATE_CALLS(get, set, release, size, serialise, restore, Bytes) \
-    SAVED_STATE_CALL(get, (Component c, FmuState *x), x != NULL, save_state(s, x)) \
-    SAVED_STATE_CALL(set, (Component c, FmuState x), x != NULL, restore_state(s, x)) \
-    SAVED_STATE_CALL(release, (Component c, FmuState *x), 1, free_state(x)) \
-    SAVED_STATE_CALL(size, (Component c, FmuState x, size_t *n), x != NULL && n != NULL, serialised_size(x, n)) \
-    SAVED_STATE_CALL(serialise, (Component c, FmuState x, Bytes bytes[], size_t n), x != NULL && bytes != NULL, serialise_state(s, x, (char *)bytes, n)) \
-    SAVED_STATE_CALL(restore, (Component c, const Bytes bytes[], size_t n, FmuState *x), bytes != NULL && x != NULL, deserialise_state(s, (const char *)bytes, n, x))
+    CALL(get, (Component c, FmuState *x), x != NULL, save_state(s, x)) \
+    CALL(set, (Component c, FmuState x), x != NULL, restore_state(s, x)) \
+    CALL(release, (Component c, FmuState *x), 1, free_state(x)) \
+    CALL(size, (Component c, FmuState x, size_t *n), x != NULL && n != NULL, serialised_size(x, n)) \
+    CALL(serialise, (Component c, FmuState x, Bytes bytes[], size_t n), x != NULL && bytes != NULL, serialise_state(s, x, (char *)bytes, n)) \
+    CALL(restore, (Component c, const Bytes bytes[], size_t n, FmuState *x), bytes != NULL && x != NULL, deserialise_state(s, (const char *)bytes, n, x))

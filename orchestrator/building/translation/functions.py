@@ -43,7 +43,7 @@ def translate(
         mutated = scope.mutated
         parameters = {name for name, _ in function.parameters}
         kinds = {name: kind for name, kind in scope.kinds.items() if name not in parameters}
-        covered |= _needed_names(scope, body) & {scope.local(name) for name in (*scope.kinds, *found.counters)}
+        covered |= _names_at_file_scope(scope, body) & {scope.local(name) for name in (*scope.kinds, *found.counters)}
         if not scope.changed and covered == scope.covered:
             break
     _check_end(source, node, function.returns)
@@ -59,7 +59,7 @@ def translate(
     return function
 
 
-def _needed_names(scope: Scope, body: list[str]) -> set[str]:
+def _names_at_file_scope(scope: Scope, body: list[str]) -> set[str]:
     """Return the names at file scope that a body needs: of functions, constants and types."""
     called = {name for line in body for name in _CALLED.findall(_TEXTS.sub("", line))}
     return called | scope.constants | scope.program.names.in_use()

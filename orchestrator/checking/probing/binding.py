@@ -75,7 +75,7 @@ class Library:
         self.threaded = False
         """Whether each call is done in a thread of its own."""
         self.logged: list[tuple[list[str], int]] = []
-        """Messages and number of errors of each call that was done last in one go."""
+        """Messages and number of errors of each call that was done last."""
         self._changed: set[str] = set()
         self._path = ""
         self._loaded: tuple[int, ...] | None = None
@@ -150,38 +150,22 @@ class Library:
         name = f"{self.names.prefix}FreeInstance"
         self._ask(_NOTHING, name, "free", number, name)
 
-    def raw(self, number: int, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
-        """Call a function of an instance; return its status and what its output arguments hold."""
-        how = "call_in_thread" if self.threaded else "call"
-        answer = self._ask(Returned, function, how, number, function, arguments)
-        return self._check_answer(answer, function, arguments)
-
-    def _check_answer(
-        self, answer: Returned, function: str, arguments: Sequence[Sequence[Any]]
-    ) -> tuple[int, list[Any]]:
-        """An answer that has as many values as there are outputs."""
-        self.messages, self.errors = self._texts(answer.messages), answer.errors
-        if answer.left:
-            text = f"{function} must clear what it catches, but leaves {answer.left[:200]}"
-            self._report("run.python-exception", text)
-        if len(answer.values) != sum(a[0].startswith(("out", "new", "free", "event")) for a in arguments):
-            raise odd(function)
-        return answer.status, answer.values
-
-    def raw_many(
-        self, number: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]
-    ) -> list[tuple[int, list[Any]]]:
+    def call(self, number: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]) -> list[tuple[int, list[Any]]]:
         """Call functions of an instance in one go, up to the first that fails; return status and values of each."""
         doing = ", ".join(dict.fromkeys(function for function, _ in requests))
-        answers = self._ask(list[Returned], doing, "calls", number, requests)
-        done: list[tuple[int, list[Any]]] = []
+        answers = self._ask(list[Returned], doing, "call", number, requests, self.threaded)
         self.logged = []
         if not 1 <= len(answers) <= len(requests):
             raise odd(doing)
         for answer, (function, arguments) in zip(answers, requests, strict=False):
-            done.append(self._check_answer(answer, function, arguments))
+            self.messages, self.errors = self._texts(answer.messages), answer.errors
             self.logged.append((self.messages, self.errors))
-        return done
+            if answer.left:
+                text = f"{function} must clear what it catches, but leaves {answer.left[:200]}"
+                self._report("run.python-exception", text)
+            if len(answer.values) != sum(a[0].startswith(("out", "new", "free", "event")) for a in arguments):
+                raise odd(function)
+        return [(answer.status, answer.values) for answer in answers]
 
     def plan(self, number: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:
         """Say what the host does in intermediate updates; see there.

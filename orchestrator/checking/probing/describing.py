@@ -57,7 +57,7 @@ def make_job(
         states=_count(d, [d.variable(u.variable) for u in d.derivatives]),
         indicators=_indicators(d),
         state_variables=_states(d, by_index),
-        rate_variables=tuple(p for u in d.derivatives if (p := _probed(d, u.variable, by_index)) is not None),
+        rate_variables=tuple(p for u in d.derivatives if (p := _variable_at(d, u.variable, by_index)) is not None),
         unknowns=tuple(_unknowns(d, by_index)),
         may_jump=frozenset(v.reference for v in known if v.reference is not None and v.flag("reinit")),
         categories=tuple(e.get("name", "") for e in d.root.findall("LogCategories/Category")),
@@ -82,7 +82,7 @@ def _flags(interface: Interface) -> frozenset[str]:
     return frozenset(found)
 
 
-def _probed(d: Description, identity: int | None, by_index: Mapping[int, ProbedVariable]) -> ProbedVariable | None:
+def _variable_at(d: Description, identity: int | None, by_index: Mapping[int, ProbedVariable]) -> ProbedVariable | None:
     v = d.variable(identity)
     return None if v is None else by_index.get(v.index)
 
@@ -93,8 +93,8 @@ def _states(d: Description, by_index: Mapping[int, ProbedVariable]) -> tuple[Pro
         rate = d.variable(u.variable)
         if rate is None:
             return None
-        state = _probed(d, int(number(rate.own.get("derivative"), "Integer") or 0), by_index)
-        if state is None or _probed(d, u.variable, by_index) is None:
+        state = _variable_at(d, int(number(rate.own.get("derivative"), "Integer") or 0), by_index)
+        if state is None or _variable_at(d, u.variable, by_index) is None:
             return None
         found.append(state)
     return tuple(found)
@@ -109,13 +109,13 @@ def _unknowns(d: Description, by_index: Mapping[int, ProbedVariable]) -> Iterato
     )
     for section, entries in lists:
         for entry in entries:
-            v = _probed(d, entry.variable, by_index)
+            v = _variable_at(d, entry.variable, by_index)
             if v is None or v.clocks or v.base == "Clock":
                 continue
             if entry.dependencies is None:
                 yield ProbedUnknown(section, v, None, ())
                 continue
-            knowns = [_probed(d, number, by_index) for number in entry.dependencies]
+            knowns = [_variable_at(d, number, by_index) for number in entry.dependencies]
             kinds = entry.kinds or ()
             if None not in knowns and len(kinds) in (0, len(knowns)):
                 yield ProbedUnknown(section, v, tuple(k for k in knowns if k is not None), kinds)

@@ -41,20 +41,22 @@ class FmuInstance:
         Args:
             values: what ``tables.functions`` wants for its parameters.
         """
-        name = self.library.names.name(function)
+        return self._call([(function, values)])[0]
+
+    def _call(self, requests: Sequence[Request]) -> list[tuple[int, list[Any]]]:
+        """Status and outputs of each function, up to the first that fails."""
+        names = self.library.names
+        calls = [(names.name(function), names.arguments(function, values)) for function, values in requests]
         if self.dead:
+            name = calls[0][0]
             raise StatusError(name, FATAL, f"{name} was not called, because a call before returned a fatal error")
-        status, found = self.library.raw(self.number, name, self.library.names.arguments(function, values))
-        self.dead = status == FATAL
-        return status, found
+        done = self.library.call(self.number, calls)
+        self.dead = done[-1][0] == FATAL
+        return done
 
     def call(self, function: str, *values: Any, when: str = "") -> list[Any]:
         """Call a function that must return OK or Warning; return a value per output argument, in their order."""
-        status, found = self.raw(function, *values)
-        if status not in (OK, WARNING):
-            raise self.status_error(function, status, when)
-        self._remark(function, status, self.library.messages, self.library.errors)
-        return found
+        return self.call_many([(function, values)], when)[0]
 
     def _remark(self, function: str, status: int, messages: list[str], errors: int) -> None:
         """Take note of a warning, and of an error that was logged although the call went well."""
@@ -68,15 +70,8 @@ class FmuInstance:
         """Call functions in one go, as ``call`` does; return what the output arguments of each hold."""
         if not requests:
             return []
-        names = self.library.names
-        if self.dead:
-            raise StatusError(
-                names.prefix, FATAL, f"nothing was called {when}, because a call before returned a fatal error"
-            )
-        done = self.library.raw_many(self.number, [(names.name(f), names.arguments(f, a)) for f, a in requests])
-        status = done[-1][0]
-        self.dead = status == FATAL
-        if status not in (OK, WARNING):
+        done = self._call(requests)
+        if (status := done[-1][0]) not in (OK, WARNING):
             raise self.status_error(requests[len(done) - 1][0], status, when)
         if len(done) < len(requests):
             raise odd(requests[len(done)][0])
@@ -100,16 +95,11 @@ class FmuInstance:
             self.library.free(self.number)
             self.dead = True
 
-    def get_state(self) -> int:
-        """A new FMU state, by its number."""
-        state = int(self.call("GetFMUState", None)[0])
+    def get_state(self, again: int | None = None) -> int:
+        """Save the state as a new one, or ``again`` as one that was saved before. Return its number."""
+        state = int(self.call("GetFMUState", again)[0])
         self._memories[state] = dict(self.memory)
         return state
-
-    def get_state_again(self, state: int) -> None:
-        """Take the present state into one that was made before."""
-        self.call("GetFMUState", state)
-        self._memories[state] = dict(self.memory)
 
     def set_state(self, state: int) -> None:
         """Restore a state."""

@@ -125,7 +125,7 @@ class Measured:
         if kind in _AT_A_POINT:
             groups = [[q for q in found if q[2] == at] for at in dict.fromkeys(at for _, _, at in found)]
         for group in groups:
-            if _spread(group):
+            if _differ(group):
                 low, high = min(q for q, _, _ in group), max(q for q, _, _ in group)
                 text = f"`{label}` must follow `{known}` by a {kind} factor, as dependenciesKind says"
                 self.context.report("dependency.kind", f"{text}, but by {low:.4g} to {high:.4g}", u.variable.name)
@@ -140,8 +140,8 @@ class Measured:
             self.context.heard = frozenset(heard)  # what is silent here may be heard near the values of the file
             return
         often = {known for (_, _, known), count in self.tried.items() if count >= _OFTEN}
-        listed = {k.key for u in self.listing() for k in u.knowns or ()}
-        listed |= self._listed_by_silence()
+        listed = {k.key for u in self.narrow_unknowns() for k in u.knowns or ()}
+        listed |= self._parameters_of_unlisted()
         movement = bench.movement
         states = {v.key for v in bench.job.state_variables or ()}
         silent: list[ProbedVariable] = []
@@ -159,7 +159,7 @@ class Measured:
             text = "what unknowns depend on, by a list or for want of one, must have an effect, but none was seen of "
             self.context.report("dependency.superfluous", f"{text}{', '.join(names)}, at three points and in a run")
 
-    def _listed_by_silence(self) -> set[tuple[str, int]]:
+    def _parameters_of_unlisted(self) -> set[tuple[str, int]]:
         """The parameters of a small FMU whose initial unknowns list nothing: they depend on all of them then."""
         job = self.context.bench.job
         found = {v.key for v in self.context.bench.movement.values if v.causality == "parameter"}
@@ -196,7 +196,7 @@ class Measured:
                     return False
         return True
 
-    def listing(self) -> list[ProbedUnknown]:
+    def narrow_unknowns(self) -> list[ProbedUnknown]:
         """The unknowns that name what they depend on, without those that name everything."""
         unknowns = self.context.bench.job.unknowns
         return [u for u in unknowns if u.knowns is not None and len(u.knowns) <= _FEW_LISTED]
@@ -209,7 +209,7 @@ def _reacts(v: ProbedVariable, a: Any, b: Any) -> bool:
     return bool(a != b)
 
 
-def _spread(quotients: Sequence[tuple[float, float, str]]) -> bool:
+def _differ(quotients: Sequence[tuple[float, float, str]]) -> bool:
     """Whether quotients differ by more than their noise."""
     if len(quotients) < 2:
         return False

@@ -83,12 +83,12 @@ def points(bench: Bench, driver: Driver) -> Iterator[RestPoint]:
             yield RestPoint(driver, number, t)
             continue
         x = driver.continuous_states()
-        driver.set_continuous_states(_pushed(driver, x, number))
+        driver.set_continuous_states(_push_states(driver, x, number))
         yield RestPoint(driver, number, t)
         driver.set_continuous_states(x)
 
 
-def _pushed(driver: ModelExchange, x: Sequence[float], number: int) -> list[float]:
+def _push_states(driver: ModelExchange, x: Sequence[float], number: int) -> list[float]:
     """States off their path, different ones by different amounts."""
     owners = [v for v in state_vector(driver) for _ in range(v.size)]
     found = []

@@ -21,7 +21,7 @@ _LATER = 10  # steps
 _NEAR = 1e-6
 
 
-def ending(context: Context) -> None:
+def end(context: Context) -> None:
     """After the end values can still be read."""
     job = context.bench.job
     variables = [v for v in job.variables if not v.clocks and v.base != "Clock" and v.causality == "output"]

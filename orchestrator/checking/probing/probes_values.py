@@ -36,26 +36,26 @@ def values(context: Context) -> None:
     bench, job = context.bench, context.bench.job
     movement = bench.movement.values
     _judge_types(context)
-    _kept_at_ticks(context)
+    _judge_ticks(context)
     if not movement:
         raise SkippedError("the FMU has nothing that can be set to other values, or takes none")
     if job.interface == "ScheduledExecution":
         raise SkippedError("the interface has no communication points")
     judge_batches(context)
     with context.away() if context.far is not None else nullcontext():
-        if not _kept_before(context, bench.movement.values):
+        if not _judge_before(context, bench.movement.values):
             return
     judge_limits(context, movement)
     judge_late_setting(context, movement)
     try:
-        _kept_between(context, movement)
-        _kept_at_limits(context)
+        _judge_between(context, movement)
+        _judge_at_limits(context)
     except StatusError:
         return  # not every FMU takes values at every point; what must be taken has been set before
-    _calculated(context, movement)
+    _judge_calculated(context, movement)
 
 
-def _kept_at_ticks(context: Context) -> None:
+def _judge_ticks(context: Context) -> None:
     """Clocked inputs that are set to other values while their clock ticks are there."""
     bench, job = context.bench, context.bench.job
     inputs = [v for v in job.variables if v.clocks and v.causality == "input" and v.base != "Clock"]
@@ -85,7 +85,7 @@ def _judge_types(context: Context) -> None:
         look(context, chosen, run.select(chosen, row), f"at t = {job.start + (n + 1) * job.step:g}", complaints)
 
 
-def _kept_before(context: Context, movement: Mapping[ProbedVariable, Values]) -> bool:
+def _judge_before(context: Context, movement: Mapping[ProbedVariable, Values]) -> bool:
     """Whether what is set before and in initialisation mode is there in it, parameters and states also afterwards."""
     bench, job = context.bench, context.bench.job
     # Others that have a start value may be computed anew: it is what they were before.
@@ -112,7 +112,7 @@ def _before(job: ProbeJob) -> str:
     return f"before {entry}, or in initialisation mode for inputs"
 
 
-def _kept_between(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
+def _judge_between(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
     """Inputs and tunable parameters that are set at a communication point, early or late, are there."""
     chosen = [v for v in movement if v.causality == "input" or _is_tunable(v)]
     if not chosen:
@@ -185,7 +185,7 @@ def _followers(context: Context, driver: Driver, wanted: Mapping[ProbedVariable,
     return parameters, by_variable(followers, driver.read(followers, "after a tunable parameter was set"))
 
 
-def _kept_at_limits(context: Context) -> None:
+def _judge_at_limits(context: Context) -> None:
     """Continuous inputs that are set to their min and max are there; no step is done with them."""
     bench, job = context.bench, context.bench.job
     inputs = [v for v in distinct(job.inputs()) if v.variability == "continuous"] if bench.excited else []
@@ -225,7 +225,7 @@ def _follow_tunable(
             context.report("value.stale", f"{text}, but {shown}", v.name)
 
 
-def _calculated(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
+def _judge_calculated(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:
     """A calculated parameter that depends on parameters, all of which get other values, is another one then."""
     bench, job = context.bench, context.bench.job
     parameters = {v.key for v in job.variables if v.causality == "parameter"}

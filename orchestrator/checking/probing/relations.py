@@ -112,7 +112,7 @@ def determinism(context: Context) -> None:
     """A second fresh instance gives the same run, whatever the importer's habits are."""
     job = context.bench.job
     chosen = [v for v in VARIATIONS if v.applies(job)]
-    if _run(context, _joined(chosen)) is None:
+    if _run(context, _join(chosen)) is None:
         return
     plain = _run(context, Habits())
     if plain is not None:
@@ -129,7 +129,7 @@ def determinism(context: Context) -> None:
             context.report_difference(variation.rule, variation.wanted, found)
 
 
-def _joined(variations: list[Variation]) -> Habits:
+def _join(variations: list[Variation]) -> Habits:
     """All habits of some variations at once."""
     usual = Habits()
     values = {

@@ -232,7 +232,7 @@ def state(context: Context) -> None:
         raise SkippedError(NOT_COMPARABLE)
     if not job.saves:
         raise SkippedError("states cannot be saved, as the flags say")
-    half = _telling_step(context.trace)
+    half = _step_to_save(context.trace)
     data, memory = b"", dict[str, Any]()
     with bench.instance() as driver:
         try:
@@ -260,7 +260,7 @@ def state(context: Context) -> None:
         _restore_elsewhere(context, later, data, memory)
 
 
-def _telling_step(trace: Sequence[Sequence[Any]]) -> int:
+def _step_to_save(trace: Sequence[Sequence[Any]]) -> int:
     """How many steps to do before a state is saved: about half, where most that is no number has changed."""
     half, last = len(trace) // 2, max(len(trace) - _FEWEST_AFTER, len(trace) // 2)
     changed = {
@@ -320,7 +320,7 @@ def _take_again(context: Context, driver: Driver, point: RunPoint, saved: int) -
     last = min(point.number + 1, bench.job.steps)
     bench.run(driver, point.number, last, read=False)
     now = RunPoint(last, point.variables, driver.read(point.variables), [])
-    driver.get_state_again(saved)
+    driver.get_state(again=saved)
     bench.run(driver, last, bench.job.steps, read=False)
     driver.set_state(saved)
     _has_values(context, now, driver, "state.restore", "a state that is taken into one that was made before")
