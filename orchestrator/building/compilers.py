@@ -145,7 +145,6 @@ def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder
 
 
 def _run(compiler: Compiler, command: Sequence[str], folder: Path, what: str) -> None:
-    """Run the compiler."""
     try:
         run = run_tool(command, folder, compiler_environment(folder))
     except OSError as error:

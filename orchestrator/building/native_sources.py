@@ -111,7 +111,6 @@ def indicator_total(cls: Any) -> int:
 
 
 def _indicators(cls: Any) -> Iterator[FmuVariable]:
-    """Yield the event indicators as variables."""
     for n in range(1, indicator_total(cls) + 1):
         yield FmuVariable(f"{INDICATOR}[{n}]", "local", description="Positive until an event ends the mode")
 

@@ -115,7 +115,6 @@ class Interface:
 
     @property
     def kind(self) -> str:
-        """The element's tag."""
         return str(self.element.tag)
 
     def flag(self, name: str) -> bool:
@@ -141,7 +140,6 @@ class Description:
     event_indicators: tuple[StructureEntry, ...]
 
     def interface(self, kind: str) -> Interface | None:
-        """An interface of the FMU."""
         return next((i for i in self.interfaces if i.kind == kind), None)
 
     def identity(self, v: DescribedVariable) -> int | None:

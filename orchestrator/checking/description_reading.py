@@ -104,7 +104,6 @@ def _variable(
 
 
 def _variability(kind: str, causality: str, dialect: FmiDialect) -> str:
-    """The default."""
     if dialect is FMI2:
         return "continuous"
     if causality in ("parameter", "structuralParameter", "calculatedParameter"):

@@ -215,7 +215,6 @@ class _Watcher:
         """The run of the interface, once there is one."""
 
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
-        """The findings of one child."""
         before = _snapshot(self.fmu)
         self.begun = time.monotonic()
         with Library(self._start, job.version, job.variables, self.add) as library:

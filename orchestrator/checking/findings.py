@@ -41,7 +41,6 @@ class Finding:
 
     @property
     def advice(self) -> str:
-        """What to do about it."""
         return RULES[self.rule].advice
 
 
@@ -78,7 +77,6 @@ class Execution:
 
     @property
     def stages_run(self) -> tuple[str, ...]:
-        """The stages that were carried out."""
         return tuple(stage for stage, reason in self.stages.items() if not reason)
 
 
@@ -106,7 +104,6 @@ class FmuFindings:
 
     @property
     def executed(self) -> bool:
-        """Whether the FMU's binary was run."""
         return any("load" in execution.stages_run for execution in self.executions)
 
     @property
@@ -128,12 +125,10 @@ class FmuFindings:
         return RuleOutcome(rule, "not run", reasons[0] if reasons else self.not_executed or _NOTHING)
 
     def count(self, severity: str) -> int:
-        """Number of findings of one severity."""
         return sum(f.severity == severity for f in self.findings)
 
     @property
     def ok(self) -> bool:
-        """No finding of severity "error"."""
         return self.count("error") == 0
 
 

@@ -66,8 +66,6 @@ class Update(NamedTuple):
 
 
 class _Callbacks(ctypes.Structure):
-    """Those of FMI 2.0."""
-
     _fields_ = (
         ("logger", LOGGER),
         ("allocateMemory", c_void_p),
@@ -78,8 +76,6 @@ class _Callbacks(ctypes.Structure):
 
 
 class _EventInfo(ctypes.Structure):
-    """``fmi2EventInfo``."""
-
     _fields_ = (*((f"flag{i}", c_int) for i in range(5)), ("next", c_double))
 
 
@@ -186,7 +182,6 @@ class Host:
         self, function: str, name: str, token: str, resources: str | None, flags: list[bool], required: list[int],
         logging: bool = True,
     ) -> Made:  # fmt: skip
-        """Make an instance of FMI 3.0."""
         self._messages, self._function = [], function
         head: tuple[Any, ...] = (
             name.encode(),
@@ -214,7 +209,6 @@ class Host:
         return Made(self._number, self._messages)
 
     def free(self, instance: int, function: str) -> None:
-        """Free an instance."""
         self._foreign(function, self._instances[instance][0])
 
     def _foreign(self, function: str, *arguments: Any) -> Any:

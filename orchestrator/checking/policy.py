@@ -44,7 +44,6 @@ class FmuPolicy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     severity: dict[str, Severity] = {}
 
     def fits(self, fmu: str) -> bool:
-        """Whether the pattern fits an FMU."""
         path = Path(fmu).as_posix()
         return fnmatch.fnmatchcase(path, self.fmu) or fnmatch.fnmatchcase(Path(fmu).name, self.fmu)
 

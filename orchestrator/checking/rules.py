@@ -116,7 +116,6 @@ class Rule:
 
     @property
     def versions(self) -> tuple[Version, ...]:
-        """The versions of FMI that the rule applies to."""
         return tuple(self.anchor)
 
     def link(self, version: Version) -> str:

@@ -103,7 +103,6 @@ class Conversion:
         return abs(self.offset - other.offset) <= _TOLERANCE * abs(other.offset) + 1e-9
 
     def reverse(self) -> "Conversion":
-        """The one in the other direction."""
         return self if self.inverse else Conversion(1.0 / self.factor, -self.offset / self.factor)
 
 

@@ -54,7 +54,6 @@ class Verdict:
 
     @property
     def fmu(self) -> str:
-        """Path of the FMU, as the user gave it."""
         return self.report.fmu
 
     @property

@@ -155,7 +155,6 @@ class ClockTimes:
     shift: Fraction | None = None
 
     def of(self, clock: PeriodicClock) -> PeriodicClock:
-        """Return the clock with these times."""
         return replace(
             clock,
             interval=clock.interval if self.interval is None else self.interval,

@@ -31,7 +31,6 @@ class EventInstance(FmuSlave, EventSlave):
     _rescaled = True  # nominal values of states may be others than before
 
     def start(self) -> None:
-        """Exit initialisation mode, into event mode."""
         super().start()
         self._in_event_mode, self._next_event = True, math.inf
 

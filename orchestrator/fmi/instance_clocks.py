@@ -70,11 +70,9 @@ class ClockedSlave(EventInstance, Fmu3Instance):
         self._activate(self._timed.take(self._reached or 0.0))
 
     def tick(self, clocks: Sequence[str]) -> None:
-        """Activate input clocks for this instant, in event mode."""
         self._activate([self.model.input_clocks[name].reference for name in clocks])
 
     def active_clocks(self) -> frozenset[str]:
-        """Return the output clocks that are active in this instant."""
         return frozenset(self._output_clocks[clock] for clock in self._active_among(sorted(self._output_clocks)))
 
     def _update(self) -> Instant:

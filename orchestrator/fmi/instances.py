@@ -40,7 +40,6 @@ class FmuFactory:
     description: FmuDescription
 
     def __call__(self, name: str) -> FmuSlave:
-        """Return a new slave called ``name``."""
         return make_slave(name, self.path, self.description)
 
 

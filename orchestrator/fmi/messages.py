@@ -28,7 +28,6 @@ class Inbox:
         self._warned, self._call = 0, ""
 
     def log(self, status: int, text: str) -> None:
-        """Take a message."""
         self.messages.append(text)
         first, count = self._logged.get(status, (text, 0))
         self._logged[status] = (first, count + 1)

@@ -157,7 +157,6 @@ class ExchangeSlave(EventInstance):
         raise SlaveError(f"{self.name}: must have the clocks {', '.join(clocks)}, but has none")
 
     def active_clocks(self) -> frozenset[str]:
-        """Return none."""
         return frozenset()
 
     def leave_event_mode(self) -> None:

@@ -161,7 +161,6 @@ class RemoteSlave(Slave):
         raise StepDiscardedError(undone.text, self.name, undone.time, undone.reached)
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return warnings since this was last asked."""
         return self._ask(list[RunRemark], "take_remarks")[:MOST_REMARKS]
 
     def close(self) -> None:
@@ -207,6 +206,5 @@ class RemoteFactory:
     walls: bool
 
     def __call__(self, name: str) -> RemoteSlave:
-        """Return a new slave called ``name``."""
         kind = EventRemoteSlave if self.description.model.has_events else RemoteSlave
         return kind(name, self.folder, self.description, self.limits, self.walls)

@@ -160,7 +160,6 @@ class FmuSlave(Slave):
         return self._reached
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return warnings since this was last asked."""
         left_out = [RunRemark(self.name, self._description.left_out)] if self._description.left_out else []
         return [*left_out, *self._inbox.take_remarks(self.name)]
 
@@ -273,7 +272,6 @@ class FmuSlave(Slave):
     # A run ---------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Exit initialisation mode."""
         self._call("ExitInitializationMode")
 
     def get_state(self) -> Any:

@@ -65,7 +65,6 @@ class Fmu2Instance(FmuSlave):
         super().set(values)
 
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        """Set the experiment up and enter initialisation mode."""
         self.messages.clear()
         self._tolerance = tolerance
         self._call("SetupExperiment", *experiment(ctypes.c_int, start, stop, tolerance))

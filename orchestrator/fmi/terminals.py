@@ -49,7 +49,6 @@ class Terminal:
 
     @property
     def has_flows(self) -> bool:
-        """Whether a member is a flow."""
         return any(m.kind in FLOWS for m in self.members) or any(part.has_flows for part in self.parts.values())
 
 

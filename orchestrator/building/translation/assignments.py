@@ -48,7 +48,6 @@ def translate_annotated(scope: Scope, node: ast.AnnAssign) -> list[str]:
 
 
 def _translate_target(scope: Scope, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[str]:
-    """Assign one value to one target."""
     if isinstance(target, ast.Name):
         return _to_name(scope, node, target.id, value)
     before = scope.faults

@@ -39,7 +39,6 @@ class Function:
 
     @property
     def text(self) -> str:
-        """The definition."""
         lines = "\n".join(f"    {line}" if line else "" for line in self.body)
         return f"{comment_of(self.comment)}{self.head}\n{{\n{lines}\n}}"
 

@@ -43,23 +43,19 @@ class PlainArray:
         self._values, self._first = values, first
 
     def __len__(self) -> int:
-        """Return the length of the first axis."""
         return self.shape[0]
 
     def __getitem__(self, index: int | tuple[int, ...]) -> Any:
-        """Return an item, or a part."""
         place, left = self._place(index)
         return PlainArray(self._values, left, place) if left else self._values[place]
 
     def __setitem__(self, index: int | tuple[int, ...], value: float) -> None:
-        """Set an item."""
         place, left = self._place(index)
         if left:
             raise IndexError("a part of an array cannot be assigned to")
         self._values[place] = value
 
     def tolist(self) -> list[Any]:
-        """Return all items, row by row."""
         return self._values[self._first : self._first + math.prod(self.shape)]
 
     def _place(self, index: int | tuple[int, ...]) -> tuple[int, tuple[int, ...]]:

@@ -49,7 +49,6 @@ class Kernels:
         return bind_module(self._name)
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        """Return a kernel."""
         if name.startswith("_"):
             raise AttributeError(name)
         found = self.load()
@@ -78,8 +77,6 @@ def load_library(name: str, checked: bool) -> dict[str, Callable[..., Any]]:
 
 
 class _Parameter:
-    """One parameter of a kernel."""
-
     def __init__(self, kernel: str, name: str, word: str, shape: list[int | None] | None, filled: bool) -> None:
         self.where, self.shape, self.filled = f"`{name}` of the kernel {kernel}", shape, filled
         self.dtype = _DTYPES.get(word)
@@ -109,8 +106,6 @@ class _Parameter:
 
 
 class _Kernel:
-    """A function of a library."""
-
     def __init__(self, library: ctypes.CDLL, name: str, returns: str, parameters: list[Any]) -> None:
         self._name = name
         self._parameters = [_Parameter(name, *parameter) for parameter in parameters]

@@ -63,12 +63,10 @@ class Program:
 
     @staticmethod
     def local_name(name: str) -> str:
-        """Return the C name of a local variable."""
         return f"{name}_" if name in RESERVED else name
 
     @staticmethod
     def attribute_name(name: str) -> str:
-        """Return the C name of a slave's attribute."""
         plain = name.lstrip("_")
         return f"{plain}_" if plain in RESERVED else plain
 
@@ -94,7 +92,6 @@ class Program:
     # Functions ----------------------------------------------------------------------------------------------
 
     def function(self, user: ModuleSource | None, node: ast.AST | None, target: Callable[..., Any]) -> Function:
-        """Return the translation of a function of the sources."""
         source = self._source(target.__module__)
         name = target.__name__
         definition = source.functions.get(name)
@@ -105,7 +102,6 @@ class Program:
         return self._translate_function(user, node, (target.__module__, name), source, definition, None)
 
     def method(self, user: ModuleSource | None, node: ast.AST | None, name: str) -> Function:
-        """Return the translation of a method of the slave."""
         assert self.owner is not None
         for cls in self.owner.cls.__mro__:
             if name in vars(cls) and cls.__module__ not in BASE_MODULES:
@@ -150,7 +146,6 @@ class Program:
     # Text -----------------------------------------------------------------------------------------------------
 
     def types(self) -> str:
-        """Return the typedefs."""
         return "\n\n".join(self.names.definitions())
 
     def constants(self) -> str:
@@ -163,7 +158,6 @@ class Program:
         return "\n".join(lines)
 
     def prototypes(self) -> str:
-        """Return a declaration of every function."""
         return "\n".join(f"{function.head};" for function in self._in_order())
 
     def definitions(self) -> str:

@@ -81,7 +81,6 @@ class Scope:
     covered: set[str] = field(default_factory=set)
 
     def refuse(self, node: ast.AST, message: str) -> NoReturn:
-        """Raise for what is outside the subset."""
         self.source.refuse(node, message)
 
     def expression(self, node: ast.expr, wanted: Kind | None = None) -> Code:
@@ -89,7 +88,6 @@ class Scope:
         return self.expressions(self, node, wanted)
 
     def condition(self, node: ast.expr) -> Code:
-        """Translate a condition."""
         return truth(value_of(self, self.expression(node)))
 
     def fault(self) -> str:
@@ -136,7 +134,6 @@ class Scope:
                 name = self.aliases.get(name, name)
 
     def temporary(self, stem: str) -> str:
-        """Return a new name for something that has none in the source."""
         while True:
             self.temporaries += 1
             name = f"{stem}_{self.temporaries}"
@@ -179,7 +176,6 @@ def convert(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
 
 
 def _fits(given: ArrayKind, wanted: ArrayKind) -> bool:
-    """Tell whether an array has the lengths that are wanted, as far as its kind says."""
     same = given.item == wanted.item and len(given.shape) == len(wanted.shape)
     return same and all(b is None or a == b for a, b in zip(given.shape, wanted.shape, strict=False))
 

@@ -128,7 +128,6 @@ def _continuous(program: Program, cls: Any, hooks: dict[str, str]) -> str:
 
 
 def _output_rates(program: Program, cls: Any, function: Function) -> list[str]:
-    """Return the table of outputs that have derivatives."""
     names = [variable.name for variable in cls.table]
     references = [names.index(name) for name in cls.response_outputs]
     if function.returns != Tuple((REAL,) * len(references)):

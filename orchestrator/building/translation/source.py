@@ -51,15 +51,12 @@ class ModuleSource:
         return [text for text in above if not text.startswith("noqa")]
 
     def value(self, name: str) -> Any:
-        """Return what a global name is bound to."""
         return vars(self.module)[name]
 
     def has(self, name: str) -> bool:
-        """Tell whether the module binds a name."""
         return name in vars(self.module)
 
     def annotation(self, node: ast.expr | None, place: ast.AST) -> Kind:
-        """Return the kind that an annotation stands for."""
         if node is None:
             self.refuse(place, "parameters and results must have type annotations")
         if isinstance(node, ast.Constant) and isinstance(node.value, str):

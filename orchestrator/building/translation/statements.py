@@ -246,7 +246,6 @@ class _Fixed(ast.NodeTransformer):
         self._name, self._number = name, number
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        """Return the number for the name."""
         return ast.copy_location(ast.Constant(self._number), node) if node.id == self._name else node
 
 

@@ -146,7 +146,6 @@ class Library:
         return made.number
 
     def free(self, number: int) -> None:
-        """Free an instance."""
         name = f"{self.names.prefix}FreeInstance"
         self._ask(_NOTHING, name, "free", number, name)
 

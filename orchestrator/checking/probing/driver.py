@@ -107,7 +107,6 @@ class Driver(FmuInstance):
         return values
 
     def set(self, variables: Sequence[ProbedVariable], values: Sequence[Any], when: str = "") -> None:
-        """Write variables of one base type."""
         if not variables:
             return
         if self.habits.alone and len(variables) > 1:
@@ -172,7 +171,6 @@ class Driver(FmuInstance):
         """Do at the communication point ``t`` [s] what must change nothing; nothing where there is no event mode."""
 
     def quieten(self) -> None:
-        """Switch logging off."""
         self.call("SetDebugLogging", 0, [])
         self.library.notes()  # what was logged before is allowed
 
@@ -184,10 +182,8 @@ class Driver(FmuInstance):
             raise DiscardedError(f"a step was discarded {when}", again)
 
     def terminate(self) -> None:
-        """End the simulation."""
         self.call("Terminate")
 
     def reset(self) -> None:
-        """Back to a new instance."""
         self.call("Reset")
         self.memory = {}

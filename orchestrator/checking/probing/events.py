@@ -90,7 +90,6 @@ class EventDriver(Driver):
                 self.memory["ticks"][clock.reference] = self.job.start + interval
 
     def _interval(self, clock: ProbedClock) -> tuple[float, int]:
-        """Interval and qualifier of a clock."""
         when = f"for the clock `{clock.name}`"
         (interval,), (qualifier,) = self.call("GetIntervalDecimal", [clock.reference], 1, 1, when=when)
         if qualifier not in (_NOT_YET_KNOWN, _UNCHANGED, _CHANGED):
@@ -141,7 +140,6 @@ class EventDriver(Driver):
         return float(min(times))
 
     def due(self, t: float) -> list[ProbedClock]:
-        """The clocks that tick at a time."""
         ticks = self.memory.get("ticks", {})
         slack = _SMALL * max(abs(t), self.job.step)
         chosen = [c for c in self.job.clocks if c.reference in ticks and ticks[c.reference] <= t + slack]
@@ -178,7 +176,6 @@ class EventDriver(Driver):
         return outcomes
 
     def _active_clocks(self, when: str) -> set[int]:
-        """The output clocks that are active."""
         chosen = [c.reference for c in self.job.clocks if c.causality == "output"]
         if not chosen:
             return set()
@@ -220,7 +217,6 @@ class EventDriver(Driver):
         self.memory["ticks"] = ticks
 
     def update(self, t: float, when: str) -> EventOutcome:
-        """Update the discrete states once."""
         found = self.call("UpdateDiscreteStates", when=when)
         row = found[0] if self.job.version == "2.0" else [values[0] for values in found]
         again, terminate, nominals, states, defined, time = row

@@ -102,7 +102,6 @@ class FmuInstance:
         return state
 
     def set_state(self, state: int) -> None:
-        """Restore a state."""
         self.call("SetFMUState", state)
         self.memory = dict(self._memories[state])
 
@@ -113,7 +112,6 @@ class FmuInstance:
         return bool(self.call("FreeFMUState", state)[0])
 
     def serialise(self, state: int) -> bytes:
-        """The bytes of a state."""
         (size,) = self.call("SerializedFMUStateSize", state)[0]
         if not 0 < size <= _LARGEST_STATE:
             function = self.library.names.name("SerializedFMUStateSize")
@@ -127,7 +125,6 @@ class FmuInstance:
         return data
 
     def deserialise(self, data: bytes, memory: dict[str, Any]) -> int:
-        """A state from bytes, by its number."""
         state = int(self.call("DeserializeFMUState", data)[0])
         self._memories[state] = dict(memory)
         return state

@@ -103,17 +103,14 @@ class ProbeJob:
 
     @property
     def varies(self) -> bool:
-        """Whether communication steps may be of any size."""
         return "canHandleVariableCommunicationStepSize" in self.flags
 
     @property
     def saves(self) -> bool:
-        """Whether states can be saved and restored."""
         return bool(self.flags & {"canGetAndSetFMUstate", "canGetAndSetFMUState"})
 
     @property
     def serialises(self) -> bool:
-        """Whether states can be serialised."""
         return bool(self.flags & {"canSerializeFMUstate", "canSerializeFMUState"})
 
     def outputs(self) -> list[ProbedVariable]:
@@ -128,7 +125,6 @@ class ProbeJob:
         return next((v for v in self.variables if v.causality == "independent" and v.real and v.size == 1), None)
 
     def labels(self) -> list[str]:
-        """Names of the recorded values."""
         return [label for v in self.outputs() for label in v.labels]
 
     def inputs(self) -> list[ProbedVariable]:

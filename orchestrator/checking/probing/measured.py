@@ -210,7 +210,6 @@ def _reacts(v: ProbedVariable, a: Any, b: Any) -> bool:
 
 
 def _differ(quotients: Sequence[tuple[float, float, str]]) -> bool:
-    """Whether quotients differ by more than their noise."""
     if len(quotients) < 2:
         return False
     low, high = min(quotients), max(quotients)

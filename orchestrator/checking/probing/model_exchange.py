@@ -72,20 +72,16 @@ class ModelExchange(EventDriver):
         return list(values)
 
     def continuous_states(self) -> list[float]:
-        """The vector of states."""
         return self._values("GetContinuousStates", "states", "")
 
     def set_continuous_states(self, x: Sequence[float]) -> None:
-        """Write the vector of states."""
         if x:
             self.call("SetContinuousStates", list(x))
 
     def rates(self) -> list[float]:
-        """The derivatives of the states."""
         return self._values("GetContinuousStateDerivatives", "states", "")
 
     def nominal_values(self) -> list[float]:
-        """The nominal values of the states, as the FMU says."""
         return self._values("GetNominalsOfContinuousStates", "states", "")
 
     def signs(self, when: str = "") -> list[bool]:

@@ -38,7 +38,6 @@ class RestPoint:
         return state_vector(self.driver)
 
     def get(self, v: ProbedVariable) -> tuple[float, ...]:
-        """The values of a variable at this point."""
         return tuple(map(float, self.driver.get([v])))
 
     def put(self, v: ProbedVariable, values: Sequence[float]) -> None:

@@ -113,7 +113,6 @@ class Context:
 
     @property
     def names(self) -> list[str]:
-        """Names of the recorded values."""
         return self.bench.job.labels()
 
     def compare(self, expected: list[list[Any]], values: list[list[Any]]) -> Difference | None:
@@ -335,7 +334,6 @@ def _report_things(context: Context, before: tuple[int, int], times: int, of: st
 
 
 def _reset_memory(context: Context, budget: Stopwatch) -> None:
-    """Resident memory over resets of one instance."""
     bench = context.bench
     library = bench.library
     if not context.resets or budget.over:

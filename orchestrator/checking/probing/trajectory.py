@@ -66,7 +66,6 @@ class Bench:
 
     @property
     def driver(self) -> type[Driver]:
-        """The class that drives the interface."""
         return _DRIVERS[self.job.version, self.job.interface]
 
     @contextmanager

@@ -49,7 +49,6 @@ class ProbedVariable:
 
     @property
     def real(self) -> bool:
-        """Whether its values are floating point numbers."""
         return self.base in ("Real", "Float32", "Float64")
 
     @property
@@ -64,7 +63,6 @@ class ProbedVariable:
 
     @property
     def labels(self) -> list[str]:
-        """A name for each of its values."""
         return [self.name] if self.size == 1 else [f"{self.name}[{i}]" for i in range(self.size)]
 
 

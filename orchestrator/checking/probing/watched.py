@@ -43,7 +43,6 @@ class WatchedRun:
         return [row[at] for row in self.rows]
 
     def select(self, variables: Sequence[ProbedVariable], row: Sequence[Any]) -> list[Any]:
-        """The values of variables in a row."""
         spans = {}
         at = 0
         for v in self.variables:

@@ -128,7 +128,6 @@ class FmiFunctions:
                 self._parameters[name] = parameters.split()
 
     def name(self, function: str) -> str:
-        """What a function is called in C."""
         return self.prefix + self._names[function]
 
     def export_names(self, interface: str) -> list[str]:
@@ -136,7 +135,6 @@ class FmiFunctions:
         return [self.name(f) for f in self._names if self._interfaces.get(f, "") in ("", interface)]
 
     def names_with(self, *words: str) -> list[str]:
-        """The functions whose names begin so."""
         return [self.name(f) for f in self._names if f.startswith(words)]
 
     def arguments(self, function: str, values: Sequence[Any]) -> list[Argument]:
@@ -146,7 +144,6 @@ class FmiFunctions:
 
 
 def _arguments(parameter: str, given: Iterator[Any]) -> Iterator[Argument]:
-    """The arguments of one parameter."""
     kind, bracket, end = parameter.partition("[")
     if kind in _SPECIAL:
         yield from _SPECIAL[kind](given)
