@@ -6,7 +6,7 @@ own to choose anyway.
 
 import ctypes
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from typing import Any, NamedTuple
@@ -19,6 +19,10 @@ TYPES: dict[str, Any] = {
     "int8": ctypes.c_int8, "uint8": ctypes.c_uint8, "int16": ctypes.c_int16, "uint16": ctypes.c_uint16,
     "int32": ctypes.c_int32, "uint32": ctypes.c_uint32, "int64": ctypes.c_int64, "uint64": ctypes.c_uint64,
 }  # fmt: skip
+_Argument = tuple[tuple[Any, ...], Callable[[], Any] | None]
+"""Arguments in C, and how to read afterwards what the function has written there, if it has."""
+Request = tuple[str, Sequence[str], Sequence[Any]]
+"""A function in C, its parameters as ``tables.functions`` has them, and what a caller hands over."""
 _MESSAGES = 4
 _ERRORS = (3, 4)  # Error and Fatal
 _MOST_UPDATES = 10_000
@@ -77,6 +81,33 @@ class _Callbacks(ctypes.Structure):
 
 class _EventInfo(ctypes.Structure):
     _fields_ = (*((f"flag{i}", c_int) for i in range(5)), ("next", c_double))
+
+
+def _array(kind: str, values: Sequence[Any]) -> tuple[Any, ...]:
+    return ((TYPES[kind] * max(len(values), 1))(*values),)
+
+
+def _output(kind: str, count: int, initial: Any) -> _Argument:
+    values = (TYPES[kind] * max(count, 1))()
+    if initial is not None:
+        values[0] = initial
+    return (values,), lambda: [v[:_LONGEST_TEXT] if isinstance(v, bytes) else v for v in list(values)[:count]]
+
+
+def _output_bytes(_kind: str, count: int, _initial: Any) -> _Argument:
+    data = ctypes.create_string_buffer(bytes(count) + _GUARD, count + len(_GUARD))
+    return (data,), lambda: data.raw[:count] if data.raw[count:] == _GUARD else None
+
+
+def _output_binaries(_kind: str, count: int, _initial: Any) -> _Argument:
+    lengths, pointers = (c_size_t * max(count, 1))(), (c_void_p * max(count, 1))()
+    return (lengths, pointers), lambda: [
+        ctypes.string_at(p, min(n, _LONGEST_TEXT)) if p else (b"" if n == 0 else None)
+        for n, p in list(zip(lengths, pointers, strict=True))[:count]
+    ]
+
+
+_WRITTEN = {">bytes": _output_bytes, ">binaries": _output_binaries}
 
 
 def open_host(_: Any) -> Callable[[Any], Any]:
@@ -277,17 +308,16 @@ class Host:
         size = c_size_t(len(buffer))
         return self._status(function, component, numbers, c_size_t(len(references)), buffer, size)
 
-    def _call(self, instance: int, function: str, arguments: Sequence[Sequence[Any]]) -> Returned:
+    def _call(self, instance: int, function: str, parameters: Sequence[str], given: Sequence[Any]) -> Returned:
         self._messages, self._errors, self._function, self._left = [], 0, function, ""
-        made = [self._argument(*a) for a in arguments]
+        waiting = iter(given)
+        made = [self._argument(parameter, waiting) for parameter in parameters]
         values = [value for group, _ in made for value in group]
         status = self._status(function, self._instances[instance][0], *values)
         found = [read() for _, read in made if read is not None]
         return Returned(status, found, self._messages, self._errors, self._left)
 
-    def call(
-        self, instance: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]], threaded: bool
-    ) -> list[Returned]:
+    def call(self, instance: int, requests: Sequence[Request], threaded: bool) -> list[Returned]:
         """Call functions, up to the first that fails; each in a thread of its own, which has ended then, if asked."""
         done: list[Returned] = []
         for request in requests:
@@ -300,49 +330,44 @@ class Host:
                 break
         return done
 
-    def _argument(self, kind: str, *value: Any) -> tuple[tuple[Any, ...], Callable[[], Any] | None]:
-        """Return the arguments that a description stands for, and how to read them afterwards when they are outputs."""
+    def _argument(self, parameter: str, given: Iterator[Any]) -> _Argument:
+        """Return the arguments that a parameter stands for (``tables.functions``), and how to read what is written."""
+        kind, bracket, end = parameter.partition("[")
         match kind:
-            case "in":
-                return ((TYPES[value[0]] * max(len(value[1]), 1))(*value[1]),), None
-            case "out":
-                return self._output(TYPES[value[0]], value[1], value[2] if len(value) > 2 else None)
-            case "bytes":
-                return (value[0],), None
-            case "in binaries":
-                sizes = (c_size_t * max(len(value[0]), 1))(*map(len, value[0]))
-                return (sizes, (c_char_p * max(len(value[0]), 1))(*value[0])), None
-            case "out binaries":
-                lengths, pointers = (c_size_t * max(value[0], 1))(), (c_void_p * max(value[0], 1))()
-                return (lengths, pointers), lambda: [
-                    ctypes.string_at(p, min(n, _LONGEST_TEXT)) if p else (b"" if n == 0 else None)
-                    for n, p in list(zip(lengths, pointers, strict=True))[: value[0]]
-                ]
+            case "refs":
+                references = next(given)
+                return (*_array("uint32", references), c_size_t(len(references))), None
+            case "texts":
+                texts = next(given)
+                return (c_size_t(len(texts)), *_array("text", texts)), None
             case "state":
-                return (self._states[value[0]],), None
-            case "free state":
-                state = self._states[value[0]]
+                return (self._states[next(given)],), None
+            case "free":
+                state = self._states[next(given)]
                 return (ctypes.byref(state),), lambda: not state
-            case "new state":
-                fresh = c_void_p()
+            case "new" | "made":
+                number, fresh = next(given) if kind == "new" else None, c_void_p()
+                if number is not None:
+                    return (ctypes.byref(self._states[number]),), lambda: number
                 return (ctypes.byref(fresh),), lambda: self._keep(fresh)
-            case "new state in place":
-                used = self._states[value[0]]
-                return (ctypes.byref(used),), lambda: value[0]
-            case "out bytes":
-                data = ctypes.create_string_buffer(bytes(value[0]) + _GUARD, value[0] + len(_GUARD))
-                return (data,), lambda: data.raw[: value[0]] if data.raw[value[0] :] == _GUARD else None
-            case "event info":
+            case "info":
                 info = _EventInfo()
                 return (ctypes.byref(info),), lambda: [*(bool(getattr(info, f"flag{i}")) for i in range(5)), info.next]
-            case _:
-                return (TYPES[kind](value[0]),), None
-
-    def _output(self, kind: Any, count: int, initial: Any) -> tuple[tuple[Any, ...], Callable[[], Any]]:
-        values = (kind * max(count, 1))()
-        if initial is not None:
-            values[0] = initial
-        return (values,), lambda: [v[:_LONGEST_TEXT] if isinstance(v, bytes) else v for v in list(values)[:count]]
+        read: Callable[[], Any] | None = None
+        count = 1
+        if not kind.startswith(">"):
+            value = next(given)
+            count = len(value) if bracket else 1
+            if kind == "binaries":
+                sizes = (c_size_t * max(count, 1))(*map(len, value))
+                made: tuple[Any, ...] = (sizes, (c_char_p * max(count, 1))(*value))
+            else:
+                made = (value,) if kind == "bytes" else _array(kind, value) if bracket else (TYPES[kind](value),)
+        else:
+            count = next(given) if bracket else 1
+            initial = next(given) if kind.endswith("=") else None
+            made, read = _WRITTEN.get(kind, _output)(kind.strip(">="), count, initial)
+        return (*made, c_size_t(count)) if end == "n]" else made, read
 
     def _keep(self, state: c_void_p) -> int:
         self._number += 1

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from orchestrator.checking.host import Made, Returned, Update
+from orchestrator.checking.host import Made, Request, Returned, Update
 from orchestrator.checking.probing.statuses import ERROR, StatusError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.rules import Version, declare
@@ -31,6 +31,7 @@ _REFERENCE = re.compile(r"#([ribs])(\d+)#")
 _MOST_CHANGES = 20
 _CHANGED = {"environment variable": "process.environment", "handler": "process.signals"}
 _NOTHING = type(None)
+_WRITTEN = (">", "new", "free", "made", "info")  # how parameters begin that a function writes to
 _LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b", "String": "s"}
 
 
@@ -149,20 +150,20 @@ class Library:
         name = f"{self.names.prefix}FreeInstance"
         self._ask(_NOTHING, name, "free", number, name)
 
-    def call(self, number: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]) -> list[tuple[int, list[Any]]]:
+    def call(self, number: int, requests: Sequence[Request]) -> list[tuple[int, list[Any]]]:
         """Call functions of an instance in one go, up to the first that fails; return status and values of each."""
-        doing = ", ".join(dict.fromkeys(function for function, _ in requests))
+        doing = ", ".join(dict.fromkeys(function for function, *_ in requests))
         answers = self._ask(list[Returned], doing, "call", number, requests, self.threaded)
         self.logged = []
         if not 1 <= len(answers) <= len(requests):
             raise odd(doing)
-        for answer, (function, arguments) in zip(answers, requests, strict=False):
+        for answer, (function, parameters, _) in zip(answers, requests, strict=False):
             self.messages, self.errors = self._texts(answer.messages), answer.errors
             self.logged.append((self.messages, self.errors))
             if answer.left:
                 text = f"{function} must clear what it catches, but leaves {answer.left[:200]}"
                 self._report("run.python-exception", text)
-            if len(answer.values) != sum(a[0].startswith(("out", "new", "free", "event")) for a in arguments):
+            if len(answer.values) != sum(p.startswith(_WRITTEN) for p in parameters):
                 raise odd(function)
         return [(answer.status, answer.values) for answer in answers]
 

@@ -12,7 +12,7 @@ from typing import Any
 from orchestrator.checking.probing.driver import MOST_ITERATIONS, Driver
 from orchestrator.checking.probing.job import ProbedClock
 from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
-from orchestrator.checking.probing.values import equal, values_text
+from orchestrator.checking.probing.variables import equal, values_text
 from orchestrator.checking.rules import declare
 from orchestrator.shared.numbers import exact_text
 

@@ -46,7 +46,7 @@ class FmuInstance:
     def _call(self, requests: Sequence[Request]) -> list[tuple[int, list[Any]]]:
         """Status and outputs of each function, up to the first that fails."""
         names = self.library.names
-        calls = [(names.name(function), names.arguments(function, values)) for function, values in requests]
+        calls = [(names.name(function), names.parameters(function), values) for function, values in requests]
         if self.dead:
             name = calls[0][0]
             raise StatusError(name, FATAL, f"{name} was not called, because a call before returned a fatal error")

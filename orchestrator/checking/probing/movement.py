@@ -92,16 +92,10 @@ def _bytes(v: ProbedVariable, value: bytes, which: int) -> bytes | None:
     return value[:-1] + bytes([value[-1] ^ (1 + which)]) if value else None
 
 
-def _limits(v: ProbedVariable) -> tuple[float, float]:
-    low = -math.inf if v.minimum is None or math.isnan(v.minimum) else float(v.minimum)
-    high = math.inf if v.maximum is None or math.isnan(v.maximum) else float(v.maximum)
-    return low, high
-
-
 def _whole(v: ProbedVariable, value: int, which: int) -> int | None:
     sign, bits = _BITS.get(v.base, ("", 32))
     least, most = (0, (1 << bits) - 1) if sign == "U" else (-(1 << (bits - 1)), (1 << (bits - 1)) - 1)
-    low, high = _limits(v)
+    low, high = v.limits
     near = (value + 1, value - 1, value + 2, value - 2)
     fit = [x for x in near if max(low, least) <= x <= min(high, most)]
     if v.minimum is None and value >= 0:
@@ -112,7 +106,7 @@ def _whole(v: ProbedVariable, value: int, which: int) -> int | None:
 def _number(v: ProbedVariable, value: float, which: int, element: int) -> float | None:
     if not math.isfinite(value):
         return None
-    low, high = _limits(v)
+    low, high = v.limits
     width = high - low
     size = scale_of(v, value)
     shares = random.Random(f"{v.name} {element}")
@@ -132,7 +126,7 @@ def distant(v: ProbedVariable) -> list[Values]:
     starts = tuple(v.start or ())
     if not v.real or not starts or not all(map(math.isfinite, starts)):
         return []
-    low, high = _limits(v)
+    low, high = v.limits
     sizes = [max(abs(x), 10.0 * scale_of(v, x)) for x in starts]
     below = tuple(x / _FAR if x else -_FAR * size for x, size in zip(starts, sizes, strict=True))
     above = tuple(x + _FAR * size for x, size in zip(starts, sizes, strict=True))
@@ -141,7 +135,7 @@ def distant(v: ProbedVariable) -> list[Values]:
 
 def scale_of(v: ProbedVariable, value: float) -> float:
     """The size of a change: a tenth of a value, or of what the description says of its size."""
-    low, high = _limits(v)
+    low, high = v.limits
     if v.nominal:
         return _SHARE * abs(v.nominal)
     if value:

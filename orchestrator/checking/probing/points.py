@@ -95,7 +95,6 @@ def _push_states(driver: ModelExchange, x: Sequence[float], number: int) -> list
         v = owners[i] if owners else None
         size = 0.1 * float(driver.memory["nominals"][i]) if v is None else scale_of(v, value)
         pushed = value + _PUSH[number % len(_PUSH)] * size * (1.0 + 0.1 * (i % 7))
-        low = -float("inf") if v is None or v.minimum is None else v.minimum
-        high = float("inf") if v is None or v.maximum is None else v.maximum
+        low, high = (pushed, pushed) if v is None else v.limits
         found.append(pushed if low <= pushed <= high else value)
     return found

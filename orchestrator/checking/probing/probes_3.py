@@ -10,7 +10,7 @@ from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.movement import moved, settable
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context
 from orchestrator.checking.probing.statuses import OK, WARNING, SkippedError, StatusError, TerminatedError
-from orchestrator.checking.probing.values import equal, values_text
+from orchestrator.checking.probing.variables import equal, values_text
 from orchestrator.checking.rules import declare
 
 declare("""

@@ -14,8 +14,7 @@ from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.probes_slopes import judge_outputs
 from orchestrator.checking.probing.statuses import SkippedError, StatusError
-from orchestrator.checking.probing.values import by_variable
-from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.probing.variables import ProbedVariable, by_variable
 from orchestrator.checking.rules import declare
 
 declare("""
@@ -200,9 +199,7 @@ def _by_changes(point: RestPoint, unknowns: list[ProbedVariable], knowns: list[P
         base = point.get(v)
         for at, x in enumerate(base):
             size = width * _CHANGE * (v.nominal or max(abs(x), 1.0))
-            low, high = x - size, x + size
-            low = low if v.minimum is None else max(low, v.minimum)
-            high = high if v.maximum is None else min(high, v.maximum)
+            low, high = max(x - size, v.limits[0]), min(x + size, v.limits[1])
             ends = []
             for value in (low, high):
                 point.put(v, (*base[:at], value, *base[at + 1 :]))

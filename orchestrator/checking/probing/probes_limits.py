@@ -9,8 +9,7 @@ from orchestrator.checking.probing.movement import Values
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.returns import readable
 from orchestrator.checking.probing.statuses import StatusError
-from orchestrator.checking.probing.values import by_variable, equal, values_text
-from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.probing.variables import ProbedVariable, by_variable, equal, values_text
 from orchestrator.checking.rules import declare
 from orchestrator.errors import ChildError
 
@@ -76,10 +75,8 @@ def _extremes(v: ProbedVariable) -> Iterator[Any]:
         yield from v.items[:_MOST_ITEMS]
     elif v.base == "String":
         yield (v.start or (b"",))[0] + _TEXT
-    elif v.numeric and v.minimum is not None and v.maximum is not None and v.minimum < v.maximum:
-        ends = (v.minimum, v.maximum)
-        if all(map(math.isfinite, ends)):
-            yield from ends if v.real else map(int, ends)
+    elif v.numeric and v.limits[0] < v.limits[1] and all(map(math.isfinite, v.limits)):
+        yield from v.limits if v.real else map(int, v.limits)
 
 
 def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:

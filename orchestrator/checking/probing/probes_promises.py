@@ -185,8 +185,7 @@ def _change(v: ProbedVariable, step: float) -> float:
     """A slope of an input that stays within its bounds over a step, or 0."""
     start = float((v.start or (0.0,))[0])
     size = 0.1 * (v.nominal or max(abs(start), 1.0))
-    high = float("inf") if v.maximum is None else v.maximum
-    low = -float("inf") if v.minimum is None else v.minimum
+    low, high = v.limits
     fits = next((x for x in (size, -size) if low <= start + x <= high), 0.0)
     return fits / step
 

@@ -7,13 +7,14 @@ from itertools import pairwise
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.job import references
 from orchestrator.checking.probing.probes import Context
-from orchestrator.checking.probing.slopes import TOLERANCE, count_far
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.variables import ProbedVariable
 
 _MOST = 20
 _PART = 1.0 / 16.0  # of a step
 _ORDERS = ("the first", "the second")
+TOLERANCE = 0.1
+"""Of the largest slope."""
 Rows = list[list[float]]
 
 
@@ -106,6 +107,28 @@ def _is_off(below: Sequence[float], derivatives: Sequence[float], size: float) -
 
 
 def _within(value: float, v: ProbedVariable) -> bool:
-    low = -math.inf if v.minimum is None else v.minimum
-    high = math.inf if v.maximum is None else v.maximum
+    low, high = v.limits
     return math.isfinite(value) and low <= value <= high
+
+
+def is_far(rates: Sequence[float], slopes: Sequence[float]) -> bool:
+    """Whether derivatives at the points between steps are far from the slopes on both sides, at most of them.
+
+    Args:
+        rates: at the end of each step.
+        slopes: of each step but the first.
+    """
+    return count_far(rates, slopes) > (len(slopes) - 1) / 2
+
+
+def count_far(rates: Sequence[float], slopes: Sequence[float]) -> int:
+    """Number of points at which a derivative is off by more than ``TOLERANCE`` of the largest slope."""
+    largest = max(map(abs, slopes), default=0.0)
+    off = [_off(x, a, b) for x, a, b in zip(rates[1:], slopes, slopes[1:], strict=False)]
+    return sum(not x <= TOLERANCE * largest for x in off)
+
+
+def _off(x: float, before: float, after: float) -> float:
+    """How far a derivative is from the slopes on both sides; NaN where it is none."""
+    bend = abs(after - before)
+    return max(min(abs(x - before), abs(x - after)) - bend, 0.0) if math.isfinite(x) else math.nan

@@ -9,7 +9,7 @@ from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.probes_exchange import judge_completed_step, judge_following
-from orchestrator.checking.probing.slopes import is_far
+from orchestrator.checking.probing.probes_slopes import is_far
 from orchestrator.checking.probing.statuses import SkippedError
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.probing.watched import slopes
@@ -65,11 +65,8 @@ def _others(driver: ModelExchange, variables: Sequence[ProbedVariable]) -> list[
     x = driver.continuous_states()
     pairs = zip(x, driver.memory["nominals"], strict=True)
     wanted = [a + 1e-3 * n * (1.0 + 0.37 * i) for i, (a, n) in enumerate(pairs)]
-    owners = [v for v in variables for _ in range(v.size)]
-    return [
-        a if (v.minimum is not None and w < v.minimum) or (v.maximum is not None and w > v.maximum) else w
-        for a, w, v in zip(x, wanted, owners, strict=True)
-    ]
+    limits = [v.limits for v in variables for _ in range(v.size)]
+    return [w if low <= w <= high else a for a, w, (low, high) in zip(x, wanted, limits, strict=True)]
 
 
 def _vector(context: Context, point: RestPoint, driver: ModelExchange, variables: tuple[ProbedVariable, ...]) -> bool:

@@ -11,8 +11,7 @@ from orchestrator.checking.probing.movement import Values, distinct, moved
 from orchestrator.checking.probing.probes import Context, look
 from orchestrator.checking.probing.probes_limits import judge_batches, judge_late_setting, judge_limits
 from orchestrator.checking.probing.statuses import SkippedError, StatusError
-from orchestrator.checking.probing.values import by_variable, equal, values_text
-from orchestrator.checking.probing.variables import ProbedVariable
+from orchestrator.checking.probing.variables import ProbedVariable, by_variable, equal, values_text
 from orchestrator.checking.probing.watched import narrow
 from orchestrator.checking.rules import declare
 

@@ -14,8 +14,7 @@ from orchestrator.checking.probing.movement import distinct, moved
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, SMALL, Context
 from orchestrator.checking.probing.statuses import SkippedError, StatusError
 from orchestrator.checking.probing.trajectory import same
-from orchestrator.checking.probing.values import by_variable
-from orchestrator.checking.probing.variables import ProbedVariable, shown
+from orchestrator.checking.probing.variables import ProbedVariable, by_variable, shown
 from orchestrator.checking.rules import declare
 from orchestrator.errors import ChildError
 

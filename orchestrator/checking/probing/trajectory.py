@@ -182,8 +182,7 @@ def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0,
         duration: of the run [s].
         share: of the usual height.
     """
-    low = -math.inf if v.minimum is None else v.minimum
-    high = math.inf if v.maximum is None else v.maximum
+    low, high = v.limits
     wave = share * (0.4 + math.sin(3.7 * math.pi * t / duration + phase + 0.3))
     if low >= high:
         return [low] * v.size

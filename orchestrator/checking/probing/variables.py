@@ -1,11 +1,13 @@
-"""The variables of an FMU as probes see them."""
+"""The variables of an FMU as probes see them, and their values: whether they are equal, and how they are shown."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 _LONGEST = 60
+_EQUAL = 1e-9
+_SINGLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,13 @@ class ProbedVariable:
         return self.base in ("Real", "Float32", "Float64")
 
     @property
+    def limits(self) -> tuple[float, float]:
+        """The smallest and the largest value that the description allows; infinite where it names none."""
+        low, high = self.minimum, self.maximum
+        least = -math.inf if low is None or math.isnan(low) else float(low)
+        return least, math.inf if high is None or math.isnan(high) else float(high)
+
+    @property
     def numeric(self) -> bool:
         """Whether its values are numbers, Boolean ones left out."""
         return self.real or "Int" in self.base
@@ -79,3 +88,32 @@ def shown(value: Any) -> str:
 def finite(value: Any) -> bool:
     """Whether a value is no NaN and no infinity."""
     return not isinstance(value, float) or math.isfinite(value)
+
+
+def equal(v: ProbedVariable, a: Sequence[Any], b: Sequence[Any], tolerance: float = _EQUAL) -> bool:
+    """Whether values of a variable are equal, numbers but for a relative tolerance."""
+    if v.base == "Float32":
+        tolerance = max(tolerance, _SINGLE)
+    for x, y in zip(a, b, strict=True):
+        if isinstance(x, float) and isinstance(y, float):
+            if x == x and y == y and abs(x - y) > tolerance * max(abs(x), abs(y)):  # noqa: PLR0124 (NaN is none)
+                return False
+        elif x != y and x is not None:  # a text that is null is a finding already
+            return False
+    return True
+
+
+def by_variable(variables: Sequence[ProbedVariable], row: Sequence[Any]) -> dict[ProbedVariable, tuple[Any, ...]]:
+    """The values of a row, which stand one variable after the other."""
+    found = {}
+    at = 0
+    for v in variables:
+        found[v] = tuple(row[at : at + v.size])
+        at += v.size
+    return found
+
+
+def values_text(values: Sequence[Any]) -> str:
+    """The first few values of a variable, as a reader of the description knows them."""
+    text = ", ".join(map(shown, values[:4]))
+    return text if len(values) <= 4 else f"{text}, …"

@@ -13,8 +13,7 @@ parameter is a kind of value, and says what a caller hands over:
     state       a saved state                 info        nothing: the function writes an event info
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
 
 from orchestrator.checking.rules import VERSIONS, Version
 
@@ -93,8 +92,6 @@ GetBinary | refs >binaries[n]
 SetBinary | refs binaries[n]
 """,
 }
-Argument = tuple[Any, ...]
-"""What the host makes an argument of; see ``checking.host``."""
 
 
 class FmiFunctions:
@@ -137,54 +134,9 @@ class FmiFunctions:
     def names_with(self, *words: str) -> list[str]:
         return [self.name(f) for f in self._names if f.startswith(words)]
 
-    def arguments(self, function: str, values: Sequence[Any]) -> list[Argument]:
-        """The arguments behind the instance, of the values that a caller hands over."""
-        given = iter(values)
-        return [a for parameter in self._parameters[function] for a in _arguments(parameter, given)]
+    def parameters(self, function: str) -> list[str]:
+        """Return the parameters behind the instance, of which ``checking.host`` makes arguments."""
+        return self._parameters[function]
 
 
-def _arguments(parameter: str, given: Iterator[Any]) -> Iterator[Argument]:
-    kind, bracket, end = parameter.partition("[")
-    if kind in _SPECIAL:
-        yield from _SPECIAL[kind](given)
-        return
-    count = 0
-    if not kind.startswith(">"):
-        value = next(given)
-        count = len(value) if bracket else 0
-        word = {"bytes": ("bytes", value), "binaries": ("in binaries", value)}
-        yield word.get(kind) or (("in", kind, list(value)) if bracket else (kind, value))
-    elif bracket:
-        count = next(given)
-        word = {">bytes": ("out bytes", count), ">binaries": ("out binaries", count)}
-        yield word.get(kind) or ("out", kind[1:], count)
-    else:
-        yield ("out", kind[1:-1], 1, next(given)) if kind.endswith("=") else ("out", kind[1:], 1)
-    if end == "n]":
-        yield "size", count
-
-
-def _references(given: Iterator[Any]) -> list[Argument]:
-    references = next(given)
-    return [("in", "uint32", references), ("size", len(references))]
-
-
-def _texts(given: Iterator[Any]) -> list[Argument]:
-    texts = next(given)
-    return [("size", len(texts)), ("in", "text", texts)]
-
-
-def _state_to_take(given: Iterator[Any]) -> list[Argument]:
-    state = next(given)
-    return [("new state",) if state is None else ("new state in place", state)]
-
-
-_SPECIAL: Mapping[str, Callable[[Iterator[Any]], list[Argument]]] = {
-    "refs": _references,
-    "texts": _texts,
-    "new": _state_to_take,
-    "made": lambda given: [("new state",)],
-    "free": lambda given: [("free state", next(given))],
-    "info": lambda given: [("event info",)],
-}
 FUNCTIONS: Mapping[Version, FmiFunctions] = {version: FmiFunctions(version) for version in VERSIONS}
