@@ -140,22 +140,23 @@ def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder
     ]
     if target.system == "linux":
         command.append("-lm")
-    _run(compiler, command, folder, f"{name}.c for {target.folder}")
+    run_compiler(compiler.identity, command, folder, f"{name}.c for {target.folder}")
     return (folder / library).read_bytes()
 
 
-def _run(compiler: Compiler, command: Sequence[str], folder: Path, what: str) -> None:
+def run_compiler(compiler: str, command: Sequence[str], folder: Path, what: str) -> None:
+    """Run a compiler in a folder; ``compiler`` and ``what`` it compiles are for messages."""
     try:
         run = run_tool(command, folder, compiler_environment(folder))
     except OSError as error:
-        raise FmuError(f"the C compiler {compiler.identity} cannot be run: {error.strerror}") from None
+        raise FmuError(f"the C compiler {compiler} cannot be run: {error.strerror}") from None
     lines = run.stderr.splitlines()
     if run.returncode != 0:
         reason = next((line for line in lines if "error" in line), "no message")
-        raise FmuError(f"the C compiler {compiler.identity} failed on {what}: {reason}")
+        raise FmuError(f"the C compiler {compiler} failed on {what}: {reason}")
     warning = next((line for line in lines if "warning:" in line), None)
     if warning is not None:
-        raise FmuError(f"{what} must compile without warnings, but {compiler.identity} says: {warning}")
+        raise FmuError(f"{what} must compile without warnings, but {compiler} says: {warning}")
 
 
 def _options(target: Target, machine: str, library: str) -> list[str]:

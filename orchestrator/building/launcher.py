@@ -8,11 +8,11 @@ import sysconfig
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.building.compilers import run_compiler
 from orchestrator.errors import FmuError
 from orchestrator.shared.cache import remember
 from orchestrator.shared.machine_code import local_compiler
 from orchestrator.shared.scratch import Scratch
-from orchestrator.shared.tool_runs import run_tool
 
 _HERE = Path(__file__).parent
 FILES = (*sorted((_HERE / "native").iterdir()), *(_HERE / "native_fmu" / n for n in ("fmi2_types.h", "slave_types.h")))
@@ -88,13 +88,7 @@ def _compile(toolchain: Toolchain, compiler: str, wrapper: str) -> bytes:
             f"-DPYTHON_PROGRAM=L{_quote(toolchain.program if library else '')}",
             *("-o", "launcher.so", SOURCE, "-ldl", "-lpthread", "-lm"),
         ]
-        try:
-            run = run_tool(command, folder, os.environ | {"TMPDIR": str(folder)})
-        except OSError as error:
-            raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
-        if run.returncode != 0:
-            reason = next((line for line in run.stderr.splitlines() if "error" in line), "no message")
-            raise FmuError(f"the C compiler {toolchain.compiler} failed on {SOURCE}: {reason}")
+        run_compiler(compiler, command, folder, SOURCE)
         return (folder / "launcher.so").read_bytes()
 
 

@@ -61,13 +61,18 @@ class Verdict:
         """No issue fails."""
         return not any(self.fails(issue) for issue in self.issues)
 
+    @property
+    def new_issues(self) -> list[Issue]:
+        """Those that the baseline does not have."""
+        return [issue for issue in self.issues if not issue.known]
+
     def fails(self, issue: Issue) -> bool:
         """Whether an issue fails the check: bad enough, and not known."""
         return not issue.known and SEVERITIES.index(issue.severity) <= SEVERITIES.index(self.fail_on)
 
     def count(self, severity: str) -> int:
         """Number of issues of one severity that the baseline does not have."""
-        return sum(issue.severity == severity and not issue.known for issue in self.issues)
+        return sum(issue.severity == severity for issue in self.new_issues)
 
 
 def judge(report: FmuFindings, policy: Policy, baseline: frozenset[str] = frozenset()) -> Verdict:

@@ -23,18 +23,15 @@ class Exchange:
     completed: bool
 
 
-def read_exchange2(root: etree._Element, interface: etree._Element) -> Exchange:
-    """Return what a description of FMI 2.0 says."""
-    states = len(root.findall("ModelStructure/Derivatives/Unknown"))
-    indicators = int(root.get("numberOfEventIndicators") or 0)
-    return Exchange(states, indicators, interface.get("completedIntegratorStepNotNeeded") not in {"true", "1"})
-
-
-def read_exchange3(root: etree._Element, interface: etree._Element) -> Exchange:
-    """Return what a description of FMI 3.0 says, which the FMU itself says better."""
-    states = len(root.findall("ModelStructure/ContinuousStateDerivative"))
-    indicators = len(root.findall("ModelStructure/EventIndicator"))
-    return Exchange(states, indicators, interface.get("needsCompletedIntegratorStep") in {"true", "1"})
+def read_exchange(root: etree._Element, interface: etree._Element) -> Exchange:
+    """Return what a description says; in FMI 3.0 the FMU itself says better."""
+    yes = {"true", "1"}
+    if root.get("fmiVersion") == "2.0":
+        states, indicators = root.findall("ModelStructure/Derivatives/Unknown"), root.get("numberOfEventIndicators")
+        not_needed = interface.get("completedIntegratorStepNotNeeded") in yes
+        return Exchange(len(states), int(indicators or 0), not not_needed)
+    states, found = (root.findall(f"ModelStructure/{tag}") for tag in ("ContinuousStateDerivative", "EventIndicator"))
+    return Exchange(len(states), len(found), interface.get("needsCompletedIntegratorStep") in yes)
 
 
 def continuous_inputs(variables: Mapping[str, Variable]) -> frozenset[str]:

@@ -47,21 +47,3 @@ def _private_root() -> Path:
         _root = (os.getpid(), Scratch("fmus"))
         atexit.register(_root[1].close)
     return _root[1].path
-
-
-def library_of(name: str, path: Path, folder: Path, identifier: str, version: str) -> Path:
-    """Return the shared library of an FMU for this platform."""
-    from fmpy import platform as platform2
-    from fmpy import platform_tuple, sharedLibraryExtension
-
-    platform = platform2 if version == "2.0" else platform_tuple
-    library = folder / "binaries" / platform / f"{identifier}{sharedLibraryExtension}"
-    if library.is_file():
-        return library
-    others = sorted(p.name for p in library.parent.glob(f"*{sharedLibraryExtension}"))
-    if others:
-        raise FmuError(
-            f"{name}: {path} must have `binaries/{platform}/{library.name}`, after its modelIdentifier, but has "
-            f"{', '.join(others)}: rename the binary, or correct the identifier"
-        )
-    raise FmuError(f"{name}: {path} must have a binary for {platform}, but has none")

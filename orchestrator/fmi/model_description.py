@@ -12,7 +12,7 @@ from orchestrator.errors import FmuError
 from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, names_in_words, read_clocks
-from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange2, read_exchange3
+from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange
 from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.shared.isolation.archives import open_archive
 from orchestrator.shared.units import EXPONENTS
@@ -153,7 +153,6 @@ def _describe(
     found = variables2.read_variables(root) if is_old else variables3.read_variables(root, configured)
     names = _unique([v.name for v in found.scalars])
     variables = dict(zip(names, found.scalars, strict=True))
-    read_exchange = read_exchange2 if is_old else read_exchange3
     exchange = None if interface.tag == "CoSimulation" else read_exchange(root, interface)
     inputs = continuous_inputs(variables) if exchange else frozenset[str]()
     has_events = exchange is not None or (not is_old and _flag(interface, "hasEventMode"))

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import FmuError
-from orchestrator.fmi.extraction import extract_fmu, library_of
-from orchestrator.fmi.farewell import ends_cleanly
+from orchestrator.fmi.extraction import extract_fmu
+from orchestrator.fmi.libraries import ends_cleanly, library_of
 from orchestrator.fmi.messages import ERROR, OK, make_callbacks
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave, experiment

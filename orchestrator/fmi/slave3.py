@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import FmuError, SlaveError
-from orchestrator.fmi.extraction import extract_fmu, library_of
-from orchestrator.fmi.farewell import ends_cleanly
-from orchestrator.fmi.libraries import free_library, load_library
+from orchestrator.fmi.extraction import extract_fmu
+from orchestrator.fmi.libraries import ends_cleanly, free_library, library_of, load_library
 from orchestrator.fmi.messages import ERROR, log_message_callback
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave, experiment

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from orchestrator.fmi.farewell import ends_cleanly
+from orchestrator.fmi.libraries import ends_cleanly
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 _LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)

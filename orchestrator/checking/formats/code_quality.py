@@ -25,7 +25,6 @@ def as_code_quality(verdicts: Sequence[Verdict]) -> str:
             },
         }
         for verdict in verdicts
-        for issue in verdict.issues
-        if not issue.known
+        for issue in verdict.new_issues
     ]
     return msgspec.json.format(msgspec.json.encode(issues), indent=1).decode() + "\n"

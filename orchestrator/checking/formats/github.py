@@ -55,7 +55,7 @@ def as_summary(verdicts: Sequence[Verdict]) -> str:
 
 def _new_issues(verdicts: Sequence[Verdict]) -> list[tuple[Verdict, Issue]]:
     """Issues that the baseline does not have, worst first."""
-    issues = [(verdict, issue) for verdict in verdicts for issue in verdict.issues if not issue.known]
+    issues = [(verdict, issue) for verdict in verdicts for issue in verdict.new_issues]
     return sorted(issues, key=lambda pair: SEVERITIES.index(pair[1].severity))
 
 

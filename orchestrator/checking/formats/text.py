@@ -43,10 +43,9 @@ def as_lines(verdict: Verdict) -> list[str]:
     The same fault at many places is one of them.
     """
     groups: dict[tuple[Severity, str, str], list[Finding]] = {}
-    for issue in verdict.issues:
-        if not issue.known:
-            f = issue.finding
-            groups.setdefault((issue.severity, f.rule, without_particulars(f.message)), []).append(f)
+    for issue in verdict.new_issues:
+        f = issue.finding
+        groups.setdefault((issue.severity, f.rule, without_particulars(f.message)), []).append(f)
     lines = [summary(verdict)]
     for (severity, rule, _), (first, *rest) in groups.items():
         lines += [f"  {severity:7} {rule}  {describe_place(first)}", f"          {first.message}"]

@@ -111,17 +111,13 @@ class Context:
         finally:
             self.bench.movement, self.trace, self.plain = near
 
-    @property
-    def names(self) -> list[str]:
-        return self.bench.job.labels()
-
     def compare(self, expected: list[list[Any]], values: list[list[Any]]) -> Difference | None:
         """Hold a run against another; None when they are equal bit for bit.
 
         Args:
             expected: the one run, [step][output].
         """
-        return compare(expected, values, self.names)
+        return compare(expected, values, self.bench.job.labels())
 
     def report_difference(self, rule: str, wanted: str, difference: Difference, allowed: float = SMALL) -> None:
         """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only."""

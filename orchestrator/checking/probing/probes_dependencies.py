@@ -119,10 +119,9 @@ def _in_initialisation(context: Context, measured: Measured, budget: Stopwatch) 
         try:
             with bench.instance(initialised=False) as driver:
                 if which:
-                    bench.place(driver, inputs=False)
-                driver.enter_initialisation(job.start, job.stop)
-                if which:
-                    bench.place(driver, inputs=True)
+                    bench.enter_moved(driver)
+                else:
+                    driver.enter_initialisation(job.start, job.stop)
                 _initial(measured, driver, unknowns, knowns, (movement, which), budget)
                 driver.exit_initialisation()
                 _first(measured, driver, unknowns, knowns, (movement, which))

@@ -93,9 +93,7 @@ def _judge_before(context: Context, movement: Mapping[ProbedVariable, Values]) -
     with bench.instance(moved=False) as driver:
         plain = by_variable(stays, driver.read(stays, "after initialisation"))
     with bench.instance(initialised=False) as driver:
-        bench.place(driver, inputs=False)
-        driver.enter_initialisation(job.start, job.stop)
-        bench.place(driver, inputs=True)
+        bench.enter_moved(driver)
         found = by_variable(stays, driver.read(stays, "in initialisation mode"))
         lost = _judge(context, {v: movement[v] for v in stays}, found, _before(job))
         driver.exit_initialisation()

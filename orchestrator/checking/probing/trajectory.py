@@ -110,11 +110,16 @@ class Bench:
         """Bring a new or reset instance to the first communication point."""
         driver.driven = moved
         if moved:
-            self.place(driver, inputs=False)
-        driver.enter_initialisation(self.job.start, self.job.stop)
-        if moved:
-            self.place(driver, inputs=True)
+            self.enter_moved(driver)
+        else:
+            driver.enter_initialisation(self.job.start, self.job.stop)
         driver.exit_initialisation()
+
+    def enter_moved(self, driver: Driver) -> None:
+        """Bring a new or reset instance into initialisation mode, with the values of the movement."""
+        self.place(driver, inputs=False)
+        driver.enter_initialisation(self.job.start, self.job.stop)
+        self.place(driver, inputs=True)
 
     def place(self, driver: Driver, inputs: bool) -> None:
         """Set the values of the movement, those of inputs or all others, a type at a time."""

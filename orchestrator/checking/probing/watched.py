@@ -71,9 +71,7 @@ def _run(bench: Bench, variables: tuple[ProbedVariable, ...]) -> WatchedRun:
         driver.driven = True
         if isinstance(driver, ModelExchange):
             driver.watched = _discrete(job)
-        bench.place(driver, inputs=False)
-        driver.enter_initialisation(job.start, job.stop)
-        bench.place(driver, inputs=True)
+        bench.enter_moved(driver)
         if job.interface != "ScheduledExecution":
             initial = driver.read(variables, "in initialisation mode")
         driver.exit_initialisation()
