@@ -105,10 +105,7 @@ def _first_line(path: str) -> str:
 
 
 def compile_library(compiler: Compiler, target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:
-    """Return the shared library of an FMU for one platform, the same bytes for the same sources and compiler.
-
-    It is compiled once for all builds of these sources on this machine.
-    """
+    """Return the library of an FMU for one platform, the same bytes for the same sources; compiled once a machine."""
     key = (compiler.identity, *compiler.command, *FLAGS, str(target), name, *(
         part for file, content in sorted(sources.items()) for part in (file, content)
     ))  # fmt: skip

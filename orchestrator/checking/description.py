@@ -75,13 +75,7 @@ class DescribedVariable:
         return self.attributes.get(name) in ("true", "1")
 
     def path(self, attribute: str = "") -> str:
-        """XPath of the variable; attributes of the type element are looked for there.
-
-        Put together here, for lxml counts all siblings each time: too slow for 100,000 variables.
-
-        Returns:
-            The path, after the file's name and a colon.
-        """
+        """XPath of the variable, made here: lxml counts all siblings each time, too slow for 100,000 variables."""
         path = self.place
         if attribute and attribute not in self.element.attrib and self.element.tag == "ScalarVariable" and self.kind:
             path += f"/{self.kind}"

@@ -22,11 +22,7 @@ def attributes_of(kind: str, version: str) -> frozenset[str]:
 
 
 def check_grammar(root: etree._Element, version: str, file: str = "modelDescription.xml") -> Iterator[Finding]:
-    """Findings about elements and attributes; equal faults of one kind of element are one finding.
-
-    Args:
-        version: "2.0" or "3.0".
-    """
+    """Findings about elements and attributes; equal faults of one kind of element are one finding."""
     for fault in xml_grammar.grammar_faults(root, _grammar(version)):
         more = f" (and {fault.count - 1} more elements of its kind)" if fault.count > 1 else ""
         path = f"{file}:{fault.element.getroottree().getpath(fault.element)}"

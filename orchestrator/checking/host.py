@@ -196,11 +196,7 @@ class Host:
         return "null" if value is None else value[:_LONGEST_TEXT].decode("utf-8", "replace")
 
     def instantiate_2(self, name: str, kind: int, guid: str, resources: str, logging: bool = True) -> Made:
-        """Make an instance of FMI 2.0.
-
-        Args:
-            kind: 0 for model exchange, 1 for co-simulation.
-        """
+        """Make an instance of FMI 2.0, of a ``kind``: 0 for model exchange, 1 for co-simulation."""
         memory = ctypes.CDLL("msvcrt" if sys.platform == "win32" else None)
         allocate, free = ctypes.cast(memory.calloc, c_void_p), ctypes.cast(memory.free, c_void_p)
         callbacks = _Callbacks(self._logger, allocate, free, None, None)
@@ -271,11 +267,7 @@ class Host:
         return returned[0]
 
     def plan(self, instance: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:
-        """Say what to do in intermediate updates.
-
-        Args:
-            early: at which update, counted from 0, an early return is asked for; -1 for never.
-        """
+        """Say what to do in intermediate updates; at number ``early`` an early return is asked for (-1: never)."""
         self._plan = [instance, reads, writes, values, early]
 
     def updates(self) -> tuple[list[Update], int]:

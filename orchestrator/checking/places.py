@@ -14,16 +14,7 @@ Position = tuple[int, int]
 
 
 def locate_findings(findings: Iterable[Finding], data: bytes, d: Description) -> tuple[Finding, ...]:
-    """Give findings on modelDescription.xml the line and column of their element.
-
-    A path is an XPath in that file, or the name of a variable for what was seen of it while it ran.
-
-    Args:
-        data: the file, from which ``d`` was read.
-
-    Returns:
-        The findings; those that name no element stay as they are.
-    """
+    """Give findings the line and column of their element in modelDescription.xml, ``data``, by XPath or variable."""
     findings = tuple(findings)
     names = {v.name: v.element for v in reversed(d.variables)}
     elements = [_element(d.root, names, finding.path) for finding in findings]

@@ -45,11 +45,7 @@ class Access(NamedTuple):
 
 
 def whole_range(kind: str) -> tuple[int, int] | None:
-    """Return the smallest and the largest number of a whole type.
-
-    Args:
-        kind: of FMI 3.0, such as "UInt8".
-    """
+    """Return the smallest and the largest number of a whole type of FMI 3.0, such as "UInt8"; None for others."""
     c_type = FMI3_TYPES.get(kind)
     if kind in {"Boolean", "String"} or c_type is None or c_type in FLOATS:
         return None

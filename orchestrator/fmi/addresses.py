@@ -19,11 +19,7 @@ def native_calls(
     python: bool,
     step: tuple[int, str] | None = None,
 ) -> NativeCalls | None:
-    """Return addresses for calls from machine code.
-
-    Args:
-        step: address and name of what steps in place of the FMU's own function.
-    """
+    """Return addresses for calls from machine code; ``step``: address and name of what steps in the FMU's place."""
     sent, received = _transfers(functions, inputs, "Set"), _transfers(functions, outputs, "Get")
     if sent is None or received is None:
         return None

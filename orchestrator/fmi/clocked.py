@@ -23,11 +23,7 @@ class ClockedTransfers:
         self._clocks, self._is_active = clocks, is_active
 
     def sends(self, names: Sequence[str], buffer: Signals, bind: Bind) -> Transfer:
-        """Return a call that sets variables from ``buffer``, as far as their clocks allow.
-
-        Args:
-            buffer: shape (len(names),).
-        """
+        """Return a call that sets variables from ``buffer``, shape (len(names),), as far as their clocks allow."""
         parts = self._parts(names, buffer, bind)
         if parts is None:
             return bind(names, buffer)
@@ -41,11 +37,7 @@ class ClockedTransfers:
         return send
 
     def receives(self, names: Sequence[str], buffer: Signals, bind: Bind) -> Transfer:
-        """Return a call that reads variables into ``buffer``; between the ticks of its clocks a value stays there.
-
-        Args:
-            buffer: shape (len(names),).
-        """
+        """Return a call that reads variables into ``buffer``, shape (len(names),); between ticks a value stays."""
         parts = self._parts(names, buffer, bind)
         if parts is None:
             return bind(names, buffer)

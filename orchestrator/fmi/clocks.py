@@ -103,11 +103,7 @@ def _samples_itself(clock: etree._Element) -> bool:
 
 
 def clock_interval(clock: etree._Element, name: str | None = None) -> Fraction | None:
-    """Return a clock's interval in seconds, where it is declared.
-
-    Args:
-        name: of the clock, where the element has none.
-    """
+    """Return a clock's interval [s], where it is declared; ``name``: of the clock, where the element has none."""
     named = f"interval of its clock {name or clock.get('name')!r}"
     interval = _seconds(clock, "interval", named)
     if interval is not None and interval <= 0:

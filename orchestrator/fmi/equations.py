@@ -56,12 +56,7 @@ class Equations:
     def feed(
         self, batches: list[VariableBatch], buffer: Any, values: Callable[[float], Sequence[float]] | None
     ) -> None:
-        """Say what inputs are inside steps, from now on.
-
-        Args:
-            batches: that set the inputs, from ``buffer``.
-            values: a value per input at a time [s]; None: inputs are held.
-        """
+        """Say what the inputs of ``batches`` are inside steps: ``values`` at a time [s], by ``buffer``; None: held."""
         self._batches, self._buffer, self._values = batches, buffer, values
 
     def read_states(self) -> NDArray[np.float64]:

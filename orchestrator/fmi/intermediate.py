@@ -36,11 +36,7 @@ class IntermediateUpdates:
     def feed(
         self, functions: Functions, accesses: Sequence[Access], values: Callable[[float], Sequence[float]] | None
     ) -> None:
-        """Say what inputs are inside steps, from now on.
-
-        Args:
-            values: a value per input at a time [s]; None: inputs are held.
-        """
+        """Say what inputs are inside steps, from now on: ``values`` at a time [s]; None: inputs are held."""
         self._buffer = np.empty(len(accesses))
         self._batches = functions.batches(accesses, "Set", self._buffer)
         self._values = values

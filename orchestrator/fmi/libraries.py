@@ -35,26 +35,13 @@ def library_of(name: str, path: Path, folder: Path, identifier: str, version: st
 
 
 def load_library(path: Path, python: bool) -> Any:
-    """Load a shared library and return it.
-
-    Args:
-        path: of it. Libraries beside it are found where the system looks in the current directory.
-        python: it runs Python: call it with the interpreter's lock held, which it would take back at once.
-
-    Raises:
-        OSError: it cannot be loaded.
-    """
+    """Load a shared library, or raise an OSError; one that runs Python is called with the interpreter's lock held."""
     with contextlib.chdir(path.parent):
         return (ctypes.PyDLL if python else ctypes.CDLL)(str(path))
 
 
 def free_library(library: Any, release: Any = _RELEASE) -> None:
-    """Release a library that nobody calls any more.
-
-    Args:
-        library: what ``load_library`` returned.
-        release: the system's function, bound early: an interpreter that ends takes modules apart.
-    """
+    """Release a library that nobody calls; ``release`` is bound early: a dying interpreter takes modules apart."""
     release(library._handle)
 
 

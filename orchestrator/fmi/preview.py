@@ -55,11 +55,7 @@ class FmuPreview(msgspec.Struct, frozen=True):
 
 
 def preview_fmu(path: Path) -> FmuPreview:
-    """Return the interface of an FMU, from its model description alone.
-
-    Raises:
-        FmuError: the archive or the description cannot be used.
-    """
+    """Return the interface of an FMU, from its model description alone."""
     described = read_description(path)
     model = described.model
     kind = "co-simulation" if described.exchange is None else "model exchange"

@@ -335,13 +335,7 @@ class FmuSlave(Slave):
     def raise_for_status(
         self, status: int, function: str, time: float, reached: float = math.nan, size: float = math.nan
     ) -> None:
-        """Raise for a status that the compiled loop met.
-
-        Args:
-            time: when [s].
-            reached: where the FMU says that it came to in a step [s].
-            size: of the step [s].
-        """
+        """Raise for a status that the compiled loop met at ``time`` [s], in a step of ``size`` to ``reached`` [s]."""
         self._reached, self._size = time, size
         self._check(status, function)
 

@@ -53,11 +53,7 @@ class Variables:
 
 
 def read_variables(root: etree._Element, configured: Mapping[str, Value] | None = None) -> Variables:
-    """Return the variables of a model description.
-
-    Args:
-        configured: values of structural parameters, in place of their start values.
-    """
+    """Return the variables of a model description, with ``configured`` values of structural parameters."""
     given = {name: str(value).lower() for name, value in (configured or {}).items()}
     elements = [e for e in root.iterfind("ModelVariables/*") if isinstance(e.tag, str)]
     types = {t.attrib["name"]: t for t in root.iterfind("TypeDefinitions/*") if isinstance(t.tag, str)}

@@ -38,10 +38,7 @@ def _run_text(execution: Execution) -> str:
 
 
 def as_lines(verdict: Verdict) -> list[str]:
-    """The verdict for a terminal: the summary, then a few lines for each issue that the baseline does not have.
-
-    The same fault at many places is one of them.
-    """
+    """The verdict for a terminal: the summary, then each new issue; the same fault at many places is one of them."""
     groups: dict[tuple[Severity, str, str], list[Finding]] = {}
     for issue in verdict.new_issues:
         f = issue.finding

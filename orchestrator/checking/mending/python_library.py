@@ -13,14 +13,7 @@ _GUID = "resources/guid.txt"  # with which the launcher compares what a host han
 
 
 def mend_library(members: dict[str, bytes], guid: str, findings: Iterable[Finding]) -> tuple[list[str], list[str]]:
-    """Put the launcher in the place of PythonFMU's Linux library, which then lies beside it.
-
-    Args:
-        members: content by path in the FMU; it is changed.
-
-    Returns:
-        What was mended, and what could not be.
-    """
+    """Put the launcher in the place of PythonFMU's Linux library; what was mended, and what could not be."""
     paths = [f.path for f in findings if f.rule == "binary.python-symbols"]
     place = next((p for p in paths if str(PurePosixPath(p).parent) == _FOLDER), None)
     if place is None or _MARK not in members:

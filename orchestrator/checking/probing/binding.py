@@ -168,11 +168,7 @@ class Library:
         return [(answer.status, answer.values) for answer in answers]
 
     def plan(self, number: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:
-        """Say what the host does in intermediate updates; see there.
-
-        Args:
-            early: at which update an early return is asked for; -1 for never.
-        """
+        """Say what the host does in intermediate updates; see there."""
         self._ask(_NOTHING, "", "plan", number, reads, writes, values, early)
 
     def updates(self) -> tuple[list[Update], int]:

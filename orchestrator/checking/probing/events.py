@@ -102,10 +102,7 @@ class EventDriver(Driver):
         return interval, qualifier
 
     def judge_intervals(self) -> list[str]:
-        """Ask for the intervals that the description has; what differs from it.
-
-        An FMU that refuses to tell is left alone; it must not be called any further then.
-        """
+        """What intervals differ from the description; an FMU that refuses to tell must not be called any further."""
         wrong = []
         for clock in self.job.clocks:
             if clock.interval is None or clock.kind != "constant":
@@ -126,14 +123,7 @@ class EventDriver(Driver):
         return float(shift)
 
     def next_instant(self, end: float) -> float:
-        """The next time at which event mode must be entered, ``end`` at the latest.
-
-        Args:
-            end: of the communication step [s].
-
-        Returns:
-            The time [s].
-        """
+        """The next time [s] at which event mode must be entered, ``end`` at the latest."""
         times = [*self.memory.get("ticks", {}).values(), end]
         if self.memory.get("next") is not None:
             times.append(self.memory["next"])

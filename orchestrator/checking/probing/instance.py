@@ -36,11 +36,7 @@ class FmuInstance:
         self._fatal = value
 
     def raw(self, function: str, *values: Any) -> tuple[int, list[Any]]:
-        """Call a function and return its status and what its output arguments hold.
-
-        Args:
-            values: what ``tables.functions`` wants for its parameters.
-        """
+        """Call a function with what its parameters in the table want; its status, and what its outputs hold."""
         return self._call([(function, values)])[0]
 
     def _call(self, requests: Sequence[Request]) -> list[tuple[int, list[Any]]]:

@@ -49,11 +49,7 @@ class Measured:
     def look(
         self, unknowns: Sequence[ProbedUnknown], v: ProbedVariable, rows: list[list[Any]], change: float | None, at: str
     ) -> None:
-        """Take the values of unknowns before and while a known has another value.
-
-        Args:
-            change: of the known; None where it is no number.
-        """
+        """Take the values of unknowns before and while a known has another value, by ``change`` if it is a number."""
         position = 0
         for u in unknowns:
             before, during = (row[position : position + u.variable.size] for row in rows)
@@ -111,11 +107,7 @@ class Measured:
                 self.context.report("value.stale", text, unknown)
 
     def _judge_kind(self, u: ProbedUnknown, label: str, known: str, kind: str) -> bool:
-        """Whether a factor is not as constant as its kind says: in the whole run, at one point, or for all parameters.
-
-        Args:
-            label: of the unknown, or of an element of it.
-        """
+        """Whether a factor is not as constant as its kind says: in the whole run, at a point, or for all parameters."""
         found = self.quotients.get((u.section, label, known), [])
         states = self.context.bench.job.state_variables
         if kind == "constant" and states and all(v.initial == "exact" for v in states):

@@ -144,15 +144,7 @@ class ModelExchange(EventDriver):
         return bool(entered[0]), bool(terminate[0])
 
     def _try(self, t: float, x: list[float], h: float, when: str) -> tuple[list[float], float, float, list[bool]]:
-        """Do a step of at most ``h`` that is exact enough and passes no event by far.
-
-        Args:
-            t, x: time [s] and states.
-            h: size of the step [s].
-
-        Returns:
-            States, time, the size of the next step, and the signs of the event indicators.
-        """
+        """Do an exact step of at most ``h`` that passes no event by far; states, time, next step and signs after it."""
         slope, _ = self._place(t, x, when)
         shortest = 1e-4 * h
         while True:

@@ -52,14 +52,7 @@ def settable(v: ProbedVariable) -> bool:
 
 
 def moved(v: ProbedVariable, base: Sequence[Any], which: int = 0) -> Values | None:
-    """Other values than ``base`` within the limits.
-
-    Args:
-        which: of several such values; numbers next to one another lie on both sides of ``base``.
-
-    Returns:
-        As many values as there are in ``base``; None where there are no others.
-    """
+    """Other values than ``base`` within the limits, number ``which`` of several on both sides; None: there are none."""
     found = tuple(_other(v, value, which, i) for i, value in enumerate(base))
     return None if not found or any(value is None for value in found) else found
 

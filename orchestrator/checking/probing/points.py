@@ -62,11 +62,7 @@ def state_vector(driver: Driver) -> tuple[ProbedVariable, ...]:
 
 
 def points(bench: Bench, driver: Driver) -> Iterator[RestPoint]:
-    """Go through a driven run and rest at some of its points.
-
-    Args:
-        driver: at the start of the run.
-    """
+    """Go through a driven run from its start, where ``driver`` is, and rest at some of its points."""
     job = bench.job
     done = 0
     for number, share in enumerate(_SHARES):

@@ -112,11 +112,7 @@ class Context:
             self.bench.movement, self.trace, self.plain = near
 
     def compare(self, expected: list[list[Any]], values: list[list[Any]]) -> Difference | None:
-        """Hold a run against another; None when they are equal bit for bit.
-
-        Args:
-            expected: the one run, [step][output].
-        """
+        """Hold a run against the ``expected`` one, both [step][output]; None when they are equal bit for bit."""
         return compare(expected, values, self.bench.job.labels())
 
     def report_difference(self, rule: str, wanted: str, difference: Difference, allowed: float = SMALL) -> None:

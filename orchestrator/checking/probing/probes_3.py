@@ -210,12 +210,7 @@ def structure(context: Context) -> None:
 
 
 def _run_resized(context: Context, driver: Driver, sizes: Mapping[int, int]) -> None:
-    """Arrays of other sizes keep what is set, and the run begins with as many states as there are then.
-
-    Args:
-        driver: with these sizes set, not yet in initialisation mode.
-        sizes: values of the structural parameters by their value references.
-    """
+    """Arrays of other sizes, by reference, keep what is set; the run begins with as many states as there are then."""
     job = context.bench.job
     states = None if job.state_variables is None else sum(v.resize(sizes).size for v in job.state_variables)
     driver.job = replace(

@@ -189,11 +189,7 @@ def _judge_order(
 
 
 def _by_changes(point: RestPoint, unknowns: list[ProbedVariable], knowns: list[ProbedVariable], width: float) -> Matrix:
-    """Central differences about the values at a point, all of which stay within their bounds.
-
-    Args:
-        width: of the changes, in multiples of the usual one.
-    """
+    """Central differences about a point within the bounds, over a ``width`` in multiples of the usual change."""
     columns = []
     for v in knowns:
         base = point.get(v)

@@ -22,14 +22,7 @@ _MOST = 100
 
 
 def judge_following(context: Context, point: RestPoint, others: Sequence[float]) -> bool:
-    """Outputs and derivatives follow states and inputs that were set, and nothing else.
-
-    Args:
-        others: a vector of states other than the present one.
-
-    Returns:
-        Whether it is so.
-    """
+    """Whether outputs and derivatives follow states, set to ``others``, and inputs that are set, and nothing else."""
     driver = point.driver
     assert isinstance(driver, ModelExchange)
     x, rates = driver.continuous_states(), driver.rates()
@@ -88,11 +81,7 @@ def _is_back(context: Context, driver: ModelExchange, rates: Sequence[float], wh
 
 
 def judge_completed_step(context: Context, point: RestPoint, others: Sequence[float]) -> None:
-    """A completed step that leads to no event leaves the derivatives as they are; the run ends with this.
-
-    Args:
-        others: a vector of states other than that of the last completed step.
-    """
+    """A completed step, states at ``others`` and no event, leaves the derivatives as they are; it ends the run."""
     driver = point.driver
     assert isinstance(driver, ModelExchange)
     t = point.time + _LATER * context.bench.job.step

@@ -61,11 +61,7 @@ def _ask(driver: Driver, variables: Sequence[ProbedVariable], order: int, when: 
 
 
 def _judge(context: Context, names: tuple[str, str], order: int, values: tuple[list[float], list[float]]) -> bool:
-    """Whether a derivative, the second of ``values``, is near the slopes of the first.
-
-    Args:
-        names: of the variable, and of the element of it.
-    """
+    """Whether a derivative, the second of ``values``, is near the slopes of the first; ``names``: variable, element."""
     below, derivative = values
     what = f"{_ORDERS[order - 1]} derivative of `{names[1]}`"
     absent = sum(not math.isfinite(x) for x in derivative)
@@ -94,12 +90,7 @@ def _divides(context: Context) -> bool:
 
 
 def _is_off(below: Sequence[float], derivatives: Sequence[float], size: float) -> bool:
-    """Whether the derivative in the middle of two short steps is not the slope over both, where they are short enough.
-
-    Args:
-        below, derivatives: before, between and after the two.
-        size: of each [s].
-    """
+    """Whether the derivative between two short steps of ``size`` [s] is not their slope, if that hardly bends."""
     first, second = ((b - a) / size for a, b in pairwise(below))
     mean, largest = 0.5 * (first + second), max(abs(first), abs(second), *map(abs, derivatives))
     noise = 1e-12 * max(map(abs, below)) / size
@@ -112,12 +103,7 @@ def _within(value: float, v: ProbedVariable) -> bool:
 
 
 def is_far(rates: Sequence[float], slopes: Sequence[float]) -> bool:
-    """Whether derivatives at the points between steps are far from the slopes on both sides, at most of them.
-
-    Args:
-        rates: at the end of each step.
-        slopes: of each step but the first.
-    """
+    """Whether derivatives after each step are far from the slopes of the steps before and behind, at most of them."""
     return count_far(rates, slopes) > (len(slopes) - 1) / 2
 
 

@@ -118,16 +118,7 @@ def inner_steps(context: Context) -> None:
 def _report_count(
     context: Context, outputs: Sequence[ProbedVariable], rows: tuple[list[list[Any]], ...], size: float, parts: int
 ) -> bool:
-    """Report an output that goes by the number of steps, whatever their size, and one that stands in short ones.
-
-    Args:
-        rows: outputs in long and in short steps, from the same start.
-        size: of a long step [s].
-        parts: how many short steps are as long as a long one.
-
-    Returns:
-        Whether one was reported.
-    """
+    """Whether an output goes by the number of steps, not by their ``size`` [s], or stands in short ones; it is told."""
     for i, v in enumerate(outputs):
         a, b = ([row[i] for row in found] for found in rows)
         if len(set(a[:_FEWEST_EQUAL])) < _FEWEST_EQUAL or len(b) < parts or _keep_time(a, b, parts):
@@ -171,11 +162,7 @@ def _rows(context: Context, outputs: list[ProbedVariable], size: float, steps: i
 
 
 def _period(rows: Sequence[Sequence[float]], size: float) -> tuple[float, float] | None:
-    """Mean time between changes, and its error, where outputs change again and again and stay in most steps between.
-
-    Args:
-        size: of the steps between rows [s].
-    """
+    """Mean time between changes and its error, if outputs change again and again, not in most steps of ``size`` [s]."""
     changed = [[a != b for a, b in zip(p, q, strict=True)] for p, q in pairwise(rows)]
     moving = [any(column) for column in zip(*changed, strict=True)] if changed else []
     if not any(moving):
