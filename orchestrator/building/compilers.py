@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from orchestrator.errors import FmuError
 from orchestrator.shared.cache import remember
-from orchestrator.shared.machine_code import UNFOLDED, compiler_environment, local_compiler
+from orchestrator.shared.machine_code import UNFOLDED, local_compiler, run_compiler
 from orchestrator.shared.scratch import Scratch
-from orchestrator.shared.tool_runs import run_tool
 
 # No contraction of a product and a sum: it would round once where Python rounds twice.
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall", "-Wextra", "-Wpedantic", *UNFOLDED)
@@ -139,21 +137,6 @@ def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder
         command.append("-lm")
     run_compiler(compiler.identity, command, folder, f"{name}.c for {target.folder}")
     return (folder / library).read_bytes()
-
-
-def run_compiler(compiler: str, command: Sequence[str], folder: Path, what: str) -> None:
-    """Run a compiler in a folder; ``compiler`` and ``what`` it compiles are for messages."""
-    try:
-        run = run_tool(command, folder, compiler_environment(folder))
-    except OSError as error:
-        raise FmuError(f"the C compiler {compiler} cannot be run: {error.strerror}") from None
-    lines = run.stderr.splitlines()
-    if run.returncode != 0:
-        reason = next((line for line in lines if "error" in line), "no message")
-        raise FmuError(f"the C compiler {compiler} failed on {what}: {reason}")
-    warning = next((line for line in lines if "warning:" in line), None)
-    if warning is not None:
-        raise FmuError(f"{what} must compile without warnings, but {compiler} says: {warning}")
 
 
 def _options(target: Target, machine: str, library: str) -> list[str]:

@@ -8,10 +8,9 @@ import sysconfig
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.building.compilers import run_compiler
 from orchestrator.errors import FmuError
 from orchestrator.shared.cache import remember
-from orchestrator.shared.machine_code import local_compiler
+from orchestrator.shared.machine_code import local_compiler, run_compiler
 from orchestrator.shared.scratch import Scratch
 
 _HERE = Path(__file__).parent

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from orchestrator.errors import OutputError
+from orchestrator.errors import FmuError, OutputError
 from orchestrator.shared.cache import cache_directory, is_intact, note_hash, tell_damage
 from orchestrator.shared.publishing import part_of
 from orchestrator.shared.scratch import Scratch
@@ -68,6 +68,21 @@ def compiler_environment(temporary: Path) -> dict[str, str]:
     place = str(cache_directory("zig"))
     own = {"ZIG_GLOBAL_CACHE_DIR": place, "ZIG_LOCAL_CACHE_DIR": place, "TMPDIR": str(temporary)}
     return {**os.environ, **own}
+
+
+def run_compiler(compiler: str, command: Sequence[str], folder: Path, what: str) -> None:
+    """Run a compiler in a folder; ``compiler`` and ``what`` it compiles are for messages."""
+    try:
+        run = run_tool(command, folder, compiler_environment(folder))
+    except OSError as error:
+        raise FmuError(f"the C compiler {compiler} cannot be run: {error.strerror}") from None
+    lines = run.stderr.splitlines()
+    if run.returncode != 0:
+        reason = next((line for line in lines if "error" in line), "no message")
+        raise FmuError(f"the C compiler {compiler} failed on {what}: {reason}")
+    warning = next((line for line in lines if "warning:" in line), None)
+    if warning is not None:
+        raise FmuError(f"{what} must compile without warnings, but {compiler} says: {warning}")
 
 
 def machine_code_folder() -> Path:

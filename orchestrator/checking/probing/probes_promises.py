@@ -26,7 +26,6 @@ promise.dependencies | W | - | 2.2.9 | per-element dependencies are those of Mod
 
 _MOST = 20
 _FEW_STEPS = 5
-_REACHED = 1e-9
 Call = tuple[str, list[Any]]
 
 
