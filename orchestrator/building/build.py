@@ -58,7 +58,7 @@ def build_variant(
     """Build (unless it is there already) an FMU called ``name`` that is ``base`` with other start values."""
     if not IDENTIFIER.fullmatch(name) or name in catalogue():
         raise FmuError(f"`name` must be a new C identifier of at most 100 characters, but is {name!r}")
-    starts = _start_numbers(start_values or {})
+    starts = {parameter: _number(value) for parameter, value in (start_values or {}).items()}
     recipe = replace(recipe_of(base), name=name, starts=starts)
     slave = getattr(importlib.import_module(f"pyfmu_sources.{recipe.module}"), recipe.class_name)
     try:
@@ -66,11 +66,6 @@ def build_variant(
     except ValueError as error:
         raise FmuError(str(error)) from None
     return _ensure(recipe, default_directory() if directory is None else directory)
-
-
-def _start_numbers(values: Mapping[str, float | str]) -> dict[str, float]:
-    """Return start values as numbers, an enumeration's item as its own."""
-    return {parameter: _number(value) for parameter, value in values.items()}
 
 
 def _number(value: float | str) -> float:

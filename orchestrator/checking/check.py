@@ -67,7 +67,8 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     finally:
         if result.files is not None:
             result.files.close()
-    facts = result.facts | _digest(path) | ({"walls": _walls(options.trust)} if executions else {})
+    walls = "none (trusted)" if options.trust else support().in_words
+    facts = result.facts | _digest(path) | ({"walls": walls} if executions else {})
     version = "" if result.description is None else result.description.dialect.version
     return FmuFindings(str(path), shown, version, result.stages, executions, reason, facts)
 
@@ -87,10 +88,3 @@ def _digest(path: Path) -> dict[str, str]:
         return {}
     with path.open("rb") as stream:
         return {"sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
-
-
-def _walls(trust: bool) -> str:
-    """What the FMU was kept from by the kernel, for the reader."""
-    if trust:
-        return "none (trusted)"
-    return support().in_words

@@ -16,6 +16,8 @@ xml.encoding | E | 2.2 | 2.4 | XML is encoded in UTF-8 | save the file as UTF-8
 """)
 
 MAXIMUM_BYTES = 64 << 20
+_GUARDED = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
+_GUARDED |= {"remove_comments": True, "remove_pis": True}
 _FAULTS = {
     expat.errors.codes[message]: text
     for message, text in (
@@ -62,7 +64,7 @@ def parse(data: bytes, name: str) -> tuple[etree._Element | None, list[Finding]]
     reader.XmlDeclHandler = lambda _version, declared, _standalone: encoding.append(declared)
     try:
         reader.Parse(data, True)
-        root = etree.fromstring(data, _parser())
+        root = etree.fromstring(data, etree.XMLParser(**_GUARDED))
     except _DoctypeError:
         return None, [
             Finding("xml.doctype", name, "the file must have no DOCTYPE, but has one (entities are not expanded)")
@@ -78,12 +80,6 @@ def parse(data: bytes, name: str) -> tuple[etree._Element | None, list[Finding]]
     if data[:2] in (b"\xff\xfe", b"\xfe\xff") or (declared or "UTF-8").upper() not in ("UTF-8", "UTF8"):
         return root, [Finding("xml.encoding", name, f"the encoding must be UTF-8, but is {declared or 'UTF-16'}")]
     return root, []
-
-
-def _parser() -> etree.XMLParser:
-    return etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
-    )
 
 
 def xpath(element: etree._Element, attribute: str = "", name: str = "modelDescription.xml") -> str:

@@ -89,17 +89,14 @@ def read_clocks(variables: Variables) -> Clocks:
         timed,
         tuple(told),
         frozenset(outputs.values()),
-        bool(inputs) and all(_samples_itself(clock) for clock in inputs),
+        bool(inputs)
+        and all(clock.find(f"Annotations/Annotation[@type='{SELF_SAMPLING}']") is not None for clock in inputs),
     )
     return Clocks(periodic, triggered, outputs, features, left_out)
 
 
 def _members(variables: Variables, reference: int) -> tuple[str, ...]:
     return tuple(name for name, clocks in variables.clocked.items() if reference in clocks)
-
-
-def _samples_itself(clock: etree._Element) -> bool:
-    return any(note.get("type") == SELF_SAMPLING for note in clock.iterfind("Annotations/Annotation"))
 
 
 def clock_interval(clock: etree._Element, name: str | None = None) -> Fraction | None:

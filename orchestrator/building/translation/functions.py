@@ -39,14 +39,15 @@ def translate(
         scope.fixed = function.by_address
         scope.mutated, scope.covered = set(mutated), set(covered)
         scope.read, scope.once, scope.homes = set(found.read), set(found.once), dict(found.homes)
-        body = block(scope, _without_docstring(node))
+        body = block(scope, node.body[ast.get_docstring(node) is not None :])
         mutated = scope.mutated
         parameters = {name for name, _ in function.parameters}
         kinds = {name: kind for name, kind in scope.kinds.items() if name not in parameters}
         covered |= _names_at_file_scope(scope, body) & {scope.local(name) for name in (*scope.kinds, *found.counters)}
         if not scope.changed and covered == scope.covered:
             break
-    _check_end(source, node, function.returns)
+    if function.returns != NOTHING and not _leaves(node.body):
+        source.refuse(node, f"`{node.name}` must end with `return` on every path")
     function.mutated = {
         name for name, kind in function.parameters if isinstance(kind, Items | ArrayKind) and name in mutated
     }
@@ -116,10 +117,6 @@ def _head(scope: Scope, function: Function) -> str:
         parameters.append("Fault *fault")
     often = "RARELY " if program.paired else ""
     return f"{often}static {program.names.c(function.returns)} {function.c}({', '.join(parameters) or 'void'})"
-
-
-def _without_docstring(node: ast.FunctionDef) -> list[ast.stmt]:
-    return node.body[1:] if ast.get_docstring(node) is not None else node.body
 
 
 def _late_declarations(scope: Scope, names: list[str]) -> list[str]:
@@ -201,11 +198,6 @@ def _own_names(statement: ast.stmt) -> list[ast.Name]:
             found.append(node)
         waiting += [child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.stmt)]
     return sorted(found, key=lambda name: isinstance(name.ctx, ast.Store))
-
-
-def _check_end(source: ModuleSource, node: ast.FunctionDef, returns: Kind) -> None:
-    if returns != NOTHING and not _leaves(node.body):
-        source.refuse(node, f"`{node.name}` must end with `return` on every path")
 
 
 def _leaves(body: list[ast.stmt]) -> bool:

@@ -152,9 +152,10 @@ class Program:
         """Return the definitions of the constants in use."""
         own = {n: v for n, v in self._constants.items() if n not in self._shared}
         wholes = {n: v for n, v in own.items() if isinstance(v, int) and abs(v) < 2**31}
-        lines = [f"enum {{ {name} = {value} }};" for name, value in sorted(wholes.items(), key=_by_value)]
+        lines = [f"enum {{ {name} = {value} }};" for name, value in sorted(wholes.items())]
         others = {n: v for n, v in own.items() if n not in wholes}
-        lines += [f"static const {_c_type(value)} {name} = {value!r};" for name, value in sorted(others.items())]
+        kinds = {name: "int64_t" if isinstance(value, int) else "double" for name, value in others.items()}
+        lines += [f"static const {kinds[name]} {name} = {value!r};" for name, value in sorted(others.items())]
         return "\n".join(lines)
 
     def prototypes(self) -> str:
@@ -191,14 +192,6 @@ def _function_in_c(source: ModuleSource, node: ast.FunctionDef) -> Function:
     )
     function.mutated = {name for name, kind in parameters if isinstance(kind, ArrayKind)}
     return function
-
-
-def _by_value(item: tuple[str, float | int]) -> tuple[str, float | int]:
-    return item
-
-
-def _c_type(value: float | int) -> str:
-    return "int64_t" if isinstance(value, int) else "double"
 
 
 BASE_MODULES = ("pyfmu_sources.adapters.slave_base", "pyfmu_sources.adapters.sampled_slave")

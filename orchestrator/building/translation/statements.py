@@ -145,7 +145,7 @@ def _translate_range(scope: Scope, node: ast.For, call: ast.Call) -> list[str]:
     start = scope.expression(arguments[0], WHOLE).text
     stop = _stop(scope, node, arguments[1])
     ends = (interval(scope, arguments[0]), interval(scope, arguments[1]))
-    variable = _loop_variable(scope, node.target.id)
+    variable = scope.temporary("pass") if node.target.id == "_" else scope.local(node.target.id)
     if node.target.id != "_":
         with_loop(scope, node.target.id, 0, 1)
         _narrow(scope, node.target.id, ends, step[0])
@@ -156,12 +156,6 @@ def _translate_range(scope: Scope, node: ast.For, call: ast.Call) -> list[str]:
     change = {1: f"{variable}++", -1: f"{variable}--"}.get(step[0], f"{variable} += {step[0]}")
     _leave(scope, node.target.id)
     return [f"for (int64_t {variable} = {start}; {variable} {sign} {stop}{stopped}; {change}) {{", *body, "}"]
-
-
-def _loop_variable(scope: Scope, name: str) -> str:
-    if name == "_":
-        return scope.temporary("pass")
-    return scope.local(name)
 
 
 def _narrow(scope: Scope, name: str, ends: tuple[Any, Any], step: int) -> None:

@@ -1,6 +1,6 @@
 """JUnit XML: a suite per FMU, a case per rule of the FMU's version of the standard."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from lxml import etree
 
@@ -22,7 +22,7 @@ def as_junit(verdicts: Sequence[Verdict]) -> str:
 
 
 def _suite(verdict: Verdict) -> etree._Element:
-    cases = list(_cases(verdict))
+    cases = [_case(verdict, o, [i for i in verdict.issues if i.finding.rule == o.rule]) for o in verdict.outcomes]
     suite = etree.Element("testsuite", name=_text(verdict.fmu), **_counts(cases))
     suite.extend(cases)
     return suite
@@ -32,11 +32,6 @@ def _counts(cases: Sequence[etree._Element]) -> dict[str, str]:
     failures = sum(case.find("failure") is not None for case in cases)
     skipped = sum(case.find("skipped") is not None for case in cases)
     return {"tests": str(len(cases)), "failures": str(failures), "errors": "0", "skipped": str(skipped)}
-
-
-def _cases(verdict: Verdict) -> Iterator[etree._Element]:
-    for outcome in verdict.outcomes:
-        yield _case(verdict, outcome, [i for i in verdict.issues if i.finding.rule == outcome.rule])
 
 
 def _case(verdict: Verdict, outcome: RuleOutcome, issues: list[Issue]) -> etree._Element:

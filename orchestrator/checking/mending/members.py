@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from orchestrator.checking.archive import FmuFiles, open_fmu
-from orchestrator.checking.findings import Finding
 from orchestrator.errors import FmuError
 from orchestrator.shared.isolation.archives import ArchiveLimits, is_folder, plain_path
 
@@ -28,7 +27,8 @@ def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], l
         files.close()
     for finding in findings:
         if finding.severity == "error" and finding.rule not in MENDED:
-            raise UnmendableError(f"{path.name} must be mended, but this cannot be: {_place(finding)}{finding.message}")
+            place = f"{finding.path}: " if finding.path else ""
+            raise UnmendableError(f"{path.name} must be mended, but this cannot be: {place}{finding.message}")
     repairs: list[str] = []
     repeated: list[str] = []
     members: dict[str, bytes] = {}
@@ -77,10 +77,6 @@ def _lift(path: Path, members: dict[str, bytes], repairs: list[str]) -> dict[str
         raise UnmendableError(f"{path.name} must be mended, but has no {DESCRIPTION} at its top or in its only folder")
     repairs.append(f"moved all files out of the folder {folder}")
     return {name.partition("/")[2]: data for name, data in members.items()}
-
-
-def _place(finding: Finding) -> str:
-    return f"{finding.path}: " if finding.path else ""
 
 
 def _list_names(names: Iterable[str]) -> str:

@@ -21,6 +21,7 @@ event.without-cause | W | - | 2.3.5 | an event changes something | refresh event
 """)  # noqa: E501
 
 _MOST_RETURNS = 1000
+_EARLY = {"mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate"}
 _SMALL = 1e-9
 
 
@@ -84,7 +85,7 @@ class CoSimulation3(EventDriver):
             text = f"lastSuccessfulTime must lie in the step from {t:g} to {goal:g}, but is {last:g} {when}"
             raise StatusError("fmi3DoStep", 0, text, "step.last-time")
         self.reached = float(last)
-        if early and not (self.early and self._may_return_early()):
+        if early and not (self.early and _EARLY & self.job.flags):
             why = "mightReturnEarlyFromDoStep is not set" if self.early else "earlyReturnAllowed was false"
             self.report("step.early-return", f"fmi3DoStep must not return early, because {why}, but does", when=when)
         if event and not self.events:
@@ -105,10 +106,6 @@ class CoSimulation3(EventDriver):
         if self.habits.idle and self.events and self.next_instant(math.inf) > t + _SMALL * max(abs(t), self.job.step):
             with self.event_mode(t, f"in event mode without a cause at t = {t:g}"):
                 pass
-
-    def _may_return_early(self) -> bool:
-        flags = {"mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate"}
-        return bool(flags & self.job.flags)
 
     def _event(self, t: float, wanted: bool, when: str) -> None:
         """Handle an event; say so when the FMU asked for it, it changes nothing, and the last one was just before.

@@ -29,7 +29,7 @@ def make_job(
     d: Description, interface: Interface, fmu: Path, library: str, reference: ReferenceResult | None, limits: Limits
 ) -> ProbeJob:
     """What is to be run of an interface."""
-    start = _or(d.experiment("startTime"), 0.0)
+    start = begin if (begin := d.experiment("startTime")) is not None and math.isfinite(begin) else 0.0
     stop = d.experiment("stopTime")
     if stop is not None and not start < stop < math.inf:
         stop = None  # a finding already
@@ -119,10 +119,6 @@ def _unknowns(d: Description, by_index: Mapping[int, ProbedVariable]) -> Iterato
             kinds = entry.kinds or ()
             if None not in knowns and len(kinds) in (0, len(knowns)):
                 yield ProbedUnknown(section, v, tuple(k for k in knowns if k is not None), kinds)
-
-
-def _or(value: float | None, default: float) -> float:
-    return default if value is None or not math.isfinite(value) else value
 
 
 def _count(d: Description, variables: list[DescribedVariable | None]) -> int | None:

@@ -68,7 +68,8 @@ def _begins(context: Context, begin: float) -> bool:
     when = f"of an experiment from t = {begin:g}"
     try:
         with context.bench.instance() as driver:
-            found = _time(context, driver)
+            v = context.bench.job.time_variable
+            found = begin if v is None else float(driver.read([v])[0])
             _steps(context, driver)
     except StatusError as error:
         if not error.rule:  # a model may have events at times of its own
@@ -76,14 +77,8 @@ def _begins(context: Context, begin: float) -> bool:
         return False
     except (DiscardedError, TerminatedError):
         return False
-    if found is not None and abs(found - begin) > _NEAR * max(abs(begin), context.bench.job.step):
-        name = context.bench.job.time_variable.name if context.bench.job.time_variable is not None else ""
-        text = f"`{name}` must be the start time after initialisation, but is {found:g}"
-        context.report("start.time", text, name, when)
+    if v is not None and abs(found - begin) > _NEAR * max(abs(begin), context.bench.job.step):
+        text = f"`{v.name}` must be the start time after initialisation, but is {found:g}"
+        context.report("start.time", text, v.name, when)
         return False
     return True
-
-
-def _time(context: Context, driver: Driver) -> float | None:
-    v = context.bench.job.time_variable
-    return None if v is None else float(driver.read([v])[0])

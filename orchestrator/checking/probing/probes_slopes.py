@@ -46,7 +46,9 @@ def judge_outputs(context: Context, outputs: Sequence[ProbedVariable]) -> None:
     places = [(v, label) for v in chosen for label in v.labels]
     wrong: set[str] = set()
     for i, (v, label) in enumerate(places):
-        right = v.name not in wrong and all(_within(row[i], v) for row in rows)  # else a finding already
+        low, high = v.limits
+        within = all(math.isfinite(row[i]) and low <= row[i] <= high for row in rows)
+        right = v.name not in wrong and within  # else a finding already
         for order, derivatives in found.items():
             below = rows if order == 1 else found[order - 1]
             pair = [row[i] for row in below], [row[i] for row in derivatives]
@@ -95,11 +97,6 @@ def _is_off(below: Sequence[float], derivatives: Sequence[float], size: float) -
     mean, largest = 0.5 * (first + second), max(abs(first), abs(second), *map(abs, derivatives))
     noise = 1e-12 * max(map(abs, below)) / size
     return abs(first - second) < TOLERANCE * largest and abs(derivatives[1] - mean) > TOLERANCE * largest + noise
-
-
-def _within(value: float, v: ProbedVariable) -> bool:
-    low, high = v.limits
-    return math.isfinite(value) and low <= value <= high
 
 
 def is_far(rates: Sequence[float], slopes: Sequence[float]) -> bool:

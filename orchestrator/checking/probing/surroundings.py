@@ -41,12 +41,12 @@ class Surroundings:
 
     def _look(self) -> dict[str, str]:
         """What is looked at less often."""
-        found = {"the working folder": os.getcwd(), "the locale": self._language()}
+        found = {
+            "the working folder": os.getcwd(),
+            "the locale": (self._library.setlocale(_LANGUAGE, None) or b"").decode("utf-8", "replace"),
+        }
         found |= {f"the handler of {name}": self._handler(getattr(signal, name)) for name in _TAKEN}
         return found | {f"the environment variable {name}": value for name, value in self._environment().items()}
-
-    def _language(self) -> str:
-        return (self._library.setlocale(_LANGUAGE, None) or b"").decode("utf-8", "replace")
 
     def _handler(self, number: int) -> str:
         action = (ctypes.c_char * _ACTION)()
