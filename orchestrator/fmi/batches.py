@@ -43,6 +43,13 @@ class VariableBatch:
         """Whether values and variables are the same, one for one in the same order."""
         return self.places == list(range(len(self.values)))
 
+    def take(self, given: Signals) -> None:
+        """Take what is to be set, unless it lies in place, then ``complete``."""
+        if not shares(self.values, given):
+            for place, position in zip(self.places, self.positions, strict=True):
+                self.values[place] = in_c(given[position], self.values)
+        self.complete()
+
     def complete(self) -> None:
         """Note the elements of arrays that are about to be set, and fill in those that keep their values."""
         for place, array, element in self.kept:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.fmi.batches import VariableBatch, in_c, shares
+from orchestrator.fmi.batches import VariableBatch
 from orchestrator.fmi.messages import DISCARD, OK
 
 _POINTER = POINTER(c_double)
@@ -108,9 +108,6 @@ class Equations:
             return worst
         self._buffer[:] = self._values(time)
         for batch in self._batches:
-            if not shares(batch.values, self._buffer):
-                for place, position in zip(batch.places, batch.positions, strict=True):
-                    batch.values[place] = in_c(self._buffer[position], batch.values)
-            batch.complete()
+            batch.take(self._buffer)
             worst = max(worst, batch.call())
         return worst

@@ -7,8 +7,7 @@ from pathlib import Path
 from orchestrator.errors import FmuError, ScenarioError
 from orchestrator.fmi.clocks import ClockTimes, times_problem
 from orchestrator.fmi.event_slave3 import EventFmuSlave
-from orchestrator.fmi.exchange2 import Exchange2Slave
-from orchestrator.fmi.exchange3 import Exchange3Slave
+from orchestrator.fmi.exchange import Exchange2Slave, Exchange3Slave
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.ours import is_ours
 from orchestrator.fmi.slave import FmuSlave

@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestrator.errors import SlaveError
 from orchestrator.fmi.access import Access
-from orchestrator.fmi.batches import Functions, VariableBatch, shares
+from orchestrator.fmi.batches import Functions, VariableBatch
 from orchestrator.fmi.messages import WARNING
 
 CALLBACK = ctypes.CFUNCTYPE(
@@ -60,10 +60,7 @@ class IntermediateUpdates:
             self._failure = error
 
     def _set(self, batch: VariableBatch, time: float) -> None:
-        if not shares(batch.values, self._buffer):
-            for place, position in zip(batch.places, batch.positions, strict=True):
-                batch.values[place] = float(self._buffer[position])
-        batch.complete()
+        batch.take(self._buffer)
         status = batch.call()
         if status > WARNING:
             raise SlaveError(f"{self._name}: {batch.function} inside a step at t = {time:g} s was refused")

@@ -12,7 +12,6 @@ from orchestrator.errors import FmuError
 from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, names_in_words, read_clocks
-from orchestrator.fmi.exchange import Exchange, continuous_inputs, read_exchange
 from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.shared.isolation.archives import open_archive
 from orchestrator.shared.units import EXPONENTS
@@ -20,6 +19,21 @@ from orchestrator.shared.units import EXPONENTS
 PYTHON_SLAVE = "resources/slavemodule.txt"  # in what PythonFMU builds
 MAXIMUM_XML = 64 * 2**20
 """Bytes of XML beyond which a model description is refused: ten times the largest seen in the wild."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """What it takes to integrate an FMU for model exchange.
+
+    Attributes:
+        states: number of continuous states, before structural parameters are set.
+        indicators: number of event indicators, likewise.
+        completed: the FMU is to be told of every step that the integrator has completed.
+    """
+
+    states: int
+    indicators: int
+    completed: bool
 
 
 @dataclass(frozen=True)
@@ -153,8 +167,10 @@ def _describe(
     found = variables2.read_variables(root) if is_old else variables3.read_variables(root, configured)
     names = _unique([v.name for v in found.scalars])
     variables = dict(zip(names, found.scalars, strict=True))
-    exchange = None if interface.tag == "CoSimulation" else read_exchange(root, interface)
-    inputs = continuous_inputs(variables) if exchange else frozenset[str]()
+    exchange = None if interface.tag == "CoSimulation" else _read_exchange(root, interface)
+    is_free = ("input", "Real", "continuous")  # may change while time goes on
+    free = (v.name for v in variables.values() if (v.causality, v.type, v.variability) == is_free)
+    inputs = frozenset(free if exchange else ())
     has_events = exchange is not None or (not is_old and _flag(interface, "hasEventMode"))
     clocks = read_clocks(found)
     if found.clocks and not has_events:
@@ -191,6 +207,17 @@ def _describe(
         exchange=exchange,
         inputs=inputs,
     )
+
+
+def _read_exchange(root: etree._Element, interface: etree._Element) -> Exchange:
+    """Return what a description says; in FMI 3.0 the FMU itself says better."""
+    yes = {"true", "1"}
+    if root.get("fmiVersion") == "2.0":
+        states, indicators = root.findall("ModelStructure/Derivatives/Unknown"), root.get("numberOfEventIndicators")
+        not_needed = interface.get("completedIntegratorStepNotNeeded") in yes
+        return Exchange(len(states), int(indicators or 0), not not_needed)
+    states, found = (root.findall(f"ModelStructure/{tag}") for tag in ("ContinuousStateDerivative", "EventIndicator"))
+    return Exchange(len(states), len(found), interface.get("needsCompletedIntegratorStep") in yes)
 
 
 def _note_on_unusable(binaries: Sequence[str], clocks: Sequence[str]) -> str:

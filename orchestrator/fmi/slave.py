@@ -232,10 +232,7 @@ class FmuSlave(Slave):
 
         def send() -> None:
             for batch in batches:
-                if not shares(batch.values, buffer):
-                    for place, position in zip(batch.places, batch.positions, strict=True):
-                        batch.values[place] = in_c(buffer[position], batch.values)
-                batch.complete()
+                batch.take(buffer)
                 self._alive(batch.function)
                 self._check(batch.call(), batch.function)
 

@@ -3,8 +3,7 @@
 from lxml import etree
 
 from orchestrator.fmi.access import Access
-from orchestrator.fmi.starts import number, start_value
-from orchestrator.fmi.variables3 import Variables
+from orchestrator.fmi.variables3 import Variables, number, start_value
 from orchestrator.master.protocol import Variable
 
 _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")

@@ -10,7 +10,6 @@ from lxml import etree
 from orchestrator.errors import FmuError
 from orchestrator.fmi.access import Access, whole_range
 from orchestrator.fmi.size import MOST_VARIABLES, element_count
-from orchestrator.fmi.starts import number, start_value
 from orchestrator.master.protocol import Value, Variable
 
 TYPES = {
@@ -222,3 +221,20 @@ def read_feedthrough(root: etree._Element, variables: Variables) -> dict[str, fr
             of_each = frozenset(inputs.intersection(known))  # one set for all elements of an array
             direct |= dict.fromkeys(variables.names.get(int(output.attrib["valueReference"]), ()), of_each)
     return direct
+
+
+def number(text: str | None) -> float | None:
+    """Return the number that a text is."""
+    return None if text is None else float(text)
+
+
+def start_value(kind: str, text: str | None, name: str) -> Value | None:
+    """Return a start value."""
+    if text is None or kind == "String":
+        return text
+    if kind == "Boolean":
+        return text in {"true", "1"}
+    value = float(text) if kind == "Real" else int(text)
+    if not math.isfinite(value):
+        raise ValueError(f"the start value of {name!r} is {text}")
+    return value

@@ -1,17 +1,18 @@
 """The repair of one FMU: archive, description, token, library; what is mended shows what else is wrong."""
 
+import hashlib
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from lxml import etree
 
 from orchestrator.building.archive import write_archive
+from orchestrator.building.launcher import compile_launcher, find_toolchain
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.mending.description import mend_description, mend_token
 from orchestrator.checking.mending.members import DESCRIPTION, UnmendableError, read_members
-from orchestrator.checking.mending.python_library import mend_library
 from orchestrator.checking.mending.structure import mend_structure
 from orchestrator.checking.static import check_static
 from orchestrator.checking.xml_reading import parse
@@ -20,6 +21,9 @@ from orchestrator.shared.isolation.archives import ArchiveLimits
 from orchestrator.shared.scratch import Scratch
 
 _MOST_ROUNDS = 5
+_MARK = "resources/slavemodule.txt"  # by which PythonFMU's library finds the class
+_FOLDER = "binaries/linux64"
+_GUID = "resources/guid.txt"  # with which the launcher compares what a host hands over
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,7 @@ def mend_fmu(path: Path, target: Path, limits: ArchiveLimits | None = None) -> R
             findings = _findings(scratch.path / f"{number}.fmu", members, limits)
             guid, mended = _mend_xml(members, findings)
             if number == 0:
-                library, left = mend_library(members, guid, findings)
+                library, left = _mend_library(members, guid, findings)
                 mended += library
             done += mended
             if not mended:
@@ -79,3 +83,20 @@ def _mend_xml(members: dict[str, bytes], findings: list[Finding]) -> tuple[str, 
         etree.indent(root)
         members[DESCRIPTION] = etree.tostring(root, encoding="UTF-8", xml_declaration=True)
     return root.get("guid", ""), done
+
+
+def _mend_library(members: dict[str, bytes], guid: str, findings: list[Finding]) -> tuple[list[str], list[str]]:
+    """Give a library of PythonFMU that loads in Python programs alone our launcher; what was mended, and what not."""
+    paths = [f.path for f in findings if f.rule == "binary.python-symbols"]
+    place = next((p for p in paths if str(PurePosixPath(p).parent) == _FOLDER), None)
+    if place is None or _MARK not in members:
+        return [], []
+    toolchain = find_toolchain()
+    if toolchain.compiler is None:
+        return [], [f"{place} loads in Python programs only; its launcher needs a C compiler (cc) on Linux"]
+    library = members[place]
+    wrapper = f"pythonfmu-{hashlib.sha256(library).hexdigest()[:12]}.so"
+    members[place] = compile_launcher(toolchain, wrapper)
+    members[f"{_FOLDER}/{wrapper}"] = library
+    members[_GUID] = guid.encode()
+    return [f"put a launcher in the place of {place}, which brings a Python to programs that have none"], []
