@@ -4,9 +4,10 @@ import re
 import shutil
 import stat
 import zipfile
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
-from typing import Protocol
+from typing import IO
 
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.rules import declare
@@ -41,24 +42,36 @@ _LONGEST_NAME = 255
 _LONGEST_PATH = 1000
 
 
-class FmuFiles(Protocol):
-    """Read access to the files of an FMU, packed or not."""
+class FmuFiles(ABC):
+    """Read access to the files of an FMU, by their paths with forward slashes and without dots; no folders."""
 
+    @abstractmethod
     def names(self) -> list[str]:
-        """Paths of the files, with forward slashes, folders left out."""
+        """Paths of the files."""
+
+    @abstractmethod
+    def open(self, name: str) -> IO[bytes]:
+        """Open a file."""
 
     def read(self, name: str, limit: int) -> bytes:
         """At most ``limit`` + 1 bytes of a file, so that a longer one can be told."""
+        with self.open(name) as stream:
+            return stream.read(limit + 1)
 
     def extract(self, target: Path) -> None:
         """Copy all files below ``target``."""
+        for name in self.names():
+            destination = target / name
+            destination.parent.mkdir(parents=True, exist_ok=True)
+            with self.open(name) as source, destination.open("wb") as sink:
+                shutil.copyfileobj(source, sink)
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 (an unpacked FMU holds nothing open)
         """Let go of the archive."""
 
 
 class ZipFiles(FmuFiles):
-    """The files of a packed FMU, by their paths with forward slashes and without dots."""
+    """The files of a packed FMU."""
 
     def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
         self.archive = archive
@@ -67,16 +80,8 @@ class ZipFiles(FmuFiles):
     def names(self) -> list[str]:
         return list(self.files)
 
-    def read(self, name: str, limit: int) -> bytes:
-        with self.archive.open(self.files[name]) as stream:
-            return stream.read(limit + 1)
-
-    def extract(self, target: Path) -> None:
-        for name, info in self.files.items():
-            destination = target / name
-            destination.parent.mkdir(parents=True, exist_ok=True)
-            with self.archive.open(info) as source, destination.open("wb") as sink:
-                shutil.copyfileobj(source, sink)
+    def open(self, name: str) -> IO[bytes]:
+        return self.archive.open(self.files[name])
 
     def close(self) -> None:
         self.archive.close()
@@ -92,18 +97,8 @@ class FolderFiles(FmuFiles):
         files = (p for p in sorted(self.root.rglob("*")) if p.is_file() and not p.is_symlink())
         return [p.relative_to(self.root).as_posix() for p in files]
 
-    def read(self, name: str, limit: int) -> bytes:
-        with (self.root / name).open("rb") as stream:
-            return stream.read(limit + 1)
-
-    def extract(self, target: Path) -> None:
-        for name in self.names():
-            destination = target / name
-            destination.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(self.root / name, destination)
-
-    def close(self) -> None:
-        """Nothing is held open."""
+    def open(self, name: str) -> IO[bytes]:
+        return (self.root / name).open("rb")
 
 
 def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[Finding]]:

@@ -182,11 +182,6 @@ def _exports(library: LibraryHeader, data: bytes, function: str) -> bool:
 
 
 def _this_machine() -> str:
+    names = dict.fromkeys(("x86_64", "amd64", "i386", "i686"), "x86") | dict.fromkeys(("arm64", "aarch64"), "arm")
     machine = platform.machine().lower()
-    return (
-        "x86"
-        if machine in ("x86_64", "amd64", "i386", "i686", "x86")
-        else "arm"
-        if machine in ("arm64", "aarch64")
-        else machine
-    )
+    return names.get(machine, machine)

@@ -9,9 +9,8 @@ from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, number
 from orchestrator.checking.findings import Finding, list_names
-from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.rules import declare
-from orchestrator.checking.xml_reading import xpath
+from orchestrator.checking.xml_reading import check_grammar, xpath
 
 declare("""
 [files]

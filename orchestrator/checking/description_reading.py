@@ -126,15 +126,9 @@ def _entries(root: etree._Element, dialect: FmiDialect, section: str) -> tuple[S
     found = []
     for position, element in enumerate(root.findall(f"ModelStructure/{section}") if section else (), 1):
         dependencies, kinds = element.get("dependencies"), element.get("dependenciesKind")
-        place = f"{_FILE}/ModelStructure/{section}[{position}]"
-        found.append(
-            StructureEntry(
-                place,
-                integer(element.get(dialect.identity)),
-                None if dependencies is None else _integers(dependencies),
-                None if kinds is None else tuple(kinds.split()),
-            )
-        )
+        place, variable = f"{_FILE}/ModelStructure/{section}[{position}]", integer(element.get(dialect.identity))
+        named = None if dependencies is None else _integers(dependencies)
+        found.append(StructureEntry(place, variable, named, None if kinds is None else tuple(kinds.split())))
     return tuple(found)
 
 

@@ -8,7 +8,6 @@ from lxml import etree
 
 from orchestrator.checking.description import Description, Interface, number
 from orchestrator.checking.findings import Finding, list_names
-from orchestrator.checking.grammar import attributes_of
 from orchestrator.checking.rules import declare
 from orchestrator.checking.units import (
     Conversion,
@@ -17,7 +16,7 @@ from orchestrator.checking.units import (
     display_conversion,
     lacks_angle,
 )
-from orchestrator.checking.xml_reading import xpath
+from orchestrator.checking.xml_reading import attributes_of, xpath
 from orchestrator.shared.units import EXPONENTS
 
 declare("""

@@ -11,7 +11,6 @@ from orchestrator.checking.binaries import PLATFORMS, check_binaries
 from orchestrator.checking.description import Description
 from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Facts, Finding
-from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.layered import ReferenceResult, check_files, check_layered
 from orchestrator.checking.rules import declare
 from orchestrator.checking.rules_arrays import check_arrays, check_clocks
@@ -67,7 +66,7 @@ def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
         return StaticResult(findings, stages, files, facts=facts)
     description = read_description(root)
     facts |= _facts(description, files)
-    findings += check_grammar(root, description.dialect.version)
+    findings += xml_reading.check_grammar(root, description.dialect.version)
     findings += _check_description(description)
     findings += check_binaries(description, files)
     findings += check_files(description, files)

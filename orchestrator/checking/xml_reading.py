@@ -1,19 +1,25 @@
-"""XML from strangers: parsed only when it is small, UTF-8, well-formed and without a document type."""
+"""XML from strangers: parsed only when it is small, UTF-8, well-formed and without a document type; its grammar."""
 
+from collections.abc import Iterator
 from xml.parsers import expat
 
 from lxml import etree
 
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.rules import declare
+from orchestrator.checking.tables.grammar2 import FMI2
+from orchestrator.checking.tables.grammar3 import FMI3
+from orchestrator.shared import xml_grammar
 
 declare("""
+[schema]
+schema.invalid | E | 2.2 | 2.4 | XML files have the elements and attributes of the schemas of FMI | correct the element or attribute
 [xml]
 xml.too-large | E | * | * | an XML file stays within the size limit | split arrays or shorten descriptions
 xml.doctype | E | * | * | there is no DOCTYPE and no entity | remove the DOCTYPE and write the entities out
 xml.malformed | E | 2.2 | 2.4 | an XML file is well-formed | mend the XML at the place named
 xml.encoding | E | 2.2 | 2.4 | XML is encoded in UTF-8 | save the file as UTF-8
-""")
+""")  # noqa: E501
 
 MAXIMUM_BYTES = 64 << 20
 _GUARDED = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
@@ -86,3 +92,20 @@ def xpath(element: etree._Element, attribute: str = "", name: str = "modelDescri
     """Where an element is: ``modelDescription.xml:/fmiModelDescription/ModelVariables/ScalarVariable[3]``."""
     path = element.getroottree().getpath(element)
     return f"{name}:{path}" + (f"/@{attribute}" if attribute else "")
+
+
+def attributes_of(kind: str, version: str) -> frozenset[str]:
+    """The attributes that version "2.0" or "3.0" of the standard has for a type."""
+    return xml_grammar.attributes_of(_grammar(version), kind)
+
+
+def check_grammar(root: etree._Element, version: str, file: str = "modelDescription.xml") -> Iterator[Finding]:
+    """Findings about elements and attributes; equal faults of one kind of element are one finding."""
+    for fault in xml_grammar.grammar_faults(root, _grammar(version)):
+        more = f" (and {fault.count - 1} more elements of its kind)" if fault.count > 1 else ""
+        path = f"{file}:{fault.element.getroottree().getpath(fault.element)}"
+        yield Finding("schema.invalid", path, fault.message + more)
+
+
+def _grammar(version: str) -> str:
+    return FMI2 if version == "2.0" else FMI3

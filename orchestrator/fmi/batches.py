@@ -1,13 +1,16 @@
-"""Variables of one type, set or read in one call through buffers that are made once."""
+"""Variables of one type, set or read in one call through buffers that are made once; addresses for machine code."""
 
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 from typing import Any
 
+import numpy as np
+
 from orchestrator.fmi.access import FLOATS, FMI2_TYPES, FMI3_TYPES, Access
-from orchestrator.master.protocol import Signals
+from orchestrator.master.protocol import NativeCalls, NativeTransfer, Signals
 
 Elements = list[tuple[int, list[Any], int]]
 """Elements of arrays: place among the values of a call, array, place in it."""
@@ -136,3 +139,50 @@ def shares(values: Any, buffer: Signals) -> bool:
     """Return whether a C array lies in a buffer."""
     first = int(buffer.ctypes.data)
     return first <= ctypes.addressof(values) < first + max(buffer.nbytes, 1)
+
+
+def native_calls(
+    functions: Functions,
+    inputs: Sequence[Access],
+    outputs: Sequence[Access],
+    python: bool,
+    step: tuple[int, str] | None = None,
+) -> NativeCalls | None:
+    """Return addresses for calls from machine code; ``step``: address and name of what steps in the FMU's place."""
+    sent, received = _transfers(functions, inputs, "Set"), _transfers(functions, outputs, "Get")
+    if sent is None or received is None:
+        return None
+    name = "fmi2DoStep" if functions.version == "2.0" else "fmi3DoStep"
+    address, name = (_address(functions.library, name), name) if step is None else step
+    return NativeCalls(
+        component=int(functions.component.value or 0),
+        do_step=address,
+        step_name=name,
+        reports=functions.version != "2.0" and step is None,
+        inputs=sent,
+        outputs=received,
+        python=python,
+    )
+
+
+def _address(library: Any, function: str) -> int:
+    return int(ctypes.cast(getattr(library, function), ctypes.c_void_p).value or 0)
+
+
+def _transfers(functions: Functions, accesses: Sequence[Access], direction: str) -> tuple[NativeTransfer, ...] | None:
+    found = []
+    for _, run in groupby(accesses, key=lambda access: access.kind):
+        (batch,) = functions.batches(list(run), direction)
+        if not batch.whole:
+            return None
+        found.append(
+            NativeTransfer(
+                function=_address(functions.library, batch.function),
+                name=batch.function,
+                number=np.dtype(batch.values._type_).str[1:],
+                sized=functions.version != "2.0",
+                references=np.array(list(batch.references), dtype=np.uint32),
+                count=len(batch.values),
+            )
+        )
+    return tuple(found)

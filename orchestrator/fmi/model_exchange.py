@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import SlaveError
-from orchestrator.fmi.addresses import native_calls
+from orchestrator.fmi.batches import native_calls
 from orchestrator.fmi.equations import Equations
 from orchestrator.fmi.event_mode import EventInstance
 from orchestrator.fmi.integrator import IntegrationError, Integrator

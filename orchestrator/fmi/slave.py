@@ -17,8 +17,7 @@ from typing import Any, ClassVar
 
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.access import Access
-from orchestrator.fmi.addresses import native_calls
-from orchestrator.fmi.batches import Functions, VariableBatch, in_c, shares
+from orchestrator.fmi.batches import Functions, VariableBatch, in_c, native_calls, shares
 from orchestrator.fmi.extraction import content_hash, extract_fmu
 from orchestrator.fmi.messages import DISCARD, ERROR, FATAL, OK, PENDING, STATUS, WARNING, Inbox
 from orchestrator.fmi.model_description import FmuDescription, read_description

@@ -13,7 +13,7 @@ from lxml import etree
 
 from benchmarks.fuzz_check import one_case
 from orchestrator.checking.check import check_fmu
-from orchestrator.checking.grammar import check_grammar
+from orchestrator.checking.xml_reading import check_grammar
 from tests.support.ball3 import INTERFACES, LIBRARY, XML, ball_files, build_ball, model_description
 from tests.support.broken_ball3 import (
     KICKED,

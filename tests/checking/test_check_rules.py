@@ -17,7 +17,6 @@ from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Finding, FmuFindings, order_findings
 from orchestrator.checking.formats.junit import as_junit
 from orchestrator.checking.formats.text import as_lines
-from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.layered import _read_csv
 from orchestrator.checking.policy import Policy
 from orchestrator.checking.rules_model import check_model
@@ -25,6 +24,7 @@ from orchestrator.checking.rules_structure import check_structure
 from orchestrator.checking.rules_variables import check_variables
 from orchestrator.checking.units import dimension_of
 from orchestrator.checking.verdict import judge
+from orchestrator.checking.xml_reading import check_grammar
 from tests.support.c_fmu import fmu_files, have_compiler, model_description, write_fmu
 from tools.rules_page import PAGE, page
 
