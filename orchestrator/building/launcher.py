@@ -14,7 +14,8 @@ from orchestrator.shared.machine_code import local_compiler, run_compiler
 from orchestrator.shared.scratch import Scratch
 
 _HERE = Path(__file__).parent
-FILES = (*sorted((_HERE / "native").iterdir()), *(_HERE / "native_fmu" / n for n in ("fmi2_types.h", "slave_types.h")))
+_SHARED = ("fmi2_types.h", "log_categories.h", "slave_types.h")  # with native FMUs
+FILES = (*sorted((_HERE / "native").iterdir()), *(_HERE / "native_fmu" / name for name in _SHARED))
 SOURCE = "launcher.c"
 
 

@@ -21,7 +21,8 @@ from orchestrator.shared.equation_files import members
 from pyfmu_sources.adapters.fmu_variables import FmuVariable
 
 RUNTIME = Path(__file__).parent / "native_fmu"
-HEADERS = ("translated.h", "pairs.h", "slave_types.h", "slave_core.h", "slave_states.h", "slave_exchange.h")
+_CORE = ("log_categories.h", "slave_core.h", "slave_states.h", "slave_exchange.h")
+HEADERS = ("translated.h", "pairs.h", "slave_types.h", *_CORE)
 _OF_VERSION = {
     2: ("fmi2_types.h", "fmi2_slave.h", "fmi2_model_exchange.h"),
     3: (

@@ -24,6 +24,7 @@
 #include <string.h>
 
 #include "fmi2_calls.h"
+#include "log_categories.h"
 #include "python_host.h"
 
 #ifndef WRAPPER
@@ -44,9 +45,7 @@ typedef struct {
     Callbacks ours;
     Status worst;
     int dead;
-    int logging;
-    size_t category_count;
-    char **categories;
+    Wanted wanted;
     char *name;
 } Shell;
 
@@ -91,24 +90,13 @@ static void load(void) {
 
 /* --- Messages ---------------------------------------------------------------------------------------------------- */
 
-static int wanted(const Shell *s, Status status, const char *category) {
-    if (status != OK)
-        return 1; /* refusals and warnings are for everyone */
-    if (!s->logging)
-        return 0;
-    for (size_t n = 0; n < s->category_count; n++)
-        if (category && strcmp(category, s->categories[n]) == 0)
-            return 1;
-    return s->category_count == 0;
-}
-
 /* Messages come ready: PythonFMU never passes further arguments. */
 static void relay(void *environment, const char *instance, Status status, const char *category, const char *message, ...) {
     Shell *s = environment;
     (void)instance;
     if (status > s->worst && status <= FATAL)
         s->worst = status;
-    if (s->host.logger && wanted(s, status, category))
+    if (s->host.logger && is_wanted(&s->wanted, status, category))
         s->host.logger(s->host.environment, s->name, status, category ? category : "", message);
 }
 
@@ -198,7 +186,7 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
     s->ours = s->host;
     s->ours.logger = relay;
     s->ours.environment = s;
-    s->logging = logging;
+    s->wanted.on = logging;
     s->name = strdup(name);
     enter_thread();
     s->inner = wrapper.fmi2Instantiate(name, type, guid, path, &s->ours, visible, 1);
@@ -209,14 +197,6 @@ EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, c
     return NULL;
 }
 
-static void forget_categories(Shell *s) {
-    for (size_t n = 0; n < s->category_count; n++)
-        free(s->categories[n]);
-    free(s->categories);
-    s->categories = NULL;
-    s->category_count = 0;
-}
-
 EXPORT void fmi2FreeInstance(Component c) {
     Shell *s = c;
     if (!s)
@@ -225,7 +205,7 @@ EXPORT void fmi2FreeInstance(Component c) {
         enter_thread();
         wrapper.fmi2FreeInstance(s->inner);
     }
-    forget_categories(s);
+    forget_categories(&s->wanted);
     free(s->name);
     free(s);
 }
@@ -234,12 +214,7 @@ EXPORT Status fmi2SetDebugLogging(Component c, Boolean on, size_t n, const char 
     Shell *s = c;
     if (!s)
         return ERROR;
-    forget_categories(s);
-    s->logging = on;
-    s->categories = n ? calloc(n, sizeof *s->categories) : NULL;
-    for (size_t k = 0; s->categories && k < n; k++)
-        s->categories[s->category_count++] = strdup(categories[k]);
-    return OK;
+    return set_logging(&s->wanted, on, n, categories);
 }
 
 /* Of the statuses returned and logged, the worse; fmi2Fatal is the last thing that an instance says. */

@@ -48,7 +48,7 @@ EXPORT Component FMI(fmi2Instantiate)(const char *name, int type, const char *gu
 EXPORT void FMI(fmi2FreeInstance)(Component c) { free_instance(c); }
 
 CALL(fmi2SetDebugLogging, (Component c, Boolean on, size_t n, const char *const categories[]), 1,
-     set_logging(s, on != 0, n, categories))
+     set_logging(&s->wanted, on != 0, n, categories))
 
 /* --- Life cycle ------------------------------------------------------------------------------------------------------ */
 

@@ -57,7 +57,7 @@ EXPORT Component FMI(fmi3InstantiateScheduledExecution)(String name, String toke
 EXPORT void FMI(fmi3FreeInstance)(Component c) { free_instance(c); }
 
 CALL(fmi3SetDebugLogging, (Component c, bool on, size_t n, const String categories[]), n == 0 || categories,
-     set_logging(s, on, n, categories))
+     set_logging(&s->wanted, on, n, categories))
 
 /* --- Life cycle ------------------------------------------------------------------------------------------------------ */
 

@@ -6,6 +6,8 @@
  * FEEDTHROUGH; CONTINUOUS_STATES is there for model exchange, SAMPLE_TIME is the value reference of a sampled slave's
  * period. fmi2_slave.h or fmi3_slave.h defines Host and `deliver`. All state is in the instance. */
 
+#include "log_categories.h"
+
 #define LARGEST_REAL 1.7976931348623157e308
 #define TIME_TOLERANCE 1e-9
 #define SAMPLE_SLACK 1e-6
@@ -30,9 +32,7 @@ typedef struct {
     Host host;
     const char *function; /* of FMI, which is being called */
     char *name;
-    bool logging;
-    size_t category_count;
-    char **categories;
+    Wanted wanted;
     Status worst;
     bool fresh;
     bool warned;
@@ -48,16 +48,6 @@ static void deliver(const Instance *s, Status status, const char *category, cons
 
 /* --- Messages ---------------------------------------------------------------------------------------------------- */
 
-static bool wanted(const Instance *s, Status status, const char *category)
-{
-    if (status != OK)
-        return true; /* refusals and warnings are for everyone */
-    for (size_t n = 0; n < s->category_count; n++)
-        if (s->logging && strcmp(category, s->categories[n]) == 0)
-            return true;
-    return s->logging && s->category_count == 0;
-}
-
 /* Log; the worst status that a call has logged is the one that it returns. */
 static void say(Instance *s, Status status, const char *format, ...)
 {
@@ -69,7 +59,7 @@ static void say(Instance *s, Status status, const char *format, ...)
     va_end(values);
     if (status > s->worst)
         s->worst = status;
-    if (wanted(s, status, categories[status]))
+    if (is_wanted(&s->wanted, status, categories[status]))
         deliver(s, status, categories[status], text);
 }
 
@@ -238,26 +228,11 @@ static void begin_anew(Instance *s)
 
 /* --- Instances ------------------------------------------------------------------------------------------------------- */
 
-static char *copied(const char *text)
-{
-    char *copy = malloc(strlen(text) + 1);
-    return copy ? strcpy(copy, text) : NULL;
-}
-
-static void forget_categories(Instance *s)
-{
-    for (size_t n = 0; n < s->category_count; n++)
-        free(s->categories[n]);
-    free(s->categories);
-    s->categories = NULL;
-    s->category_count = 0;
-}
-
 static void free_instance(Instance *s)
 {
     if (!s)
         return;
-    forget_categories(s);
+    forget_categories(&s->wanted);
     free(s->name);
     free(s);
 }
@@ -271,7 +246,7 @@ static Instance *instantiate(const char *name, Type type, const char *token, con
         return NULL;
     if (host)
         s->host = *host;
-    s->logging = logging;
+    s->wanted.on = logging;
     s->name = copied(name ? name : "");
     if (!name || !*name)
         say(s, ERROR, "instanceName must not be empty");
@@ -288,17 +263,6 @@ static Instance *instantiate(const char *name, Type type, const char *token, con
     s->course.type = type;
     begin_anew(s);
     return s;
-}
-
-static Status set_logging(Instance *s, bool on, size_t n, const char *const categories[])
-{
-    forget_categories(s);
-    s->logging = on;
-    s->categories = n && categories ? calloc(n, sizeof *s->categories) : NULL;
-    for (size_t k = 0; s->categories && k < n; k++)
-        if (categories[k] && (s->categories[s->category_count] = copied(categories[k])) != NULL)
-            s->category_count++;
-    return OK;
 }
 
 /* --- Life cycle ------------------------------------------------------------------------------------------------------ */
