@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.dynamic import check_dynamic, obstacle
-from orchestrator.checking.findings import Execution, Finding, FmuFindings, has_errors, order_findings
+from orchestrator.checking.findings import Execution, Finding, FmuFindings, order_findings
 from orchestrator.checking.places import locate_findings
 from orchestrator.checking.sources import check_sources
 from orchestrator.checking.static import StaticResult, check_static
@@ -58,7 +58,7 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
                 options.tell,
             )  # fmt: skip
             findings += probed
-        elif not options.static and not has_errors(findings):
+        elif not options.static and not any(f.severity == "error" for f in findings):
             findings.append(Finding("run.not-executed", "", f"the FMU must be executed, but is not: {reason}"))
         shown = order_findings(findings)
         if result.files is not None and result.description is not None:

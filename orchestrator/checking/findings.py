@@ -161,8 +161,3 @@ def _group(findings: Iterable[Finding]) -> Iterator[Finding]:
     for paths in places.values():
         first, *rest = paths.values()
         yield replace(first, message=f"{first.message} (at {len(paths)} places)") if rest else first
-
-
-def has_errors(findings: Iterable[Finding]) -> bool:
-    """Whether any finding is an error."""
-    return any(f.severity == "error" for f in findings)

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from lxml import etree
 
-from orchestrator.fmi.variables3 import Variables
+from orchestrator.fmi.variables import Variables
 from orchestrator.master.protocol import PeriodicClock, TriggeredClock
 
 _TIME = re.compile(

@@ -9,9 +9,9 @@ from pathlib import Path
 from lxml import etree
 
 from orchestrator.errors import FmuError
-from orchestrator.fmi import variables2, variables3
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.clocks import EventFeatures, names_in_words, read_clocks
+from orchestrator.fmi.variables import read_feedthrough, read_scalars, read_variables
 from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.shared.isolation.archives import open_archive
 from orchestrator.shared.units import EXPONENTS
@@ -164,7 +164,7 @@ def _describe(
     root: etree._Element, interface: etree._Element, is_old: bool, python: bool, configured: Mapping[str, Value]
 ) -> FmuDescription:
     """Return what a description of FMI 2.0 (``is_old``) or 3.0 says."""
-    found = variables2.read_variables(root) if is_old else variables3.read_variables(root, configured)
+    found = read_scalars(root) if is_old else read_variables(root, configured)
     names = _unique([v.name for v in found.scalars])
     variables = dict(zip(names, found.scalars, strict=True))
     exchange = None if interface.tag == "CoSimulation" else _read_exchange(root, interface)
@@ -180,7 +180,7 @@ def _describe(
         name=root.attrib["modelName"],
         variables=variables,
         units=_units(root),
-        feedthrough=(variables2 if is_old else variables3).read_feedthrough(root, found),
+        feedthrough=read_feedthrough(root, found),
         can_save_state=_flag(interface, "canGetAndSetFMUstate" if is_old else "canGetAndSetFMUState"),
         can_vary_step=exchange is not None or _flag(interface, "canHandleVariableCommunicationStepSize"),
         has_events=has_events,

@@ -113,23 +113,17 @@ EXPORT Status FMI(fmi2GetInteger)(Component c, const Reference r[], size_t n, in
     return all && !fault.kind ? s->worst : refuse_read(s, r, n, false, &fault);
 }
 
-EXPORT Status FMI(fmi2SetReal)(Component c, const Reference r[], size_t n, const double v[])
-{
-    ENTER(fmi2SetReal, VALUES_GIVEN)
-    s->fresh = false;
-    for (size_t k = 0; k < n && may_set(s, r[k], HAS(r[k], REAL_VALUE)); k++)
-        set_real(s, r[k], v[k]);
-    return s->worst;
-}
-
-EXPORT Status FMI(fmi2SetInteger)(Component c, const Reference r[], size_t n, const int v[])
-{
-    ENTER(fmi2SetInteger, VALUES_GIVEN)
-    s->fresh = false;
-    for (size_t k = 0; k < n && may_set(s, r[k], IS_WHOLE(r[k])); k++)
-        set_whole(s, r[k], v[k]);
-    return s->worst;
-}
+#define SET_VALUES(name, type, fits, set) \
+    EXPORT Status FMI(name)(Component c, const Reference r[], size_t n, const type v[]) \
+    { \
+        ENTER(name, VALUES_GIVEN) \
+        s->fresh = false; \
+        for (size_t k = 0; k < n && may_set(s, r[k], fits); k++) \
+            set(s, r[k], v[k]); \
+        return s->worst; \
+    }
+SET_VALUES(fmi2SetReal, double, HAS(r[k], REAL_VALUE), set_real)
+SET_VALUES(fmi2SetInteger, int, IS_WHOLE(r[k]), set_whole)
 
 /* No variable is of that type. */
 #define NO_VALUES(name, type, none) \

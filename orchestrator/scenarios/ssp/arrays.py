@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.size import SystemSize, element_count
-from orchestrator.fmi.variables3 import element_places
+from orchestrator.fmi.variables import element_places
 from orchestrator.master.problems import Problem
 from orchestrator.scenarios.ssp.flow import Node, Structure
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from orchestrator.errors import ScenarioError
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.model_description import FmuDescription
-from orchestrator.fmi.variables3 import element_places
+from orchestrator.fmi.variables import element_places
 from orchestrator.master.protocol import Value, Variable
 from orchestrator.master.system import Instance
 

@@ -1,4 +1,4 @@
-"""Variables of FMI 3.0, from a model description: arrays become scalars, what nobody can use is left out."""
+"""Variables from a model description: arrays of FMI 3.0 become scalars, what nobody can use is left out."""
 
 import itertools
 import math
@@ -29,7 +29,7 @@ class Variables:
     Attributes:
         scalars: all but clocks and binaries, arrays by their elements.
         accesses: where their values are.
-        names: names of the scalars at a value reference, those of aliases left out.
+        names: names of the scalars at a value reference, those of aliases left out; of FMI 2.0 at an index.
         clocks: the elements of the clocks, by name.
         clocked: the value references of the clocks that a scalar belongs to, by its name.
         inside: names of the inputs that may be set in intermediate updates.
@@ -51,8 +51,28 @@ class Variables:
     resized: list[str] = field(default_factory=list)
 
 
+_SCALARS = ("Real", "Integer", "Boolean", "String", "Enumeration")
+
+
+def read_scalars(root: etree._Element) -> Variables:
+    """Return the variables of a model description of FMI 2.0."""
+    types = {t.attrib["name"]: t for t in root.iterfind("TypeDefinitions/SimpleType")}
+    found = Variables()
+    for index, scalar in enumerate(root.iterfind("ModelVariables/ScalarVariable"), 1):
+        kind = next((child for child in scalar if child.tag in _SCALARS), None)
+        if kind is None:
+            raise ValueError(f"the variable {scalar.get('name')!r} has no type")
+        declared = types.get(kind.get("declaredType", ""))
+        inherited = None if declared is None else declared.find(str(kind.tag))
+        made = _maker(scalar, kind, inherited)(scalar.attrib["name"], kind.get("start"))
+        found.scalars.append(made)
+        found.accesses.append(Access("Integer" if made.type == "Enumeration" else made.type, made.reference))
+        found.names[index] = [made.name]
+    return found
+
+
 def read_variables(root: etree._Element, configured: Mapping[str, Value] | None = None) -> Variables:
-    """Return the variables of a model description, with ``configured`` values of structural parameters."""
+    """Return the variables of a description of FMI 3.0, with ``configured`` values of structural parameters."""
     given = {name: str(value).lower() for name, value in (configured or {}).items()}
     elements = [e for e in root.iterfind("ModelVariables/*") if isinstance(e.tag, str)]
     types = {t.attrib["name"]: t for t in root.iterfind("TypeDefinitions/*") if isinstance(t.tag, str)}
@@ -113,7 +133,7 @@ def _add(
     """Add a variable by its elements, and its aliases, which can only be read."""
     reference, name = int(element.attrib["valueReference"]), element.attrib["name"]
     kind, count = str(element.tag), math.prod(shape)
-    make = _maker(element, declared)
+    make = _maker(element, element, None if declared is None or declared.tag != f"{kind}Type" else declared)
     clocks = tuple(int(clock) for clock in element.get("clocks", "").split())
     aliases = [(a.attrib["name"], a.get("description")) for a in element.iterfind("Alias")]
     for number_, place in enumerate(element_places(shape)):
@@ -147,36 +167,44 @@ def _alias(scalar: Variable, name: str, description: str | None) -> Variable:
     )
 
 
-def _maker(element: etree._Element, declared: etree._Element | None) -> Callable[[str, str | None], Variable]:
-    """Return what makes a scalar of a variable, given its name and start value."""
-    kind = str(element.tag)
-    inherited = None if declared is None or declared.tag != f"{kind}Type" else declared
+def _maker(
+    outer: etree._Element, inner: etree._Element, inherited: etree._Element | None
+) -> Callable[[str, str | None], Variable]:
+    """Return what makes a scalar of a variable, given its name and start value.
+
+    Args:
+        outer, inner: what all variables have, and what those of its type have; in FMI 3.0 one element.
+        inherited: of the declared type.
+    """
+    kind, old = TYPES.get(str(inner.tag), str(inner.tag)), inner is not outer
 
     def attribute(key: str) -> str | None:
-        own = element.get(key)
+        own = inner.get(key)
         return own if own is not None or inherited is None else inherited.get(key)
 
-    causality = element.get("causality", "local")
-    fixed = causality in {"parameter", "calculatedParameter", "structuralParameter"}
-    usual = "fixed" if fixed else "continuous" if TYPES[kind] == "Real" else "discrete"
-    variability = element.get("variability", usual)
+    causality = outer.get("causality", "local")
+    fixed = not old and causality in {"parameter", "calculatedParameter", "structuralParameter"}
+    usual = "fixed" if fixed else "continuous" if kind == "Real" else "discrete"
+    variability = outer.get("variability", usual)
     if causality == "structuralParameter":  # the arrays have been counted: its value is final
         causality, variability = "calculatedParameter", "constant"
-    widest = whole_range(kind) or (None, None)
+    widest = whole_range(str(inner.tag)) or (None, None)
     low, high = number(attribute("min")), number(attribute("max"))
+    if old and kind != "Real":  # what is beyond the 32 bits of a whole number limits nothing
+        low, high = (None if limit is None or abs(limit) > 2**31 else limit for limit in (low, high))
     items = [] if inherited is None else inherited.findall("Item")
     literals = tuple((item.attrib["name"], int(item.attrib["value"])) for item in items)
-    unit, text = attribute("unit") or None, element.get("description", "")
-    reference, relative = int(element.attrib["valueReference"]), attribute("relativeQuantity") in {"true", "1"}
+    unit, text = attribute("unit") or None, outer.get("description", "")
+    reference, relative = int(outer.attrib["valueReference"]), attribute("relativeQuantity") in {"true", "1"}
 
     def make(name: str, start: str | None) -> Variable:
         return Variable(
             name=name,
             causality=causality,
-            type=TYPES[kind],
+            type=kind,
             unit=unit,
             variability=variability,
-            start=start_value(TYPES[kind], start, name),
+            start=start_value(kind, start, name),
             minimum=widest[0] if low is None else low,
             maximum=widest[1] if high is None else high,
             items=literals,
@@ -213,13 +241,18 @@ def _starts(element: etree._Element, count: int, resized: bool) -> list[str] | N
 def read_feedthrough(root: etree._Element, variables: Variables) -> dict[str, frozenset[str]]:
     """Return for each output whose dependencies are declared the inputs on which it depends at once."""
     inputs = {v.name for v in variables.scalars if v.causality == "input"}
+    old = root.get("fmiVersion") == "2.0"
+    path, key = ("Outputs/Unknown", "index") if old else ("Output", "valueReference")
     direct: dict[str, frozenset[str]] = {}
-    for output in root.iterfind("ModelStructure/Output"):
+    for output in root.iterfind(f"ModelStructure/{path}"):
         listed = output.get("dependencies")
         if listed is not None:
-            known = (name for r in listed.split() for name in variables.names.get(int(r), ()))
-            of_each = frozenset(inputs.intersection(known))  # one set for all elements of an array
-            direct |= dict.fromkeys(variables.names.get(int(output.attrib["valueReference"]), ()), of_each)
+            numbers = [int(output.attrib[key]), *map(int, listed.split())]
+            # In FMI 3.0 clocks and binaries are not there, in FMI 2.0 an index is wrong then.
+            names, *known = [variables.names[n] if old else variables.names.get(n, ()) for n in numbers]
+            # One set for all elements of an array.
+            of_each = frozenset(inputs.intersection(itertools.chain.from_iterable(known)))
+            direct |= dict.fromkeys(names, of_each)
     return direct
 
 
