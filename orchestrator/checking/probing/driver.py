@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library
-from orchestrator.checking.probing.instance import FmuInstance
 from orchestrator.checking.probing.job import ProbeJob, references
-from orchestrator.checking.probing.statuses import DiscardedError, odd
+from orchestrator.checking.probing.statuses import FATAL, OK, PENDING, WARNING, DiscardedError, StatusError, odd
 from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.rules import declare
 from orchestrator.checking.tables.functions import C_TYPES
@@ -42,6 +41,10 @@ class Habits:
 
 
 Report = Callable[..., None]
+Request = tuple[str, Sequence[Any]]
+"""A function and what it is called with."""
+_STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+_LARGEST_STATE = 64 << 20
 _PYTHON: dict[str, tuple[type, ...]] = {"double": (float,), "float": (float,), "bool": (bool,)}
 _TEXTS: tuple[type, ...] = (bytes, type(None))
 MOST_ITERATIONS = 100
@@ -49,8 +52,8 @@ MOST_PARTS = 1024
 """Into so many a communication step is divided when longer ones are discarded."""
 
 
-class Driver(FmuInstance):
-    """Base of the drivers.
+class Driver:
+    """Base of the drivers: one instance. After a fatal status nothing is called any more, as the standard demands.
 
     Attributes:
         report: called with rule, message, path and the time of the first one in words (``when``).
@@ -64,9 +67,17 @@ class Driver(FmuInstance):
     reached: float | None = None
 
     def __init__(self, library: Library, number: int, job: ProbeJob, report: Report) -> None:
-        super().__init__(library, number)
+        self.library = library
+        self.number = number
         self.job = job
         self.report = report
+        self._epoch = library.epoch
+        self._fatal = False
+        self.remarks: dict[str, tuple[int, str]] = {}
+        """Warnings, and errors that were logged while a call went well: how many, and the first, by rule."""
+        self.memory: dict[str, Any] = {}
+        """What a driver keeps beside the FMU, saved and restored with its states."""
+        self._memories: dict[int, dict[str, Any]] = {}
 
     @classmethod
     def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
@@ -121,11 +132,8 @@ class Driver(FmuInstance):
         """Values of variables of any type, one after the other; those of clocked variables at their last tick."""
         found: dict[int, list[Any]] = {}
         held = self.memory.get("held", {})
-        groups = [
-            [(i, v) for i, v in enumerate(variables) if v.base == base]
-            for base in dict.fromkeys(v.base for v in variables if not v.clocks)
-        ]
-        groups = [[(i, v) for i, v in group if not v.clocks] for group in groups]
+        free = [(i, v) for i, v in enumerate(variables) if not v.clocks]
+        groups = [[(i, v) for i, v in free if v.base == base] for base in dict.fromkeys(v.base for _, v in free)]
         if self.habits.alone:
             groups = 2 * [[pair] for group in groups for pair in group]
         answers = self.call_many([self._get_call([v for _, v in group]) for group in groups], when)
@@ -187,3 +195,102 @@ class Driver(FmuInstance):
     def reset(self) -> None:
         self.call("Reset")
         self.memory = {}
+
+    @property
+    def dead(self) -> bool:
+        """Whether nothing may be called any more: after a fatal status, and once its process is gone."""
+        return self._fatal or self._epoch != self.library.epoch
+
+    @dead.setter
+    def dead(self, value: bool) -> None:
+        self._fatal = value
+
+    def raw(self, function: str, *values: Any) -> tuple[int, list[Any]]:
+        """Call a function with what its parameters in the table want; its status, and what its outputs hold."""
+        return self._call([(function, values)])[0]
+
+    def _call(self, requests: Sequence[Request]) -> list[tuple[int, list[Any]]]:
+        """Status and outputs of each function, up to the first that fails."""
+        names = self.library.names
+        calls = [(names.name(function), names.parameters(function), values) for function, values in requests]
+        if self.dead:
+            name = calls[0][0]
+            raise StatusError(name, FATAL, f"{name} was not called, because a call before returned a fatal error")
+        done = self.library.call(self.number, calls)
+        self.dead = done[-1][0] == FATAL
+        return done
+
+    def call(self, function: str, *values: Any, when: str = "") -> list[Any]:
+        """Call a function that must return OK or Warning; return a value per output argument, in their order."""
+        return self.call_many([(function, values)], when)[0]
+
+    def _remark(self, function: str, status: int, messages: list[str], errors: int) -> None:
+        """Take note of a warning, and of an error that was logged although the call went well."""
+        if status == WARNING or errors:
+            function = self.library.names.name(function)
+            rule = "run.warning" if status == WARNING else "run.logged-error"
+            count, first = self.remarks.get(rule, (0, f"{function} ({'; '.join(messages)})" if messages else function))
+            self.remarks[rule] = (count + 1, first)
+
+    def call_many(self, requests: Sequence[Request], when: str = "") -> list[list[Any]]:
+        """Call functions in one go, as ``call`` does; return what the output arguments of each hold."""
+        if not requests:
+            return []
+        done = self._call(requests)
+        if (status := done[-1][0]) not in (OK, WARNING):
+            raise self.status_error(requests[len(done) - 1][0], status, when)
+        if len(done) < len(requests):
+            raise odd(requests[len(done)][0])
+        for (function, _), (status, _), (messages, errors) in zip(requests, done, self.library.logged, strict=True):
+            self._remark(function, status, messages, errors)
+        return [values for _, values in done]
+
+    def status_error(self, function: str, status: int, when: str = "") -> StatusError:
+        """The error of a status that is not wanted."""
+        prefix = self.library.names.prefix
+        known = 0 <= status < len(_STATUS) and not (prefix == "fmi3" and status == PENDING)
+        name = prefix + _STATUS[status] if known else f"the status {status}, which does not exist"
+        said = f" ({'; '.join(self.library.messages)})" if self.library.messages else ""
+        called = self.library.names.name(function)
+        text = f"{called}{' ' + when if when else ''} must return {prefix}OK, but returned {name}{said}"
+        return StatusError(called, status, text)
+
+    def free(self) -> None:
+        """Free the instance, unless that is forbidden."""
+        if not self.dead and not self.library.ended:
+            self.library.free(self.number)
+            self.dead = True
+
+    def get_state(self, again: int | None = None) -> int:
+        """Save the state as a new one, or ``again`` as one that was saved before. Return its number."""
+        state = int(self.call("GetFMUState", again)[0])
+        self._memories[state] = dict(self.memory)
+        return state
+
+    def set_state(self, state: int) -> None:
+        self.call("SetFMUState", state)
+        self.memory = dict(self._memories[state])
+
+    def free_state(self, state: int) -> bool:
+        """Free a state, unless that is forbidden; whether the pointer was set to null."""
+        if self.dead or self.library.ended:
+            return True
+        return bool(self.call("FreeFMUState", state)[0])
+
+    def serialise(self, state: int) -> bytes:
+        (size,) = self.call("SerializedFMUStateSize", state)[0]
+        if not 0 < size <= _LARGEST_STATE:
+            function = self.library.names.name("SerializedFMUStateSize")
+            text = f"{function} must be positive and at most {_LARGEST_STATE}, but is {size}"
+            raise StatusError(function, OK, text)
+        data = self.call("SerializeFMUState", state, size)[0]
+        if not isinstance(data, bytes):
+            function = self.library.names.name("SerializeFMUState")
+            text = f"{function} must write the {size} bytes that it asked for, but writes more"
+            raise StatusError(function, OK, text, "state.serialise")
+        return data
+
+    def deserialise(self, data: bytes, memory: dict[str, Any]) -> int:
+        state = int(self.call("DeserializeFMUState", data)[0])
+        self._memories[state] = dict(memory)
+        return state
