@@ -206,9 +206,6 @@ class AdaptiveRun:
                 if isinstance(error, StepDiscardedError) and length < self.settings.smallest:
                     raise SlaveError(str(error)) from None
                 return _Window((), None, math.inf, length)
-            except _RefusedError as refused:
-                restore()
-                return _Window((), None, refused.error, length)
 
     def _sweep_whole_and_halves(
         self, begin: float, end: float, rates: Array, guess: Track | None, record: Slots, restore: Callable[[], None]
@@ -227,7 +224,8 @@ class AdaptiveRun:
             read = np.union1d(self._recorded(track, record), self.events.exchanged if whole.event else record[:0])
             error = max(error, self._compare(track, halves[1]), self._between(track, halves, read))
         if error > 1.0:
-            raise _RefusedError(error)
+            restore()
+            return _Window((), None, error, end - begin)
         last = halves[-1]
         parts = tuple(half.track for half in halves if half.end > half.track.start)
         return _Window(parts, last.end, error, length, last.event, last.rates)
@@ -274,11 +272,3 @@ class AdaptiveRun:
             held = self.sweeper.held
             rows[first:row] = np.where(held, tracks.values_before(times), tracks.at(times))[:, record]
         return row
-
-
-class _RefusedError(Exception):
-    """A window's error is too large."""
-
-    def __init__(self, error: float) -> None:
-        super().__init__()
-        self.error = error

@@ -6,7 +6,7 @@ takes inputs inside steps is fed their polynomials, any other one constant piece
 stops at an event the window becomes shorter, and the sweeps go on until the event stays where it is.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from orchestrator.master.event_stage import EventStage, is_discrete, slack
 from orchestrator.master.events import EventIteration
 from orchestrator.master.pieces import piece_times, piece_weights
 from orchestrator.master.rollback import rollback
-from orchestrator.master.tracks import Track, cell_coefficients
+from orchestrator.master.tracks import Track, cell_coefficients, follow_cubics
 
 Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
@@ -170,17 +170,9 @@ class Sweeper:
         begins = cubics.transpose(0, 2, 1) @ np.array([1.0, 0.5, 1.0 / 3.0, 0.25])  # means, of those that are held
         begins[:, stage.places] = cubics[:, 0, stage.places]
         for k in range(2):
-            origin, cubic = times[k], rows[k]
-
-            def signals(
-                time: float, origin: float = origin, cubic: Sequence[Sequence[float]] = cubic
-            ) -> Sequence[float]:
-                s = (time - origin) / cell
-                return [a + s * (b + s * (c + s * d)) for a, b, c, d in cubic]
-
             self.wiring.values[stage.inputs] = begins[k]
             stage.send()
-            stage.events.feed(stage.inside, signals)
+            stage.events.feed(stage.inside, follow_cubics(rows[k], times[k], cell))
             outcome = stage.step(times[k], times[k + 1])
             event = outcome.event
             self._show(stage, k + 1, values, rates)

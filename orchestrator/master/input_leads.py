@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.master.event_stage import EventStage, Gather
 from orchestrator.master.events import EventIteration
+from orchestrator.master.tracks import follow_cubics
 
 Array = NDArray[np.float64]
 
@@ -56,12 +57,7 @@ class InputLeads:
                 last[k] = first[k] + slope
             bend = 3.0 * slope - 2.0 * rate - rate_end
             cubics.append((float(first[k]), float(rate), float(bend), float(rate + rate_end - 2.0 * slope)))
-
-        def signals(time: float) -> list[float]:
-            s = (time - begin) / step
-            return [a + s * (b + s * (c + s * d)) for a, b, c, d in cubics]
-
-        stage.events.feed(stage.inside, signals)
+        stage.events.feed(stage.inside, follow_cubics(cubics, begin, step))
         return last
 
     def _inputs(self, stage: EventStage, values: Array) -> Array:

@@ -1,5 +1,6 @@
 """What signals do over a window: values and derivatives at its begin, middle and end, and polynomials between."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,6 +67,16 @@ def cell_coefficients(values: Array, rates: Array, rated: NDArray[np.bool_], cel
         found[k, 2] = np.where(rated, 3.0 * (y_end - y) - 2.0 * r - r_end, bend)
         found[k, 3] = np.where(rated, 2.0 * (y - y_end) + r + r_end, 0.0)
     return found
+
+
+def follow_cubics(cubics: Sequence[Sequence[float]], begin: float, length: float) -> Callable[[float], list[float]]:
+    """Return the function of time [s] that gives cubics, by their coefficients, of the passed share of a length [s]."""
+
+    def signals(time: float) -> list[float]:
+        s = (time - begin) / length
+        return [a + s * (b + s * (c + s * d)) for a, b, c, d in cubics]
+
+    return signals
 
 
 class JoinedTracks:
