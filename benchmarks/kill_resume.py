@@ -3,6 +3,7 @@
     python -m benchmarks.kill_resume --kills 100 --workers 30     # a sweep of an FMU that is not ours, behind walls
     python -m benchmarks.kill_resume --kills 50 --table table.csv -- \\
         python -m tests.support.engine_driver {out} 2000 0.02 2
+    python -m benchmarks.kill_resume --cluster 2000               # pairs on a Dask cluster, which loses its scheduler
 
 ``{out}`` in a command stands for the result directory; ``--resume`` is appended to it. Exit code 1 when the
 tables differ, when a case is lost or double, when a worker process outlives its sweep, or when the temporary
@@ -57,6 +58,39 @@ def run(command: list[str], out: Path) -> float:
     return time.monotonic() - start
 
 
+def kill_cluster(folder: Path, pairs: int) -> None:
+    """Sweep on a Dask cluster of two workers; kill a worker, then the scheduler; resume on this machine and compare."""
+    from tests.support.dask_cluster import DaskProcesses
+
+    words = [sys.executable, "-m", "orchestrator", "sweep", "--sizes", f"random:{pairs}", "--noise", "1e-4"]
+    tables = {}
+    for workers in ("1", "2"):
+        out = folder / f"calm{workers}"
+        print(f"{workers} workers: {run([*words, '--workers', workers, '--out', str(out)], out):.1f} s", flush=True)
+        tables[workers] = (out / "sweep.csv").read_bytes()
+    with DaskProcesses(folder, workers=2) as cluster:
+        calm, out = folder / "cluster", folder / "killed"
+        command = [*words, "--scheduler", cluster.address, "--out"]
+        print(f"Dask, two workers: {run([*command, str(calm)], calm):.1f} s", flush=True)
+        tables["Dask"] = (calm / "sweep.csv").read_bytes()
+        if len(set(tables.values())) != 1:
+            raise SystemExit("one worker, two workers and a cluster give different tables")
+        process = subprocess.Popen(
+            [*command, str(out)], cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        for share, kill in ((0.2, lambda: cluster.kill_worker(0)), (0.5, cluster.kill_scheduler)):
+            while process.poll() is None and finished_cases(out) < share * pairs:
+                time.sleep(0.01)
+            kill()
+        said = process.communicate()[1].strip().splitlines()
+    kept = finished_cases(out)
+    if process.returncode != 1 or not share * pairs <= kept < pairs:
+        raise SystemExit(f"the sweep ended with {process.returncode}, {kept} cases kept: {said}")
+    run([*words, "--workers", "2", "--out", str(out), "--resume"], out)
+    compare(tables["1"], out / "sweep.csv")
+    print(f"without worker and scheduler: {said[-1]}; resumed: same bytes")
+
+
 def kill_workers(process: "subprocess.Popen[str]", out: Path, dice: random.Random, most: int) -> int:
     """Kill at most ``most`` workers, each at a random moment after a case has come in; return how many were killed."""
     lost = 0
@@ -101,6 +135,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=50, help="of sweeps, at least")
     parser.add_argument("--workers", type=int, default=0, help="kills of workers, at least")
+    parser.add_argument("--cluster", type=int, metavar="PAIRS", help="a sweep of pairs on a Dask cluster instead")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--longest", type=float, default=4.0, help="seconds until a kill, at most")
     parser.add_argument("--table", default="sweep.csv")
@@ -108,6 +143,9 @@ def main() -> int:
     args = parser.parse_args()
     dice = random.Random(args.seed)
     with tempfile.TemporaryDirectory() as scratch:
+        if args.cluster:
+            kill_cluster(Path(scratch), args.cluster)
+            return 0
         command = args.command or foreign_sweep(Path(scratch) / "scenario")
         os.environ["TMPDIR"] = str(Path(scratch) / "temporary")
         temporary().mkdir()
