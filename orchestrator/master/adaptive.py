@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ConvergenceError, ScenarioError, SlaveError
 from orchestrator.master.algorithms import Adaptive
@@ -26,10 +25,7 @@ from orchestrator.master.result import Statistics
 from orchestrator.master.rollback import rollback
 from orchestrator.master.signals import GRID_SLACK, Signal
 from orchestrator.master.tracks import JoinedTracks, Track
-from orchestrator.master.wiring import Stage, gather
-
-Array = NDArray[np.float64]
-Slots = NDArray[np.int64]
+from orchestrator.master.wiring import Array, Slots, Stage, gather
 
 CUBIC_GAIN = 16.0
 """How much better cubics are between nodes over half the length."""

@@ -13,14 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.master.protocol import NativeCalls, NativeTransfer
-from orchestrator.master.wiring import Wiring
+from orchestrator.master.wiring import Array, Slots, Wiring
 from orchestrator.shared.machine_code import compile_library
-
-Array = NDArray[np.float64]
-Slots = NDArray[np.int64]
 
 SOURCE = Path(__file__).with_name("loop.c")
 NUMBERS = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "b1")

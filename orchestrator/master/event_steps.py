@@ -6,7 +6,6 @@ the communication point, late.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ChatteringError, ConvergenceError
 from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi
@@ -17,10 +16,7 @@ from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.input_leads import InputLeads
 from orchestrator.master.iterated import loop_groups
 from orchestrator.master.protocol import RunEndedError, StepOutcome
-from orchestrator.master.wiring import Stage, gather
-
-Array = NDArray[np.float64]
-Slots = NDArray[np.int64]
+from orchestrator.master.wiring import Array, Slots, Stage, gather
 
 MOST_SHORTENINGS = 100
 """Times that a window may become shorter, because slaves stop earlier and earlier when they are taken back."""

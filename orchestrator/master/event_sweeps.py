@@ -17,9 +17,7 @@ from orchestrator.master.events import EventIteration
 from orchestrator.master.pieces import piece_times, piece_weights
 from orchestrator.master.rollback import rollback
 from orchestrator.master.tracks import Track, cell_coefficients, follow_cubics
-
-Array = NDArray[np.float64]
-Slots = NDArray[np.int64]
+from orchestrator.master.wiring import Array
 
 MOST_SWEEPS = 30
 BRIEF = 100.0

@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ChatteringError
 from orchestrator.master.clocks import ClockSchedule
@@ -20,9 +19,8 @@ from orchestrator.master.iterated import backward_slots
 from orchestrator.master.protocol import EventSlave
 from orchestrator.master.result import EventStatistics, RunRemark
 from orchestrator.master.system import split
-from orchestrator.master.wiring import Wiring
+from orchestrator.master.wiring import Array, Wiring
 
-Array = NDArray[np.float64]
 Ticks = dict[str, list[str]]
 
 MOST_INSTANTS = 100

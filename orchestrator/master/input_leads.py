@@ -6,13 +6,11 @@ line. Where the source has not stepped yet it goes along the derivative, or is h
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.master.event_stage import EventStage, Gather
 from orchestrator.master.events import EventIteration
 from orchestrator.master.tracks import follow_cubics
-
-Array = NDArray[np.float64]
+from orchestrator.master.wiring import Array
 
 
 class InputLeads:
