@@ -356,7 +356,7 @@ def test_a_stiff_fmu_is_integrated_by_the_implicit_method(tmp_path: Path) -> Non
     assert len(calls) < 20_000
 
 
-@pytest.mark.parametrize("whole", [["MotorHalf"], []])
+@pytest.mark.parametrize("whole", [pytest.param(["MotorHalf"], marks=pytest.mark.night), []])
 def test_half_drivetrains_meet_as_model_exchange(tmp_path: Path, whole: list[str], build_native: BuildNative) -> None:
     """Contacts between two FMUs under error control, against the solution of both as one system."""
     paths = build_native(["MotorHalf", "LoadHalf"], fmi=3)
