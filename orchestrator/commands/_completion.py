@@ -32,14 +32,9 @@ class PrintCompletion(argparse.Action):
 
 def add_completion_argument(parser: argparse.ArgumentParser, build: Callable[[], argparse.ArgumentParser]) -> None:
     """Add the option; ``build`` makes the parser with the options of all commands."""
-    parser.add_argument(
-        "--print-completion",
-        action=PrintCompletion,
-        build=build,
-        choices=SHELLS,
-        metavar="SHELL",
-        help="print a completion script for a shell (bash, zsh, tcsh)",
-    )
+    text = f"print a completion script for a shell ({', '.join(SHELLS)})"
+    options: dict[str, Any] = {"action": PrintCompletion, "build": build}
+    parser.add_argument("--print-completion", choices=SHELLS, metavar="SHELL", help=text, **options)
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:

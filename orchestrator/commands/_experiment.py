@@ -11,12 +11,8 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--experiment", default="default", metavar="NAME", help=f"{' or '.join(EXPERIMENTS)} (default: %(default)s)"
     )
-    parser.add_argument(
-        "--backlash-model",
-        default="dead_zone",
-        metavar="MODEL",
-        help=f"model of the gap: {', '.join(BACKLASH_MODELS)} (default: %(default)s)",
-    )
+    text = f"model of the gap: {', '.join(BACKLASH_MODELS)} (default: %(default)s)"
+    parser.add_argument("--backlash-model", default="dead_zone", metavar="MODEL", help=text)
 
 
 def refuse_with_scenario(arguments: argparse.Namespace, defaults: dict[str, object]) -> None:

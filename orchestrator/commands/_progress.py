@@ -23,20 +23,10 @@ def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
     for name, what in (("ca", "certificate of the authority"), ("cert", "certificate"), ("key", "private key")):
         parser.add_argument(f"--tls-{name}", type=Path, metavar="FILE", help=f"{what} for --scheduler tls://HOST:PORT")
     parser.add_argument("--resume", action="store_true", help="continue a run that was stopped")
-    parser.add_argument(
-        "--time-limit",
-        type=float,
-        default=defaults.time,
-        metavar="S",
-        help="time limit of a case (default: %(default)g)",
-    )
-    parser.add_argument(
-        "--memory-limit",
-        type=int,
-        default=defaults.memory // MIB,
-        metavar="MIB",
-        help="memory limit of a case, 0 for none (default: %(default)s)",
-    )
+    text = "time limit of a case (default: %(default)g)"
+    parser.add_argument("--time-limit", type=float, default=defaults.time, metavar="S", help=text)
+    text = "memory limit of a case, 0 for none (default: %(default)s)"
+    parser.add_argument("--memory-limit", type=int, default=defaults.memory // MIB, metavar="MIB", help=text)
 
 
 class CaseProgress:

@@ -12,11 +12,8 @@ _chosen: list[str] = []
 
 def add_progress_argument(parser: argparse.ArgumentParser) -> None:
     """Add ``--progress``, which every command has."""
-    parser.add_argument(
-        "--progress",
-        choices=["json"],
-        help="print stage, share (0 to 1) and time left [s] to standard error, as lines of JSON",
-    )
+    text = "print stage, share (0 to 1) and time left [s] to standard error, as lines of JSON"
+    parser.add_argument("--progress", choices=["json"], help=text)
 
 
 def choose_progress(kind: str | None) -> None:

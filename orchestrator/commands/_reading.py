@@ -20,17 +20,10 @@ def add_reading_arguments(parser: argparse.ArgumentParser, rate_too: str = "") -
     """Add the options; ``rate_too`` is what else ``--rate`` means to the command."""
     group = parser.add_argument_group("reading of records")
     group.add_argument("--part", metavar="START:END", help="keep this part of each record [s], from its first row on")
-    group.add_argument(
-        "--resample",
-        choices=RESAMPLING,
-        help="if times are not uniform: treat the samples as uniform, or interpolate (default: decide by the motion)",
-    )
-    group.add_argument(
-        "--header",
-        type=int,
-        metavar="LINE",
-        help="line of a text file with the column names; 0: none (default: detected)",
-    )
+    text = "if times are not uniform: treat the samples as uniform, or interpolate (default: decide by the motion)"
+    group.add_argument("--resample", choices=RESAMPLING, help=text)
+    text = "line of a text file with the column names; 0: none (default: detected)"
+    group.add_argument("--header", type=int, metavar="LINE", help=text)
     text = "reduce to this sample rate with an anti-alias filter (default: all samples)"
     group.add_argument("--rate", type=float, metavar="HZ", help=f"{text}{rate_too}")
 

@@ -20,28 +20,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="*", metavar="FMU", help="which FMUs (default: all)")
     usual = f"{short_path(default_directory())}, --native: {short_path(native_directory())}, report: {RESULTS}"
     parser.add_argument("--out", type=Path, metavar="DIR", help=f"where FMUs and the report go (default: {usual})")
-    parser.add_argument(
-        "--native", action="store_true", help="translate to C and compile: FMUs that need no Python at run time"
-    )
-    parser.add_argument(
-        "--platforms",
-        choices=PLATFORMS,
-        default=PLATFORMS[0],
-        help="platforms of native FMUs: this machine (default), or all (takes minutes)",
-    )
-    parser.add_argument(
-        "--fmi",
-        type=int,
-        choices=VERSIONS,
-        default=2,
-        help="version of FMI (default: 2); FMUs of 3 are native, into fmi3/",
-    )
-    parser.add_argument(
-        "--real-outputs",
-        action="store_true",
-        help="native FMUs with real outputs only, for hosts that read every output as Real; into real/",
-    )
-    parser.add_argument("--force", action="store_true", help="build FMUs that are up to date too")
+    text = "platforms of native FMUs: this machine (default), or all (takes minutes)"
+    parser.add_argument("--platforms", choices=PLATFORMS, default=PLATFORMS[0], help=text)
+    text = "version of FMI (default: 2); FMUs of 3 are native, into fmi3/"
+    parser.add_argument("--fmi", type=int, choices=VERSIONS, default=2, help=text)
+    for flag, text in (
+        ("--native", "translate to C and compile: FMUs that need no Python at run time"),
+        ("--real-outputs", "native FMUs with real outputs only, for hosts that read every output as Real; into real/"),
+        ("--force", "build FMUs that are up to date too"),
+    ):
+        parser.add_argument(flag, action="store_true", help=text)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -13,12 +13,8 @@ from orchestrator.shared.output import stage_output
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add machine, landing, plants and files."""
-    parser.add_argument(
-        "--model",
-        type=Path,
-        metavar="FILE",
-        help="corrected.toml of `diagnose` or `estimate`, or estimate.json (default: the thesis's drivetrain)",
-    )
+    text = "corrected.toml of `diagnose` or `estimate`, or estimate.json (default: the thesis's drivetrain)"
+    parser.add_argument("--model", type=Path, metavar="FILE", help=text)
     for flag, unit, text in (
         ("--alpha", "RAD", "half-gap (default: the model's, else 0.02)"),
         ("--tau", "S", "without a model, time constant of the drive (default: 0.005)"),

@@ -30,38 +30,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "records", type=Path, nargs="+", metavar="DATA", help=f"measured records of one machine ({FORMATS})"
     )
-    parser.add_argument("--model", type=Path, metavar="FILE.toml", help="nominal model")
     add_settings_argument(parser)
-    parser.add_argument(
-        "--fmu",
-        type=Path,
-        metavar="ANY.fmu",
-        help="any co-simulation FMU of FMI 2.0 or 3.0, instead of a plant of this project",
-    )
-    parser.add_argument(
-        "--scenario", type=Path, metavar="LOOP.toml", help="several FMUs connected by a scenario, instead of one"
-    )
-    parser.add_argument(
-        "--map", type=Path, metavar="MAP.toml", help="with an FMU: columns, uncertain parameters, ports"
-    )
-    parser.add_argument(
-        "--draft-map",
-        action="store_true",
-        help="with an FMU: write a draft map.toml from its units and causality, and stop",
-    )
-    parser.add_argument("--validate", type=Path, metavar="OTHER", help="a second record on which to report the misfit")
-    parser.add_argument(
-        "--test", type=Path, metavar="OTHER", help="a record to use as test data instead of the last rows"
-    )
-    parser.add_argument(
-        "--no-search", action="store_true", help="re-fit and judge the given model (a corrected.toml), without a search"
-    )
-    parser.add_argument(
-        "--effects",
-        type=_labels,
-        metavar="NAME@SITE,...",
-        help="fit exactly these effects, without a search for others; none: fit no effect",
-    )
+    for flag, metavar, text in (
+        ("--model", "FILE.toml", "nominal model"),
+        ("--fmu", "ANY.fmu", "any co-simulation FMU of FMI 2.0 or 3.0, instead of a plant of this project"),
+        ("--scenario", "LOOP.toml", "several FMUs connected by a scenario, instead of one"),
+        ("--map", "MAP.toml", "with an FMU: columns, uncertain parameters, ports"),
+        ("--validate", "OTHER", "a second record on which to report the misfit"),
+        ("--test", "OTHER", "a record to use as test data instead of the last rows"),
+    ):
+        parser.add_argument(flag, type=Path, metavar=metavar, help=text)
+    text = "with an FMU: write a draft map.toml from its units and causality, and stop"
+    parser.add_argument("--draft-map", action="store_true", help=text)
+    text = "re-fit and judge the given model (a corrected.toml), without a search"
+    parser.add_argument("--no-search", action="store_true", help=text)
+    text = "fit exactly these effects, without a search for others; none: fit no effect"
+    parser.add_argument("--effects", type=_labels, metavar="NAME@SITE,...", help=text)
     parser.add_argument(
         "--time-limit", type=float, metavar="SECONDS", help="end the search after this time, with the result so far"
     )

@@ -20,25 +20,13 @@ OWN = ("torque_limit", "speed_limit", "duration")  # `--rate` is of reading, too
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    parser.add_argument(
-        "records",
-        type=Path,
-        nargs="*",
-        metavar="DATA",
-        help=f"measured record ({FORMATS}); several of one machine are fitted together",
-    )
-    parser.add_argument(
-        "--model",
-        type=Path,
-        metavar="FILE.toml",
-        help="nominal model (default: the thesis's values, 5 %% each)",
-    )
+    text = f"measured record ({FORMATS}); several of one machine are fitted together"
+    parser.add_argument("records", type=Path, nargs="*", metavar="DATA", help=text)
+    text = "nominal model (default: the thesis's values, 5 %% each)"
+    parser.add_argument("--model", type=Path, metavar="FILE.toml", help=text)
     listed = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
-    parser.add_argument(
-        "--method",
-        choices=[*METHODS, "all"],
-        help=f"{listed} (default: {FITTED}; {WITHOUT_TORQUE} without a torque)",
-    )
+    text = f"{listed} (default: {FITTED}; {WITHOUT_TORQUE} without a torque)"
+    parser.add_argument("--method", choices=[*METHODS, "all"], help=text)
     parser.add_argument("--motor-only", action="store_true", help="ignore the load encoder")
     parser.add_argument(
         "--time-limit", type=float, metavar="S", help="stop without a result after this time (default: never)"

@@ -18,11 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model", type=Path, metavar="FILE.toml", help="model file of the machine (default: the thesis's drivetrain)"
     )
     weights = ",".join(f"{weight:g}" for weight in STATE_WEIGHTS)
-    parser.add_argument(
-        "--state-weights",
-        metavar="Q,Q,Q,Q,Q",
-        help=f"of theta_m, omega_m, theta_l, omega_l, T_m (default: {weights})",
-    )
+    text = f"of theta_m, omega_m, theta_l, omega_l, T_m (default: {weights})"
+    parser.add_argument("--state-weights", metavar="Q,Q,Q,Q,Q", help=text)
     parser.add_argument(
         "--torque-weight", type=float, default=TORQUE_WEIGHT, metavar="R", help="of the request (default: %(default)s)"
     )

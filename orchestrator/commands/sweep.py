@@ -26,33 +26,19 @@ PAIR_ONLY = frozenset({"experiment", "backlash_model", *PAIR_DEFAULTS})
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what a sweep takes."""
     add_experiment_arguments(parser)
-    parser.add_argument(
-        "--sizes",
-        default="random:20",
-        metavar="SPEC",
-        help="half-gaps [rad]: 0.01,0.02 or range:LOW:HIGH:N or logrange:LOW:HIGH:N or random:N (default: %(default)s)",
-    )
-    parser.add_argument("--noise", default="0,1e-4", metavar="LIST", help="encoder noise [rad] (default: %(default)s)")
-    parser.add_argument(
-        "--seeds", type=int, default=1, metavar="N", help="runs of each size and noise level (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="seed of random sizes and of all noise (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--vary",
-        action="append",
-        default=[],
-        metavar="NAME=SPEC",
-        help="also vary a parameter, such as plant.J_l=range:5.3:5.9:5; also list, logrange, random, sobol",
-    )
+    for name, kind, metavar, text in (
+        ("sizes", str, "SPEC", "half-gaps [rad]: 0.01,0.02 or range:LOW:HIGH:N or logrange:LOW:HIGH:N or random:N"),
+        ("noise", str, "LIST", "encoder noise [rad]"),
+        ("seeds", int, "N", "runs of each size and noise level"),
+        ("seed", int, "N", "seed of random sizes and of all noise"),
+    ):
+        told = f"{text} (default: %(default)s)"
+        parser.add_argument(f"--{name}", type=kind, default=PAIR_DEFAULTS.get(name, 0), metavar=metavar, help=told)
+    text = "also vary a parameter, such as plant.J_l=range:5.3:5.9:5; also list, logrange, random, sobol"
+    parser.add_argument("--vary", action="append", default=[], metavar="NAME=SPEC", help=text)
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="sweep this TOML scenario instead of the pair")
-    parser.add_argument(
-        "--samples",
-        type=int,
-        metavar="N",
-        help=f"number of draws for random and sobol in --vary (default: {DEFAULT_SAMPLES})",
-    )
+    text = f"number of draws for random and sobol in --vary (default: {DEFAULT_SAMPLES})"
+    parser.add_argument("--samples", type=int, metavar="N", help=text)
     parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="changed settings of the calibration")
     parser.add_argument("--parquet", action="store_true", help="also write the table as Parquet (extra [parquet])")
     add_engine_arguments(parser)
