@@ -1,5 +1,6 @@
 """A scenario: which FMUs run, how they are connected, what is fed in, which master runs them, what is recorded."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,3 +76,9 @@ class Scenario:
             ConnectionMismatchError: outputs and inputs that are connected do not fit.
         """
         return Session(self.system, self.record, self.algorithm, self.stop, self.start)
+
+
+def open_runs(scenario: Scenario) -> Callable[[None], Recording]:
+    """Return a handler that runs a scenario, whose FMUs are unpacked folders, in a child process."""
+    session = scenario.session()
+    return lambda _: session.run(allow_early_end=True)

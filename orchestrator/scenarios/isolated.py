@@ -21,7 +21,6 @@ from orchestrator.master.result import MOST_REMARKS, Recording
 from orchestrator.master.system import System
 from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.scenarios.definition import Scenario
-from orchestrator.scenarios.inside import UnpackedRun
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
@@ -149,13 +148,12 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
     memory = limits.memory + 24 * shape[0] * shape[1]
     limits = replace(limits, memory=memory, total=2.0 * limits.time + 600.0)
     with unpack_system(scenario.system) as (system, scratch, _):
-        job = UnpackedRun(system, scenario.record, scenario.algorithm, scenario.stop, scenario.start)
+        job = replace(scenario, system=system, derived=(), remarks=())
         names = ", ".join(map(str, foreign)) or "the scenario"
         prepare()
         try:
-            with Jail(
-                "orchestrator.scenarios.inside:open_runs", job, read=[scratch.path], limits=limits, walls=bool(foreign)
-            ) as jail:
+            handler = "orchestrator.scenarios.definition:open_runs"
+            with Jail(handler, job, read=[scratch.path], limits=limits, walls=bool(foreign)) as jail:
                 jail.start(limits.time)
                 claimed = jail.call(None, Recording, most=8 * (shape[0] + 1) * shape[1] + _SLACK)
         except ChildError as error:

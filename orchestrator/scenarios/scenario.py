@@ -7,7 +7,7 @@ reported at once, each problem with its path in the file.
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -61,27 +61,12 @@ def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
         raise FmuError(f"{scenario.origin}: {error}" if scenario.origin else str(error)) from None
 
 
-@dataclass(frozen=True)
-class _Top:
-    """The parts of a file that fit, see ``ScenarioTable``."""
-
-    stop: float = math.nan
-    start: float = 0.0
-    name: str = "scenario"
-    master: Any = None
-    instances: Mapping[str, Any] = field(default_factory=dict)
-    record: Sequence[str] = ()
-    connections: Sequence[Any] = ()
-    clock_connections: Sequence[Any] = ()
-    terminals: Sequence[Any] = ()
-    sources: Sequence[Any] = ()
-
-
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be."""
     content = read_toml(path, MAXIMUM_BYTES)
     problems: list[Problem] = []
-    top = _Top(**convert_what_fits(content, ScenarioTable, "$", problems))
+    lacking: dict[str, Any] = {"stop": math.nan, "master": None, "instances": {}, "record": []}
+    top = ScenarioTable(**lacking | convert_what_fits(content, ScenarioTable, "$", problems))
     reader = _Reader(path, problems)
     algorithm, order = reader.master(top)
     instances = reader.instances(top.instances)
@@ -111,7 +96,7 @@ def load_scenario(path: Path) -> Scenario:
     )  # fmt: skip
 
 
-def _joints(top: _Top, problems: list[Problem]) -> list[tuple[str, str, str]]:
+def _joints(top: ScenarioTable, problems: list[Problem]) -> list[tuple[str, str, str]]:
     """Return where each pair of terminals is asked for, and the two."""
     return [(f"{path}.join", *pair.join) for path, pair in _each(top.terminals, TerminalsTable, "terminals", problems)]
 
@@ -132,7 +117,7 @@ class _Reader:
         self.lacking: list[Problem] = []  # FMUs that cannot be read
         self._events = True  # event mode is used where an FMU has it
 
-    def master(self, top: _Top) -> tuple[Algorithm | None, tuple[str, ...]]:
+    def master(self, top: ScenarioTable) -> tuple[Algorithm | None, tuple[str, ...]]:
         if top.master is None:
             return None, ()
         master: MasterTable | None = convert_table(top.master, MasterTable, "$.master", self.problems)
