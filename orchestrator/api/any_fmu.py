@@ -15,7 +15,7 @@ from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnose_records
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
 from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.fmu.record import FmuRecord, decimate, decimation_factor, read_fmu_record
-from orchestrator.diagnosis.fmu.report import Array, FmuDiagnosis, first_test, misfit_on_record, stage_runs
+from orchestrator.diagnosis.fmu.report import FmuDiagnosis, first_test, misfit_on_record, stage_runs
 from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
 from orchestrator.diagnosis.report.json_results import (
     dependence_found,
@@ -28,6 +28,7 @@ from orchestrator.diagnosis.report.summary import summarise
 from orchestrator.diagnosis.result import TestMisfit
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.tables import column_names
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import ParameterFound
@@ -75,7 +76,6 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         return lines
 
     def results(self, place: Path) -> FmuDiagnosisFound:
-        """Return what goes into ``diagnose.json``."""
         d, report = self.diagnosis, self.diagnosis.settings.report
         return FmuDiagnosisFound(
             verdict=d.verdict,

@@ -41,7 +41,6 @@ class BuildResult(Result):
         return lines if self.remark is None else [*lines, f"note: {self.remark}"]
 
     def results(self, place: Path) -> BuildFound:
-        """Return what ``build.json`` says."""
         return BuildFound(fmus={name: str(path) for name, path in self.paths.items()}, remark=self.remark)
 
 

@@ -46,7 +46,6 @@ class CalibrationResult(Result):
         return trust_of([Reason(Level.RED, MISSING), *(Reason(trust.level, text) for text in trust.reasons)])
 
     def blocks(self) -> Sequence[Block]:
-        """Return parameters and misfit."""
         c = self.calibration
         parameters, *misfits = calibration_tables(self.results(Path()))
         lines: list[Block] = [f"Parameters {'explain' if c.explained else 'do not explain'} the record to its noise"]
@@ -59,7 +58,6 @@ class CalibrationResult(Result):
         return lines
 
     def results(self, place: Path) -> FmuCalibrationFound:
-        """Return what goes into ``calibrate.json``."""
         del place
         c, d = self.calibration, self.calibration.diagnosis
         parameters = {

@@ -3,6 +3,7 @@
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import ClassVar, Self
 
@@ -134,6 +135,10 @@ class AnySweepResult(PlottedResult):
     def rows(self) -> Iterator[Row]:
         """Read the finished cases from the journal."""
         return self.sweep.rows()
+
+    def _first_rows(self) -> Iterator[Row]:
+        """Read as many of them as are shown."""
+        return islice(self.rows(), MOST_ROWS_SHOWN)
 
     def write_csv(self, path: Path | str) -> None:
         """Write the table as CSV, with as many digits as are needed to read the numbers back exactly."""

@@ -49,7 +49,6 @@ class CheckResult(Result):
         return tuple(issue.finding for verdict in self.verdicts for issue in verdict.issues)
 
     def blocks(self) -> Sequence[Block]:
-        """Return the lines of each FMU."""
         return [line for verdict in self.verdicts for line in as_lines(verdict)]
 
     def junit(self) -> str:
@@ -77,7 +76,6 @@ class CheckResult(Result):
         return as_code_quality(self.verdicts)
 
     def results(self, place: Path | None = None) -> CheckFound:
-        """Return what ``check.json`` says."""
         return as_results(self.verdicts)
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.api.machine import read_fitted_model, require_machine
 from orchestrator.api.plotted import PlottedResult
@@ -30,12 +29,11 @@ from orchestrator.control.weights import choose_weights
 from orchestrator.errors import ScenarioError
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.scenarios.scenario import simulate
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.compensate import UPPER, CompensateFound, LawFound, laws_tables
 from orchestrator.shared.results.regulator import ForecastFound
-
-Array = NDArray[np.float64]
 
 # Least and largest value of each argument: rad, s, rad/s, N.m, N.m, s, plants, seed.
 RANGES = {
@@ -108,7 +106,6 @@ class CompensateResult(PlottedResult):
         ]
 
     def results(self, place: Path | None = None) -> CompensateFound:
-        """Return what ``compensate.json`` says."""
         times, path = bound_path(self.task, self.task.impact_speed)
         bounds = {speed: bound_time(self.task, speed) for speed in _BOUND_SPEEDS.tolist()}
         bounds = {speed: time for speed, time in bounds.items() if time > 0.0}
@@ -143,7 +140,6 @@ class CompensateResult(PlottedResult):
             write_loop(folder, self.name, self.task, bool(self.arguments["native"]), int(self.arguments["fmi"]))
 
     def write_data(self, folder: Path) -> None:
-        """Write ``traversals.csv``."""
         count = [len(law.times) for law in self.laws]
         write_columns(
             folder / "traversals.csv",

@@ -93,7 +93,6 @@ class DesignResult(SampledResult):
         return columns if request is None else columns | {request.label: request.number(self.best.u)}
 
     def blocks(self) -> Sequence[Block]:
-        """Return the table of the candidates."""
         request, best = self.request, self.best
         duration = float(self.arguments["duration"])
         title = f"To see a half-gap of {self.size:g} rad in {duration:g} s"
@@ -113,7 +112,6 @@ class DesignResult(SampledResult):
         return tuple(_entry(c) for c in self.candidates if c.bound < UNSEEN)
 
     def results(self, place: Path | None = None) -> EstimateFound:
-        """Return what ``estimate.json`` says of the design."""
         return EstimateFound(design=self.entries())
 
 

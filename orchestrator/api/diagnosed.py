@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
 from orchestrator.api.numerics import numeric_errors
@@ -28,13 +26,12 @@ from orchestrator.diagnosis.result import Diagnosis, TestMisfit
 from orchestrator.errors import OutputError
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import LiveFound
 from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound
 from orchestrator.shared.scratch import Scratch
 from orchestrator.shared.trust import Level
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,7 +112,6 @@ class DiagnosisResult(AnyDiagnosisResult):
         yield from self._closing_lines()
 
     def blocks(self) -> Sequence[Block]:
-        """Return the summary, and the tables of misfits."""
         return [*doubts_of((self.record, *self.more)), *self.summary(), *self._misfit_tables()]
 
     def results(self, place: Path) -> DiagnoseFound:

@@ -128,7 +128,6 @@ class EstimateResult(PlottedResult):
         return corrected or Play(self.alpha, self._ratio(self.best))
 
     def blocks(self) -> Sequence[Block]:
-        """Return the table of the methods and their messages."""
         r = self.record
         encoders = "one encoder" if r.theta_l is None else "two encoders"
         title = f"{r.source}: {r.duration:g} s at {1.0 / r.step:g} Hz, {encoders}"
@@ -155,7 +154,6 @@ class EstimateResult(PlottedResult):
         return [*warnings, methods, *sizes, *floor, *messages, *doubts, *unfit, *missing]
 
     def results(self, place: Path | None = None) -> EstimateFound:
-        """Return what ``estimate.json`` says."""
         entries = {m.method: method_entry(m) for m in self.methods}
         r, repeats = self.record, self.repeats
         fit = next((e for e in self.estimates if e.method == "maximum_likelihood"), None)

@@ -121,7 +121,6 @@ class InspectResult(PlottedResult):
         return said
 
     def results(self, place: Path | None = None) -> InspectFound:
-        """Return what ``inspect.json`` says."""
         r, found, angles = self.record, self.sufficiency, self.two_angles
         return InspectFound(
             record=describe_record(r),

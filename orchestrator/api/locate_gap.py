@@ -6,9 +6,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from orchestrator.api.estimate import EstimateResult
 from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
@@ -27,13 +24,14 @@ from orchestrator.plants.known.two_stage_train import TRAIN
 from orchestrator.records.model_file import Model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.results import GapFound
 from orchestrator.shared.results.estimate import EstimateFound, LocationFound, location_tables
+from orchestrator.shared.results.fields import copy_fields
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Trust
 
-Array = NDArray[np.float64]
 METHOD = "two_stages"
 
 
@@ -108,16 +106,8 @@ class LocationResult(SampledResult):
 
     def _describe(self) -> LocationFound:
         found = self.location
-        return LocationFound(
-            answers=found.answers,
-            answer=found.answer,
-            total=_gap_found(found.total),
-            stages={str(n): _gap_found(gap) for n, gap in enumerate(found.stages, start=1)},
-            behind=found.behind,
-            traversals=found.traversals,
-            autocorrelation=found.autocorrelation,
-            parameters=found.parameters,
-        )
+        stages = {str(n): _gap_found(gap) for n, gap in enumerate(found.stages, start=1)}
+        return copy_fields(LocationFound, found, total=_gap_found(found.total), stages=stages)
 
     def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says, which names nothing of the result's folder."""

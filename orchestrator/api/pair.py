@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.api.arguments import choose_experiment
 from orchestrator.api.sampled import SampledResult
@@ -21,11 +20,10 @@ from orchestrator.paired.calibration import GapEstimate
 from orchestrator.paired.cosimulation import FMUS, LoopRun
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.pair import PairRun, with_settings
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.numbers import not_negative
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import GapFound, PairFound
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
@@ -85,7 +83,6 @@ class PairResult(SampledResult):
         return signals | {f"twin_{name}": values for name, values in self.twin.signals.items()}
 
     def blocks(self) -> Sequence[Block]:
-        """Return the table of the run."""
         machine, twin = self.machine, self.twin
         apart = np.abs(machine["theta_l"] - twin["theta_l"]).max()
         rows = [
@@ -112,7 +109,6 @@ class PairResult(SampledResult):
         return Play(alpha, self.experiment.values.i)
 
     def results(self, place: Path | None = None) -> PairFound:
-        """Return what ``simulate.json`` says of the run."""
         return PairFound(
             alpha=self.alpha,
             play={

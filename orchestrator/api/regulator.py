@@ -18,6 +18,7 @@ from orchestrator.plants.design import GAIN_UNITS, REGULATOR_STATES, DrivetrainV
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns, write_whole
+from orchestrator.shared.results.fields import copy_fields
 from orchestrator.shared.results.regulator import ForecastFound, RegulatorFound, gains_table
 
 RANGES = {"torque_weight": (1e-12, 1e12), "sample_time": (1e-4, 0.05), "delay": (0, 100)}  # s, samples
@@ -75,16 +76,10 @@ class RegulatorResult(PlottedResult):
         return frequencies, np.abs(response), np.unwrap(np.angle(response))
 
     def results(self, place: Path | None = None) -> RegulatorFound:
-        """Return what ``regulator.json`` says."""
         frequencies, size, phases = self._response()
-        return RegulatorFound(
-            gains=self.gains_by_name,
-            sample_time=self.sample_time,
-            delay=self.delay,
-            forecast=self.forecast,
-            frequencies=tuple(frequencies.tolist()),
-            response=tuple(size.tolist()),
-            phases=tuple(phases.tolist()),
+        curves = zip(("frequencies", "response", "phases"), (frequencies, size, phases), strict=True)
+        return copy_fields(
+            RegulatorFound, self, gains=self.gains_by_name, **{name: tuple(c.tolist()) for name, c in curves}
         )
 
     def write_data(self, folder: Path) -> None:

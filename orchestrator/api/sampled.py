@@ -58,7 +58,6 @@ class SampledResult(PlottedResult):
         return "" if math.isnan(value) else f"{value:.{self.digits}g}"
 
     def write_data(self, folder: Path) -> None:
-        """Write the CSV file."""
         self.write_csv(folder / f"{self.csv_name or self.command}.csv")
 
     def to_dataframe(self) -> pandas.DataFrame:

@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
+from orchestrator.api.cases import AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.engine import DesignCases, Row, Status, Sweep, parse_design
 from orchestrator.scenarios.isolated import Safety, describe_walls
@@ -38,12 +38,7 @@ class ScenarioSweepResult(AnySweepResult):
     isolation: WallsFound | None = None
 
     def blocks(self) -> Sequence[Block]:
-        """Return the table of the first cases."""
-        rows: list[list[str]] = []
-        for row in self.rows():
-            if len(rows) == MOST_ROWS_SHOWN:
-                break
-            rows.append(_last_values(row, len(self.scenario.record)))
+        rows = [_last_values(row, len(self.scenario.record)) for row in self._first_rows()]
         name = self.scenario.name
         title = f"{name}: {len(self.cases)} cases, {self.failed} failed; last values, more in sweep.csv"
         shown: list[Block] = [table(title, [*self.cases.names, *self.scenario.record], rows)]
@@ -63,7 +58,6 @@ class ScenarioSweepResult(AnySweepResult):
         return count, first
 
     def results(self, place: Path | None = None) -> SweepFound:
-        """Return what ``sweep.json`` says."""
         remarked, first = self._remarks
         return SweepFound(
             cases=len(self.cases),

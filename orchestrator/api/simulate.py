@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, table
@@ -17,10 +16,11 @@ from orchestrator.scenarios import scenario as scenarios
 from orchestrator.scenarios.isolated import Safety, describe_walls
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.read import open_ssp
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.operating_system import LIMITS
 from orchestrator.shared.results import EventsFound, RemarkFound, SignalFound, SignalsFound, WallsFound
+from orchestrator.shared.results.fields import copy_fields
 
-Array = NDArray[np.float64]
 HEAD = ("signal", "unit", "first", "last", "smallest", "largest")
 
 
@@ -107,11 +107,10 @@ class SimulationResult(SampledResult):
         return found
 
     def results(self, place: Path | None = None) -> SignalsFound:
-        """Return what the JSON file says of the run."""
         signals = self._signals()
-        remarks = [RemarkFound(r.instance, r.text, r.count) for r in self.run.remarks]
+        remarks = [copy_fields(RemarkFound, remark) for remark in self.run.remarks]
         took = self.run.statistics.events
-        events = EventsFound(list(took.times), took.instants, took.ticks, list(took.late)) if took.instants else None
+        events = copy_fields(EventsFound, took) if took.instants else None
         return SignalsFound(signals=signals, steps=self.steps, events=events, remarks=remarks, isolation=self.isolation)
 
 

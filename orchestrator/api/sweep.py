@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.api.arguments import choose_experiment
-from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
+from orchestrator.api.cases import AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
 from orchestrator.engine import DesignCases, Row, Status, Sweep
@@ -23,7 +23,7 @@ from orchestrator.scenarios.sweep import check_parameters
 from orchestrator.shared.numbers import exact_text
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import CalibrationFound, ErrorsFound, SweepFound
-from orchestrator.shared.results.fields import fields_table
+from orchestrator.shared.results.fields import copy_fields, fields_table
 from orchestrator.shared.settings import as_tables, choose_settings
 from orchestrator.shared.trust import Trust
 
@@ -74,12 +74,7 @@ class SweepResult(AnySweepResult):
         return trust_of_sweep(self.statistics.values(), level, self.failed)
 
     def blocks(self) -> Sequence[Block]:
-        """Return the table of the first cases and that of the errors."""
-        shown: list[list[str]] = []
-        for row in self.rows():
-            if len(shown) == MOST_ROWS_SHOWN:
-                break
-            shown.append(_cells(row, self.cases.names))
+        shown = [_cells(row, self.cases.names) for row in self._first_rows()]
         title = f"Sweep of {len(self.cases)} cases"
         if len(self.cases) > len(shown):
             title += f", the first {len(shown)}; all of them are in sweep.csv"
@@ -107,7 +102,6 @@ class SweepResult(AnySweepResult):
         return {"smallest": Play(float(sizes.min()), ratio), "largest": Play(float(sizes.max()), ratio)}
 
     def results(self, place: Path | None = None) -> SweepFound:
-        """Return what ``sweep.json`` says."""
         return SweepFound(
             cases=len(self.cases),
             failed=self.failed,
@@ -203,17 +197,7 @@ def _levels(noise: float | Sequence[float]) -> tuple[float, ...]:
 
 
 def _provenance(calibration: Calibration) -> CalibrationFound:
-    return CalibrationFound(
-        calibration.digest,
-        calibration.runs,
-        calibration.seed_branch,
-        calibration.smallest,
-        calibration.largest,
-        calibration.level,
-        calibration.width,
-        calibration.version,
-        as_tables(calibration.settings),
-    )
+    return copy_fields(CalibrationFound, calibration, settings=as_tables(calibration.settings))
 
 
 def _cells(row: Row, names: tuple[str, ...]) -> list[str]:

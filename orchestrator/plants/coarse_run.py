@@ -4,11 +4,9 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 FINER = 8  # times more steps of a free run in a sample in which friction may turn round or teeth meet, as in fits
 MOST_STEPS = 1000  # of a free run in a sample: with values that ask for more a model is lost, and not waited for

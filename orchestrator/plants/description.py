@@ -9,13 +9,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.effects.effect import Effect
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.laws.parameter_rows import BIG, Parameter
-
-Array = NDArray[np.float64]
 
 STATES = 8  # places of the state, as in ``pyfmu_sources.drivetrain.equations``
 STEP = 0.35  # of the fastest oscillation: a Runge-Kutta step, whose error then lies far below an encoder's count

@@ -3,13 +3,12 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.plants.description import Plant
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 LINEAR = Kernels("orchestrator.plants.kernels.linear")
 Run = Callable[[Array, Array, Array, Array], None]
 

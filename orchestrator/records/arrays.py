@@ -1,14 +1,17 @@
 """The record itself: arrays of one length, and what is known of how they were logged."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.records.columns import Array
 from orchestrator.records.timing import Timing
+from orchestrator.shared.arrays import Array
 
+ArrayMap = Callable[[Array], Array]
 MINIMUM_ROWS = 200
 LONGEST_LINE = 20  # rows: over a longer hole no line stands for the motion
 
@@ -102,17 +105,8 @@ class Record:
         Returns:
             A view of this record's arrays.
         """
-        rows = slice(start, stop)
-        return replace(
-            self,
-            time=self.time[rows],
-            u=self.u[rows],
-            theta_m=self.theta_m[rows],
-            theta_l=None if self.theta_l is None else self.theta_l[rows],
-            further={name: values[rows] for name, values in self.further.items()},
-            u_deviation=None if self.u_deviation is None else self.u_deviation[rows],
-            u_sampled=None if self.u_sampled is None else self.u_sampled[rows],
-        )
+        take = itemgetter(slice(start, stop))
+        return map_arrays(self, take, take, take, take)
 
     def parts_between_holes(self) -> list["Record"]:
         """Return the parts between holes that are too long for lines over them, each with enough rows to be a record.
@@ -152,6 +146,23 @@ class Record:
             theta_l=None if self.theta_l is None else interpolate_missing(self.theta_l),
             u_deviation=None,
         )
+
+
+def map_arrays(
+    record: Record, time: ArrayMap, measured: ArrayMap, torque: ArrayMap, deviation: ArrayMap, **others: Any
+) -> Record:
+    """Return a record of other rows, made of its times, of what was measured, of torques and of their deviation."""
+    return replace(
+        record,
+        time=time(record.time),
+        u=torque(record.u),
+        u_sampled=None if record.u_sampled is None else torque(record.u_sampled),
+        theta_m=measured(record.theta_m),
+        theta_l=None if record.theta_l is None else measured(record.theta_l),
+        further={name: measured(values) for name, values in record.further.items()},
+        u_deviation=None if record.u_deviation is None else deviation(record.u_deviation),
+        **others,
+    )
 
 
 def interpolate_missing(values: Array) -> Array:

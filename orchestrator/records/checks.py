@@ -8,11 +8,9 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 LARGEST_VALUE = 1e12  # of any number in a record
 LARGEST_ANGLE = 1e7  # rad

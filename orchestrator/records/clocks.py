@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.columns import KINDS, Array, Column, scale_values, unit_of
+from orchestrator.records.columns import KINDS, Column, scale_values, unit_of
 from orchestrator.records.counters import unwrap_time
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice
@@ -18,6 +18,7 @@ from orchestrator.records.stamps import seconds_of
 from orchestrator.records.timing import LARGEST_STEP
 from orchestrator.records.units import parse_unit
 from orchestrator.records.words import names_time
+from orchestrator.shared.arrays import Array
 
 DAY = 86_400.0  # s
 SERIAL_DAYS = ((20_000.0, 80_000.0), (690_000.0, 800_000.0))  # of 1954 to 2119, by spreadsheets and by MATLAB

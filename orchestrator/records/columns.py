@@ -3,18 +3,16 @@
 In all functions: ``values``: (n,), in the unit of the file.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.units import SI, TURN, RecordUnit, parse_unit
 from orchestrator.records.words import ANGLE, CURRENT, SPEED, TORQUE, VOLTAGE, words_of
+from orchestrator.shared.arrays import Array
 
-__all__ = ["COLUMNS", "KINDS", "SI", "Array", "Column"]
+__all__ = ["COLUMNS", "KINDS", "SI", "Column"]
 
-Array = NDArray[np.float64]
 COLUMNS = ("time", "u", "theta_m", "theta_l")
 OPTIONAL = ("theta_l",)
 MEANINGS = {
@@ -37,6 +35,16 @@ EXAMPLES = {
     "theta_m": "rad, deg, rev, m, mm, counts (with counts_per_rev), rpm, rad/s",
 }
 EXAMPLES["theta_l"] = EXAMPLES["theta_m"]
+# What a unit needs besides, by its kind: numbers of the column, what they make of one, what both are in words.
+NEEDS: dict[str, tuple[tuple[str, ...], Callable[[float], float], str, str]] = {
+    "counts": (("counts_per_rev",), lambda counts: TURN / counts, "counts", "counts of one revolution"),
+    "share": (("rated_value",), lambda rated: 0.01 * rated, "percent", "what 100 % is, in N.m"),
+    "current": (("torque_constant",), float, "amperes", "N.m per ampere"),
+    "voltage": (
+        ("resistance", "torque_constant"), lambda _: 1.0, "volts",
+        "ohm, N.m per ampere; perhaps `back_emf_constant`, `inductance`",
+    ),
+}  # fmt: skip
 # Kinds of unit that a number of a column is for, and the unit that a message proposes.
 UNITS_OF = {
     "counts_per_rev": (("counts",), "counts"),
@@ -122,41 +130,26 @@ def _check_word(name: str, column: Column, label: str, source: str) -> None:
 
 def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, source: str) -> float:
     """Return the factor from the column's unit to SI."""
-    if unit is None:
-        return 1.0
-    if unit.kind == "voltage":
-        lacking = [key for key in ("resistance", "torque_constant") if getattr(column, key) is None]
-        if lacking:
-            said = " and ".join(f"`[columns.{name}] {key} = ...`" for key in lacking)
-            raise RecordError(
-                f"{source}: column `{label}` is in volts: say {said} (ohm, N.m per ampere; perhaps "
-                "`back_emf_constant`, `inductance`) in the model file (`model`)"
-            )
-        return unit.factor
-    worth = {
-        "counts": ("counts_per_rev", None if column.counts_per_rev is None else TURN / column.counts_per_rev, "counts"),
-        "share": ("rated_value", None if column.rated_value is None else 0.01 * column.rated_value, "percent"),
-        "current": ("torque_constant", column.torque_constant, "amperes"),
-    }.get(unit.kind)
-    if worth is None:
-        return unit.factor
-    key, factor, spoken = worth
-    if factor is None and unit.kind == "share" and unit.factor == 100.0:
+    if unit is None or unit.kind not in NEEDS:
+        return 1.0 if unit is None else unit.factor
+    _, worth, spoken, meaning = NEEDS[unit.kind]
+    lacking = lacking_numbers(column, unit.kind)
+    if lacking and unit.kind == "share" and unit.factor == 100.0:
         raise RecordError(
             f"{source}: column `{label}` has no dimension: say `[columns.{name}] rated_value = ...` (what 1 is, in "
             f'N.m), or `[columns.{name}] unit = "..."` where that is not so, in the model file (`model`)'
         )
-    if factor is None:
-        what = {
-            "counts_per_rev": "counts of one revolution",
-            "rated_value": "what 100 % is, in N.m",
-            "torque_constant": "N.m per ampere",
-        }[key]
+    if lacking:
+        said = " and ".join(f"`[columns.{name}] {key} = ...`" for key in lacking)
         raise RecordError(
-            f"{source}: column `{label}` is in {spoken}: say `[columns.{name}] {key} = ...` ({what}) in the model file "
-            "(`model`)"
+            f"{source}: column `{label}` is in {spoken}: say {said} ({meaning}) in the model file (`model`)"
         )
-    return unit.factor * factor
+    return unit.factor * worth(getattr(column, NEEDS[unit.kind][0][0]))
+
+
+def lacking_numbers(column: Column, kind: str) -> list[str]:
+    """Return the numbers that a unit of a kind needs and the column does not state."""
+    return [key for key in NEEDS[kind][0] if getattr(column, key) is None] if kind in NEEDS else []
 
 
 def scale_values(values: Array, factor: float, offset: float) -> Array:

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.checks import quantisation_step
-from orchestrator.records.columns import Array, Column
+from orchestrator.records.columns import Column
 from orchestrator.records.units import TURN
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.numbers import exact_text
 
 # Ranges of counters of time.

@@ -3,11 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.records.arrays import Record, interpolate_missing
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 DRIFT_BLOCKS = 12  # of a record, whose drifts give the error of the whole
 DRIFT_ROWS = 200_000  # at most, evenly taken

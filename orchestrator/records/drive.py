@@ -9,7 +9,8 @@ encoder's noise moves the torque's sum only from one sample to the next, and doe
 import numpy as np
 
 from orchestrator.records.arrays import interpolate_missing
-from orchestrator.records.columns import Array, Column
+from orchestrator.records.columns import Column
+from orchestrator.shared.arrays import Array
 
 
 def torque_of_voltage(voltage: Array, angle: Array, time: Array, column: Column) -> Array:

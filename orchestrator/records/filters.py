@@ -1,17 +1,16 @@
 """Decimation of a record with an anti-alias filter."""
 
 import math
-from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.arrays import MINIMUM_ROWS, Record, interpolate_missing
+from orchestrator.records.arrays import MINIMUM_ROWS, Record, interpolate_missing, map_arrays
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.band import content_band
 from orchestrator.shared.inference.noise import robust_noise
-
-Array = NDArray[np.float64]
 
 TAPS_PER_STEP = 5.0  # half length of the filter in new samples; with the next two, white noise stays white
 KAISER = 6.0  # of the window: 60 dB
@@ -65,29 +64,16 @@ def decimate(record: Record, rate: float) -> Record:
         low = np.convolve(interpolate_missing(torque), taps, "same")
         return np.convolve(low, np.ones(factor) / factor, "full")[factor - 1 :][: record.size][centres]
 
-    columns = {
-        name: None if values is None else _at(values, taps, centres)
-        for name, values in (("theta_m", record.theta_m), ("theta_l", record.theta_l))
-    }
-    assert columns["theta_m"] is not None
-    deviation = None
-    if record.u_deviation is not None:
-        deviation = np.sqrt(np.convolve(record.u_deviation**2, np.ones(factor) / factor, "full"))[factor - 1 :][centres]
+    def mean_deviation(deviation: Array) -> Array:
+        return np.sqrt(np.convolve(deviation**2, np.ones(factor) / factor, "full"))[factor - 1 :][centres]
+
     note = (
         f"brought from {1.0 / record.step:.6g} to {1.0 / (record.step * factor):.6g} Hz: filter to "
         f"{CUT_OFF / (record.step * factor):.4g} Hz, every {factor}th sample kept"
     )
-    return replace(
-        record,
-        time=record.time[centres],
-        u=held(record.u),
-        u_sampled=None if record.u_sampled is None else held(record.u_sampled),
-        theta_m=columns["theta_m"],
-        theta_l=columns["theta_l"],
-        further={name: _at(values, taps, centres) for name, values in record.further.items()},
-        u_deviation=deviation,
-        notes=(*record.notes, note),
-        averaged=record.averaged * factor,
+    more = {"notes": (*record.notes, note), "averaged": record.averaged * factor}
+    return map_arrays(
+        record, itemgetter(centres), lambda values: _at(values, taps, centres), held, mean_deviation, **more
     )
 
 

@@ -8,7 +8,7 @@ samples keep to that clock or to their stamps, the motion says: it is smoother o
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 LOOK = 15  # rows before and behind a step, whose medians tell a lost row from jitter
 LATE = 1.2  # steps from one stamp to the next, from which rows may be lost in between

@@ -10,17 +10,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.clocks import Clock, read_clock, read_own_time
-from orchestrator.records.columns import (
-    COLUMNS,
-    KINDS,
-    SI,
-    Array,
-    Column,
-    check_numbers,
-    scale_of,
-    scale_values,
-    unit_of,
-)
+from orchestrator.records.columns import COLUMNS, KINDS, SI, Column, check_numbers, scale_of, scale_values, unit_of
 from orchestrator.records.counters import check_sign, check_whole, check_wraps, decode_sign, unwrap
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
@@ -31,6 +21,7 @@ from orchestrator.records.rows import describe_failed, drop_failed_readings
 from orchestrator.records.topics import has_topics, split_topics
 from orchestrator.records.units import angle_unit, parse_unit
 from orchestrator.records.words import names_time
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.numbers import exact_text
 
 MOST_NAMED = 12  # columns in a note

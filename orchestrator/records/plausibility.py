@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 WITH_SHAFT = ("Drivetrain", "TwoStageTrain")
 DEGREES = 180.0 / math.pi

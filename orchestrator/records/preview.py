@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.columns import COLUMNS, KINDS, MEANINGS, SI, Column
+from orchestrator.records.columns import COLUMNS, KINDS, MEANINGS, SI, Column, lacking_numbers
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.formats.text_file import open_text
@@ -25,13 +25,6 @@ SHOWN_CHANNELS = 60  # whose first rows are read; the names of all are listed
 LINE_LENGTH = 400  # characters of a raw line
 RANGED_ROWS = 20_000  # whose least and most value are shown in SI
 RANGED_CELLS = 1_000_000  # of these rows: of a wide file fewer are looked at
-# What a unit needs besides, by its kind.
-NEEDED = {
-    "counts": ("counts_per_rev",),
-    "share": ("rated_value",),
-    "current": ("torque_constant",),
-    "voltage": ("resistance", "torque_constant"),
-}
 
 
 class ChannelShown(msgspec.Struct, frozen=True):
@@ -169,7 +162,7 @@ def _take(name: str, choice: Choice | None, column: Column, source: RecordSource
     text = column.unit or source.heads[choice.place].unit
     unit = parse_unit(text, KINDS[name])
     kind = "" if unit is None else unit.kind
-    needs = [key for key in NEEDED.get(kind, ()) if getattr(column, key) is None]
+    needs = lacking_numbers(column, kind)
     if choice.numbered and column.rate is None and source.rate is None:
         needs.append("rate")
     how = "recognised" if choice.assumed else "named"

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.errors import RecordError
-from orchestrator.records.columns import COLUMNS, Array
+from orchestrator.records.columns import COLUMNS
 from orchestrator.records.requests import SAMPLED, hold_request
 from orchestrator.records.timing import has_gap, interpolate, interpolation_cost, resample_grid
 from orchestrator.records.words import INTERPOLATION
+from orchestrator.shared.arrays import Array
 
 Table = dict[str, Array]
 

@@ -21,7 +21,7 @@ from orchestrator.records.checks import (
     motion_span,
     quantisation_step,
 )
-from orchestrator.records.columns import COLUMNS, Array, Column
+from orchestrator.records.columns import COLUMNS, Column
 from orchestrator.records.drift import join_clocks
 from orchestrator.records.filters import decimate
 from orchestrator.records.formats import open_source
@@ -38,6 +38,7 @@ from orchestrator.records.rows import (
 )
 from orchestrator.records.timing import Grid, grid_of
 from orchestrator.records.words import RESAMPLING
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.numbers import exact_text
 
 ANGLES = ("theta_m", "theta_l")

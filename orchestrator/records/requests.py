@@ -9,11 +9,9 @@ sampled. So the record also keeps that reading, as a spline through the torque's
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 SAMPLED = "u, sampled"  # column of a record that is being read: its torque as a smooth signal
 RARER = 1.5  # times the step of the angles, from which the torque's rows are too rare to say what lies between

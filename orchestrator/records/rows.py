@@ -14,14 +14,14 @@ In all functions: ``values``: (n,), NaN: missing; ``time``: (n,) [s].
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.arrays import MINIMUM_ROWS, Record
-
-Array = NDArray[np.float64]
+from orchestrator.records.arrays import MINIMUM_ROWS, Record, map_arrays
+from orchestrator.shared.arrays import Array
 
 LONGEST_FAILURE = 3  # rows that leave the motion and come back; what stays away longer may be motion
 FAR_AWAY = 13.0  # of the 95 % quantile of what rows are off their neighbours: white noise never is
@@ -198,17 +198,9 @@ def take_new_readings(record: Record) -> Record:
     rows, mean = slowest.rows(record.size), slowest.mean
     if record.time[rows].size < MINIMUM_ROWS:
         return replace(record, doubts=(*record.doubts, f"{said}; log a longer run"))
-    return replace(
-        record,
-        time=record.time[rows],
-        u=mean(record.u),
-        u_sampled=None if record.u_sampled is None else mean(record.u_sampled),
-        theta_m=record.theta_m[rows],
-        theta_l=None if record.theta_l is None else record.theta_l[rows],
-        further={name: values[rows] for name, values in record.further.items()},
-        u_deviation=None if record.u_deviation is None else np.sqrt(mean(record.u_deviation**2)),
-        doubts=(*record.doubts, f"{said}; rows of new readings are taken, and the mean of the torque between them"),
-    )
+    take = itemgetter(rows)
+    doubts = (*record.doubts, f"{said}; rows of new readings are taken, and the mean of the torque between them")
+    return map_arrays(record, take, take, mean, lambda deviation: np.sqrt(mean(deviation**2)), doubts=doubts)
 
 
 def _resolution(values: Array) -> float:

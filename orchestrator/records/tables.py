@@ -14,10 +14,9 @@ from orchestrator.records.formats.source import Head
 from orchestrator.records.names import find_named, list_names, near, recognise_time
 from orchestrator.records.stamps import seconds_of
 from orchestrator.records.units import parse_unit
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.units import KnownUnit
 from orchestrator.shared.units import parse_unit as parse_any_unit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

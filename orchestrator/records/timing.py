@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.jitter import describe_jitter, fit_clock, places_on_clock
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.numbers import exact_text
-
-Array = NDArray[np.float64]
 
 LEAST_STEP = 1e-6  # s
 LARGEST_STEP = 0.5  # s

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.records.checks import LARGEST_SHARE_MISSING
-from orchestrator.records.formats.source import Head, RecordSource, is_filled
+from orchestrator.records.formats.source import RecordSource, RowView, is_filled
 
 TOGETHER = 0.1  # of the rows of a column: with fewer that another one fills, too, they are two topics
 EVEN = 0.9  # of the distances between a column's rows: with more of them equal it has a raster of its own
@@ -43,8 +43,13 @@ def split_topics(source: RecordSource, time: int, places: Sequence[int], main: i
     if len(topics) < 2 or any(not filled[topic[0]].any() for topic in topics):
         return None
     topics.sort(key=lambda topic: main not in topic)
-    rows = [np.logical_or.reduce([filled[place] for place in topic]) for topic in topics]
-    return _Topics(source, time, topics, rows)
+    rows = {n: np.logical_or.reduce([filled[place] for place in topic]) for n, topic in enumerate(topics)}
+    number_of = {place: number for number, topic in enumerate(topics) for place in topic}
+    heads = [replace(head, raster=number_of.get(place, 0)) for place, head in enumerate(source.heads)]
+    for number, topic in enumerate(topics[1:], start=1):  # whose times are channels behind those of the file
+        label = source.heads[topic[0]].full or source.heads[topic[0]].name
+        heads.append(replace(source.heads[time], name="time", raster=number, full=f"time of {label}"))
+    return RowView(source, heads, rows, f", {len(rows)} topics with rows of their own", time)
 
 
 def _agree(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> bool:
@@ -56,29 +61,3 @@ def _agree(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> bool:
     steps = np.diff(np.flatnonzero(few[many]))
     usual = float(np.median(steps)) if steps.size else 1.0
     return usual == 1.0 or float(np.mean(steps == usual)) < EVEN
-
-
-class _Topics(RecordSource):
-    """A file with a raster for each topic; the times of the further ones are channels behind those of the file."""
-
-    def __init__(self, source: RecordSource, time: int, topics: list[list[int]], rows: list[NDArray[np.bool_]]) -> None:
-        self._source, self._time, self._rows = source, time, rows
-        of = {place: number for number, topic in enumerate(topics) for place in topic}
-        heads = [replace(head, raster=of.get(place, 0)) for place, head in enumerate(source.heads)]
-        for number, topic in enumerate(topics[1:], start=1):
-            label = source.heads[topic[0]].full or source.heads[topic[0]].name
-            heads.append(replace(source.heads[time], name="time", raster=number, full=f"time of {label}"))
-        self.heads: Sequence[Head] = heads
-        self.rate, self.broken = source.rate, source.broken
-
-    @property
-    def dialect(self) -> str:  # type: ignore[override]
-        """Return what was detected."""
-        return f"{self._source.dialect}, {len(self._rows)} topics with rows of their own"
-
-    def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        """Return the values of some channels, in the rows of their topics."""
-        own = [place if place < len(self._source.heads) else self._time for place in places]
-        distinct = sorted(set(own))
-        values = dict(zip(distinct, self._source.load(distinct), strict=True))
-        return [values[place][self._rows[self.heads[asked].raster]] for asked, place in zip(places, own, strict=True)]

@@ -5,13 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.plain_text import plain_text
-from orchestrator.records.columns import COLUMNS, KINDS, Column
+from orchestrator.records.columns import COLUMNS, KINDS, Column, lacking_numbers
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
 from orchestrator.records.loading import choose_channels
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.model_text import entry_texts
-from orchestrator.records.preview import NEEDED, preview_log
+from orchestrator.records.preview import preview_log
 from orchestrator.records.units import parse_unit
 
 ASSUMED_COUNTS = 4096.0
@@ -172,7 +172,7 @@ def blank_starter(path: Path, columns: Mapping[str, Column], header: int | None,
             lines.append(
                 f'# unit = "{EXAMPLES[taken.column]}"   # FILL IN{f"; {unknown!r} is not known" * bool(unknown)}'
             )
-        needs = taken.needs or (() if column.unit else NEEDED.get(UNIT_KINDS[taken.column], ()))
+        needs = taken.needs or (() if column.unit else lacking_numbers(Column(), UNIT_KINDS[taken.column]))
         lines += [*(f"# {key} =    # FILL IN: {SHEET[key]}" for key in needs if getattr(column, key) is None), ""]
     model = read_model(None)
     lines.append("[parameters]   # of the data sheets")

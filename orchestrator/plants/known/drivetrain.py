@@ -3,17 +3,15 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.effects.effect import DRIVETRAIN
 from orchestrator.effects.of_logs import LEAD, SAMPLED, SHIFT, eccentricity
 from orchestrator.effects.of_plants import PRESLIDING, bank_of, build_up_distance
 from orchestrator.plants.description import Body, Drive, Plant, Resonance, Shaft
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.drivetrain import equations as dt
 from pyfmu_sources.laws.backlash_models import GRADUAL, MODELS
 from pyfmu_sources.laws.friction import breakaway_torque
-
-Array = NDArray[np.float64]
 
 NUISANCES = ("presliding.motor", "presliding.load", "contact.onset")
 

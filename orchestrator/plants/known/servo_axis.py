@@ -1,16 +1,14 @@
 """One inertia, or mass, behind the lag of its drive: the FMU ``ServoAxis``."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.effects.effect import AXIS
 from orchestrator.effects.of_logs import LEAD, SAMPLED, eccentricity
 from orchestrator.effects.of_plants import PRESLIDING, bank_of, build_up_distance
 from orchestrator.plants.description import Body, Drive, Plant
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.axis import axis_equations as ap
 from pyfmu_sources.laws.friction import breakaway_torque
-
-Array = NDArray[np.float64]
 
 
 def _fmu_parameters(p: Array) -> Array:

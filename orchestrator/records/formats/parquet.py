@@ -30,7 +30,6 @@ class ParquetSource(RecordSource):
         self.rate = None
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        """Return the values of some columns."""
         names = [self._file.schema_arrow.names[place] for place in places]
         try:
             table = self._file.read(columns=names)

@@ -1,6 +1,6 @@
 """What every reader of a format gives: named channels with units, and their values on demand."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -58,21 +58,37 @@ class RecordSource(Protocol):
 
     def within(self, rows: slice, raster: int) -> "RecordSource":
         """Return the same file with some rows of one raster alone."""
-        return _Within(self, rows, raster)
+        return RowView(self, self.heads, {raster: rows})
 
 
-class _Within(RecordSource):
-    """Some rows of a file."""
+class RowView(RecordSource):
+    """Some rows of a file, by raster; all of a raster that ``rows`` does not name.
 
-    def __init__(self, source: RecordSource, rows: slice, raster: int) -> None:
-        self._source, self._rows, self._raster = source, rows, raster
-        self.heads, self.dialect, self.rate = source.heads, source.dialect, source.rate
+    ``said`` follows the file's dialect. Channels beyond those of the file have its values at the place ``time``.
+    """
+
+    def __init__(
+        self, source: RecordSource, heads: Sequence[Head], rows: Mapping[int, Any], said: str = "", time: int = 0
+    ) -> None:
+        self._source, self._rows, self._said, self._time = source, rows, said, time
+        self.heads, self.rate = heads, source.rate
+
+    @property
+    def broken(self) -> str:  # type: ignore[override]
+        """Return what stands among the rows and is no row."""
+        return self._source.broken
+
+    @property
+    def dialect(self) -> str:  # type: ignore[override]
+        """Return what was detected."""
+        return self._source.dialect + self._said
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        return [
-            values[self._rows] if self.heads[place].raster == self._raster else values
-            for place, values in zip(places, self._source.load(places), strict=True)
-        ]
+        own = [place if place < len(self._source.heads) else self._time for place in places]
+        distinct = sorted(set(own))
+        values = dict(zip(distinct, self._source.load(distinct), strict=True))
+        rows = (self._rows.get(self.heads[place].raster, slice(None)) for place in places)
+        return [values[place][kept] for place, kept in zip(own, rows, strict=True)]
 
 
 def is_filled(values: NDArray[Any]) -> NDArray[np.bool_]:

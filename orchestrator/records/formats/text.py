@@ -59,7 +59,6 @@ class TextSource(RecordSource):
         return TextSource(self._file, self._dialect, self._rows, rows)
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
-        """Return the values of some columns."""
         return self._rastered(places) if self.heads[-1].raster else self._read(places, strict=True)
 
     def _read(self, places: Sequence[int], strict: bool) -> list[NDArray[Any]]:

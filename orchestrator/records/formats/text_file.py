@@ -54,37 +54,16 @@ def open_text(path: Path) -> TextFile:
     """Return a text, read through once: as UTF-8 where it is that, else as Windows-1252."""
     try:
         with path.open("rb") as file:
-            start = file.read(4000)
-        encoding = next((name for bom, name in _BOMS if start.startswith(bom)), "") or _without_bom(start)
-        plain = _look_through_plain(path) if encoding == "utf-8" else None
-        if plain is not None:
-            return plain
-        try:
-            return _look_through(path, encoding)
-        except UnicodeDecodeError as error:
-            if encoding != "utf-8":
-                raise RecordError(
-                    f"{path}: must be text, but byte {error.start} is no {encoding}: save it as UTF-8"
-                ) from None
-        return _look_through(path, "cp1252")
+            head = file.read(4000)
+        encoding = next((name for bom, name in _BOMS if head.startswith(bom)), "") or _without_bom(head)
+        for one in ("ascii", "utf-8", "cp1252") if encoding == "utf-8" else (encoding,):
+            try:
+                return _look_through(path, one)
+            except UnicodeDecodeError as error:
+                start = error.start
     except OSError as error:
         raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def _look_through_plain(path: Path) -> TextFile | None:
-    """Return a text of nothing but ASCII characters and plain line ends, as most are; None: it is none."""
-    lines, last_comma, before, data = 0, -1, b"", b""
-    with path.open("rb") as file:
-        while part := file.read(BLOCK):
-            part += file.readline()
-            if not part.isascii() or b"\r" in part or b"\x00" in part:
-                return None
-            comma = part.rfind(b",")
-            if comma >= 0:
-                last_comma = lines + count_of(part[:comma], "\n")
-            lines += count_of(part, "\n") + (not part.endswith(b"\n"))
-            before, data = data, part
-    return TextFile(path, "ascii", lines, last_comma, str(before + data, "ascii"))
+    raise RecordError(f"{path}: must be text, but byte {start} is no {encoding}: save it as UTF-8")
 
 
 def _look_through(path: Path, encoding: str) -> TextFile:
@@ -114,10 +93,13 @@ def _count_lines(text: str) -> int:
 
 def _texts(path: Path, encoding: str) -> Iterator[str]:
     """Yield the text in blocks of whole lines, whatever ends a line in the file; raise UnicodeDecodeError."""
-    if encoding == "ascii":  # with plain line ends: nothing to decode, and nothing to carry over
+    if encoding == "ascii":  # with plain line ends, as most are: nothing to decode, and nothing to carry over
         with path.open("rb") as file:
             while data := file.read(BLOCK):
-                yield str(data + file.readline(), encoding)
+                data += file.readline()
+                if b"\r" in data or b"\x00" in data:
+                    raise UnicodeDecodeError(encoding, data, 0, 1, "no plain line ends")
+                yield str(data, encoding)
         return
     plain = codecs.getincrementaldecoder(encoding)("replace" if encoding == "cp1252" else "strict")
     decoder = io.IncrementalNewlineDecoder(plain, translate=True)

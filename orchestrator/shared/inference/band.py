@@ -1,9 +1,8 @@
 """The band of frequencies in which a motion shows above measurement noise."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 
 def content_band(values: Array, step: float, noise: float, shows: float, most_above: float, pane: int) -> float:

@@ -3,9 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 
 def pseudo_inverse(matrix: Array, **how: Any) -> Array:

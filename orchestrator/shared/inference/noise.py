@@ -3,9 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 MAD_TO_DEVIATION = 1.4826  # standard deviation over median absolute deviation, of a normal distribution
 

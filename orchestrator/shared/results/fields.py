@@ -7,10 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, get_type_hints
+from typing import Any, TypeVar, get_type_hints
 
 import msgspec
 
+S = TypeVar("S", bound=msgspec.Struct)
 Cell = float | int | str | bool | None
 ROW_LIMIT = 500
 
@@ -95,6 +96,14 @@ def displays(kind: type[msgspec.Struct]) -> dict[str, Display]:
             if isinstance(note, Display):
                 found[name] = note
     return found
+
+
+def copy_fields(kind: type[S], source: object, **others: Any) -> S:
+    """Return a struct with the attributes of ``source`` that have the names of its fields, and ``others``."""
+    own = {
+        name: getattr(source, name) for name in kind.__struct_fields__ if name not in others and hasattr(source, name)
+    }
+    return kind(**own, **others)
 
 
 def fields_table(
