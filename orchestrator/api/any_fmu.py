@@ -46,7 +46,6 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         diagnosis: verdict, graded effects, parameters, misfits and what is left.
         validation: how the models do on another record, or None.
         seconds: wall time of the diagnosis [s].
-        arguments: what was asked for.
         delivered: the corrected system, once it has been written.
     """
 

@@ -24,7 +24,6 @@ class BuildResult(Result):
     Attributes:
         paths: path of each FMU by its model's name.
         remark: what this machine cannot give an FMU, or None.
-        arguments: what was asked for.
     """
 
     command: ClassVar[str] = "build"

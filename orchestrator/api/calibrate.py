@@ -29,7 +29,6 @@ class CalibrationResult(Result):
     Attributes:
         calibration: values, intervals, what the record does not determine, misfit.
         seconds: wall time [s].
-        arguments: what was asked for.
     """
 
     command: ClassVar[str] = "calibrate"

@@ -104,9 +104,9 @@ class AnySweepResult(PlottedResult):
     """What the sweeps share: a table of finished cases that streams from a journal. Close it, or use ``with``."""
 
     command: ClassVar[str] = "sweep"
-    cases: DesignCases
-    sweep: Sweep
-    parquet: bool
+    cases: DesignCases  # varied values by case, computed when asked for
+    sweep: Sweep  # outcomes of the finished cases, in case order
+    parquet: bool  # whether ``save`` writes Parquet too
 
     def __enter__(self) -> Self:
         return self

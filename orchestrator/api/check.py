@@ -26,7 +26,6 @@ class CheckResult(Result):
 
     Attributes:
         verdicts: one for each FMU.
-        arguments: what was asked for.
     """
 
     command: ClassVar[str] = "check"

@@ -70,7 +70,6 @@ class CompensateResult(PlottedResult):
         bound: least time [s] of a traversal from rest that lands at the speed asked for, without torque.
         task: move, gap and limits.
         forecast: what the plain LQR does at rest without friction and load, with its margins.
-        arguments: what was asked for.
     """
 
     command: ClassVar[str] = "compensate"

@@ -59,7 +59,6 @@ class DesignResult(SampledResult):
         time: the grid [s], shape (n,).
         candidates: what was judged: torque ``u`` [N.m] of shape (n,), and the bound on the half-gap [rad].
         request: the unit in which the model file says that the drive takes its request; None: N.m, or volts.
-        arguments: what was asked for.
     """
 
     command: ClassVar[str] = "estimate"

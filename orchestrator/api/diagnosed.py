@@ -43,7 +43,6 @@ class DiagnosisResult(AnyDiagnosisResult):
         record: the first measured record.
         validation: how the models do on another record, or None.
         seconds: wall time of the diagnosis [s].
-        arguments: what was asked for.
         more: further records of the same machine, fitted together with the first.
     """
 

@@ -48,7 +48,6 @@ class EstimateResult(PlottedResult):
         model: what it was compared with.
         methods: what each method says.
         diagnosis: what the model misses, where it does not explain the record; else None.
-        arguments: what was asked for.
         more: further records of the same machine, fitted together with the first.
         repeats: what records with the same torque differ by, or None.
         settings: the thresholds that were used.

@@ -67,7 +67,6 @@ class InspectResult(PlottedResult):
         assumed: what was assumed, a sentence each.
         starter: text of a model file to start from.
         two_angles: the half-gap from the two angles alone, where the log has no torque.
-        arguments: what was asked for.
     """
 
     command: ClassVar[str] = "inspect"

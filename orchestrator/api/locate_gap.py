@@ -43,7 +43,6 @@ class LocationResult(SampledResult):
         record: motor and load angle, and the torque, as they were read.
         model: what it was compared with.
         location: what the fits say.
-        arguments: what was asked for.
         settings: the thresholds that were used.
     """
 

@@ -35,7 +35,6 @@ class PairResult(SampledResult):
         experiment: what both loops share.
         seed: of the encoder noise.
         run: both loops, the metric and the estimate.
-        arguments: what was asked for.
     """
 
     command: ClassVar[str] = "simulate"

@@ -37,7 +37,6 @@ class RegulatorResult(PlottedResult):
         sample_time: [s].
         delay: of the request [samples].
         forecast: what the loop does at rest, and its margins.
-        arguments: what was asked for.
     """
 
     command: ClassVar[str] = "regulator"

@@ -21,11 +21,7 @@ class ScenarioSweepResult(AnySweepResult):
 
     Attributes:
         scenario: as read from its file, before parameters are varied.
-        cases: varied values by case, computed when asked for.
-        sweep: outcomes of the finished cases, in case order.
         seed: from which random and Sobol parameters are drawn.
-        parquet: whether ``save`` writes Parquet too.
-        arguments: what was asked for.
         isolation: the walls around the FMUs that are not ours.
     """
 

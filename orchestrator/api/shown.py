@@ -32,7 +32,7 @@ def doubts_of(records: Sequence[Any]) -> list[str]:
 class Result:
     """Base of what the workflows return: it prints itself, and saves itself as the command of its name does.
 
-    A subclass gives ``blocks``, ``results`` and ``write_data``.
+    A subclass gives ``blocks``, ``results`` and ``write_data``. ``arguments`` are what was asked for.
     """
 
     command: ClassVar[str]

@@ -33,7 +33,6 @@ class SimulationResult(SampledResult):
         title: above the printed table: the scenario's name.
         isolation: the walls around the run: which FMUs are not ours, and what the system could not enforce.
         command: whose result directory ``save`` makes.
-        arguments: what was asked for.
     """
 
     replaces: ClassVar[tuple[str, ...]] = ("simulate.png",)

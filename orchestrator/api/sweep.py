@@ -34,12 +34,8 @@ class SweepResult(AnySweepResult):
 
     Attributes:
         plan: sizes, noise levels, seeds and varied parameters.
-        cases: varied values by case, computed when asked for.
-        sweep: outcomes of the finished cases, in case order.
         fmus: paths of the three FMUs.
         calibrations: by noise level [rad].
-        parquet: whether ``save`` writes Parquet too.
-        arguments: what was asked for.
         fmu_kind: which builds of the FMUs ran: "native" or "Python".
     """
 
