@@ -16,8 +16,7 @@ from orchestrator.shared.stopping import stop_in_words
 def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
     """Run a program's work and return its exit code: that of the work, 2 for bad input, 1 for other errors.
 
-    Returns:
-        The exit code; 130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP.
+    It is 130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of any script, whatever the terminal's encoding

@@ -158,12 +158,9 @@ class Plant:
         return self.realised(p) if self.realised else np.asarray(p[: len(self.table)])
 
     def follow_requests(self, p: Array, u: Array, h: float) -> tuple[Array, Array]:
-        """Return what requests (n,) [N.m] become behind a second lag and a limited rate.
+        """Return what requests ``u`` (n,) [N.m], each held for ``h`` [s], become by a second lag and a limited rate.
 
-        ``u``: requests (n,), each held for ``h``; ``h``: sample time [s].
-
-        Returns:
-            their mean over each sample (n,), and the value at its beginning (n,).
+        That is their mean over each sample (n,), and the value at its beginning (n,).
         """
         if not self.drive.rate:
             return u, u

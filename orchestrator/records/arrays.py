@@ -166,11 +166,7 @@ def map_arrays(
 
 
 def interpolate_missing(values: Array) -> Array:
-    """Return values with straight lines over NaN. ``values``: (n,).
-
-    Returns:
-        Shape (n,); unchanged when nothing is missing, or everything.
-    """
+    """Return values (n,) with straight lines over NaN; unchanged when nothing is missing, or everything."""
     good = np.isfinite(values)
     if good.all() or not good.any():
         return values

@@ -58,11 +58,7 @@ class Loaded:
 def load(
     source: RecordSource, path: Path, columns: Mapping[str, Column], further: Sequence[str], reading: Reading
 ) -> Loaded:
-    """Return the columns of a record from an opened file.
-
-    Returns:
-        Arrays (n,) in SI units by name, names in the file, and what was assumed.
-    """
+    """Return the columns of a record from an opened file: arrays (n,) in SI units by name, and what was assumed."""
     chosen = choose_channels(source, columns, str(path), reading.torque_needed)
     extra = {name: n for n, head in enumerate(source.heads) for name in further if name in (head.name, head.full)}
     places = sorted({choice.place for choice in chosen.values()} | set(extra.values()))

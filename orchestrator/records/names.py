@@ -32,8 +32,7 @@ def find_channels(
 ) -> tuple[dict[str, Choice], dict[str, str]]:
     """Return the channel of each column of a record: named, of the same name, or recognised without doubt.
 
-    Returns:
-        the channels that were found, and for each other column that must be there a message that says what is missing.
+    Beside the channels stands, for each other column that must be there, a message that says what is missing.
     """
     found: dict[str, Choice] = {}
     unclear: dict[str, str] = {}

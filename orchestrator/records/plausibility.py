@@ -9,7 +9,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model
@@ -235,16 +234,10 @@ def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
         )
 
 
-def lag_torque(u: NDArray[np.float64], tau: float, step: float) -> NDArray[np.float64]:
-    """Return the motor's torque [N.m] for a request held from sample to sample.
+def lag_torque(u: Array, tau: float, step: float) -> Array:
+    """Return the torque (n,) [N.m] of a drive that starts at rest for a request ``u`` (n,) [N.m].
 
-    Args:
-        u: (n,) requested torque [N.m].
-        tau: time constant of the drive [s].
-        step: sample time [s].
-
-    Returns:
-        Shape (n,); the drive starts at rest.
+    ``tau``: time constant of the drive [s]; ``step``: over which each request is held [s].
     """
     keep = math.exp(-step / tau)
     torque = np.empty_like(u)

@@ -231,14 +231,7 @@ def resample_grid(time: Array) -> tuple[Array, float]:
 
 
 def interpolate(grid: Array, time: Array, values: Array, how: str) -> Array:
-    """Return ``values`` at ``time`` brought to ``grid``, by lines or by a spline through the points.
-
-    Args:
-        grid: (m,) [s].
-
-    Returns:
-        Shape (m,); NaN within gaps.
-    """
+    """Return ``values`` at ``time`` brought to ``grid`` (m,) [s], by lines or by a spline; NaN within gaps."""
     good = np.isfinite(values)
     known = time[good]
     if how == "cubic":
@@ -264,10 +257,7 @@ def interpolation_cost(time: Array, values: Array, how: str) -> float:
 
     Rows are left out and interpolated from every second row, and from every fourth. From one to the next the error
     falls by some factor, sixteen for a smooth signal and a spline, and hardly at all for one that jumps; the same
-    factor once more leads to the rows as they stand.
-
-    Returns:
-        The error, in the unit of ``values``; 0.0 for fewer than sixteen samples.
+    factor once more leads to the rows as they stand. It is 0.0 for fewer than sixteen samples.
     """
     good = np.isfinite(values)
     t, v = time[good], values[good]

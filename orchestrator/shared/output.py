@@ -127,12 +127,9 @@ def remove_empty(directories: list[Path]) -> None:
 
 
 def write_result(directory: Path, command: str, arguments: Mapping[str, Any], seed: int | None, results: Any) -> Path:
-    """Write ``DIR/COMMAND.json``, the machine-readable result that every command leaves.
+    """Write ``DIR/COMMAND.json``, the machine-readable result that every command leaves; return where.
 
     Non-finite numbers become ``null``: JSON has no other way to say them.
-
-    Returns:
-        The path of the file.
     """
     document = {
         "command": command,

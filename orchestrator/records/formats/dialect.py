@@ -106,11 +106,7 @@ def detect(file: TextFile, header: int | None = None) -> Dialect:
 
 
 def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int, int, str, str] | None:
-    """Return the longest run of rows of numbers, or None.
-
-    Returns:
-        Values, minus the number of words, width, first line, separator, decimal.
-    """
+    """Return the longest run of rows of numbers, or None: values, minus words, width, first line, both signs."""
     best: tuple[int, int, int, int] | None = None
     width = start = count = words = 0
     for n, line in enumerate(lines):

@@ -34,8 +34,7 @@ def version() -> int:
 def restrict(read: Iterable[str], write: Iterable[str]) -> int:
     """Refuse this thread, for good, every file outside ``read`` and ``write``, TCP, and signals to other processes.
 
-    Returns:
-        The version in use; 0 when there is none, and then nothing is refused.
+    Return the version in use; 0 when there is none, and then nothing is refused.
     """
     found = version()
     if not found:
