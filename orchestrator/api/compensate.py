@@ -29,7 +29,6 @@ from orchestrator.control.weights import choose_weights
 from orchestrator.errors import ScenarioError
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.scenarios.scenario import simulate
-from orchestrator.shared.arrays import Array
 from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.compensate import UPPER, CompensateFound, LawFound, laws_tables

@@ -1,6 +1,7 @@
 """Decimation of a record with an anti-alias filter."""
 
 import math
+from dataclasses import replace
 from operator import itemgetter
 
 import numpy as np
