@@ -44,7 +44,8 @@ def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
     twist = run["plant.theta_m"] / task.nominal.i - run["plant.theta_l"]
     met = np.flatnonzero((contact[1:] != 0) & (contact[:-1] != contact[1:]))
     left = np.flatnonzero((contact[:-1] != 0) & (contact[:-1] != contact[1:]))
-    times, impacts = [], []
+    times: list[float] = []
+    impacts: list[float] = []
     path = (np.zeros(0), np.zeros(0))
     for end in met:
         before = left[left <= end]

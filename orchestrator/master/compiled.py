@@ -135,7 +135,7 @@ class CompiledWiring:
                 if slave.astray:
                     called.came_elsewhere(slave.astray, start + slave.first_astray * step, slave.farthest)
 
-    def _run(self, job: _Run, out: Array, start: float, step: float) -> None:
+    def _run(self, job: Any, out: Array, start: float, step: float) -> None:
         failure = _Failure()
         steps, begin, chunk = len(out) - 1, 0, FIRST_CHUNK
         while begin < steps:

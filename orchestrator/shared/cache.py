@@ -91,9 +91,9 @@ def remember(name: str, key: Iterable[str | bytes], make: Callable[[], bytes]) -
         tell_damage(path)
     content = make()
     with contextlib.suppress(OSError):  # a full cache costs time, no result
-        part = part_of(path)
-        part.write_bytes(content)
-        part.replace(path)
+        begun = part_of(path)
+        begun.write_bytes(content)
+        begun.replace(path)
         note_hash(path)
     return content
 
