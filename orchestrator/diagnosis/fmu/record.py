@@ -122,7 +122,7 @@ def read_fmu_record(path: Path, given: Map, uneven: float = DEFAULT.uneven) -> F
     if not np.any(np.ptp(inputs, axis=0)):
         raise RecordError(f"{path}: at least one input must change, but none does")
     signals = signals - np.array([e.reference for e in given.signals.values()])
-    return _take_new_readings(FmuRecord(even, inputs, outputs, str(path), signals, notes=tuple(notes)), given)
+    return _take_new_readings(FmuRecord(even, inputs, outputs, path.name, signals, notes=tuple(notes)), given)
 
 
 def _take_new_readings(record: FmuRecord, given: Map) -> FmuRecord:

@@ -14,7 +14,7 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     evidence_table,
     parameter_table,
 )
-from orchestrator.reporting.pages.generic import folds_of, sections_of
+from orchestrator.reporting.pages.generic import folds_of
 from orchestrator.reporting.source import Array, ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
@@ -23,7 +23,6 @@ from orchestrator.shared.results.diagnose import misfit_tables
 from orchestrator.shared.results.fields import Cell, fields_table
 
 STAGES = {"nominal": "model as given", "refitted": "with re-fitted parameters", "corrected": "with the effects"}
-KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
 
 
 def build(source: ResultDocument) -> Report:
@@ -45,7 +44,6 @@ def build(source: ResultDocument) -> Report:
         "Values and search": [
             *([parameter_table(found.parameters)] if found.parameters else []),
             *candidate_table(found.candidates),
-            *sections_of("More", {k: v for k, v in source.results.items() if k not in KNOWN}),
         ],
     }
     return Report(

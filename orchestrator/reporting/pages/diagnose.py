@@ -26,7 +26,7 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     evidence_table,
     parameter_table,
 )
-from orchestrator.reporting.pages.generic import folds_of, sections_of
+from orchestrator.reporting.pages.generic import folds_of
 from orchestrator.reporting.pages.meanings import with_meanings
 from orchestrator.reporting.pages.record import signal_plots
 from orchestrator.reporting.source import ResultDocument, words
@@ -42,7 +42,6 @@ from orchestrator.shared.results.diagnose import (
 )
 from orchestrator.shared.results.fields import fields_table
 
-KNOWN = frozenset(DiagnoseFound.__struct_fields__)
 MISSING = "The torque that the model misses without the effect, and how much of that its law accounts for."
 BLOCKS = "The size as every block of the record by itself says it. Where blocks agree, a size is sure."
 UNSIZED = frozenset({"phase", "cycles_per_rev"})  # parameters that are no sizes
@@ -78,7 +77,6 @@ def build(source: ResultDocument) -> Report:
             with_meanings(parameter_table(results.parameters), live),
             *candidate_table(results.candidates),
             *_analysis(results),
-            *sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"}),
         ],
     }
     sections += folds_of(folds)
