@@ -1,32 +1,13 @@
-import { fileAddress } from "./api.js";
 import { check, choice, field, fill, make, numberIn, numberInput } from "./dom.js";
 import { action, fileChoice, jobView, kept, message } from "./parts.js";
 import { sliders } from "./sliders.js";
 import { choices, choose, isOver, session, start, watch } from "./state.js";
 
-const TAKEN_ALONG = /\.(fmu|ssp|toml)$/i, CORRECTED = /(^|\/)corrected\.toml$/;
+const CORRECTED = /(^|\/)corrected\.toml$/;
 
 export function build(panel) {
-  panel.append(models(), make("h2", {}, "Simulate it"), ...simulation(), make("h2", {}, "A controller for it"), ...controller());
-}
-
-// What diagnoses and estimates leave to take along.
-function models() {
-  const list = make("div", {});
-  let shown = "";
-  const draw = () => {
-    const jobs = session.jobs.filter((job) => job.files.some((name) => /\.(fmu|ssp)$/i.test(name) || CORRECTED.test(name)));
-    const now = JSON.stringify(jobs.map((job) => job.name));
-    if (now === shown) return;
-    shown = now;
-    const link = (job, name) => make("li", {}, make("a", { href: fileAddress(`results/${job.name}/${name}`), download: name.split("/").at(-1) }, name));
-    fill(list, jobs.length ? jobs.toReversed().map((job) => make("div", { class: "job" }, make("strong", {}, job.name),
-      make("ul", { class: "files" }, job.files.filter((name) => TAKEN_ALONG.test(name)).map((name) => link(job, name)))))
-      : make("p", {}, "No corrected model is here yet: a diagnosis or an estimate leaves it. The tab FMUs checks and runs it."));
-  };
-  watch(draw);
-  draw();
-  return list;
+  panel.append(make("p", { class: "note" }, "A diagnosis or an estimate leaves the corrected model: its FMU and corrected.toml stand among the files of the result."),
+    make("h2", {}, "Simulate it"), ...simulation(), make("h2", {}, "A controller for it"), ...controller());
 }
 
 // The model of a result under sliders.

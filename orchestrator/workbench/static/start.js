@@ -20,7 +20,7 @@ function steps() {
     ["machine", "Machine", "Say what is known of the machine: inertias, ratio, stiffness.", choices.model && fileName(choices.model), needsLog || "the look at the log drafts it"],
     ["gap", "Gap", "How large is the play? With its 95 % interval.", gap?.name, needsLog || "press “Estimate the gap”"],
     ["diagnosis", "Diagnosis", "Which effects does the model of the machine lack?", diagnosis?.name, needsLog || "press “Diagnose”"],
-    ["model", "Model", "Take the corrected model along as an FMU, move its sliders, and design a controller for it.", fmu, "a diagnosis leaves it"],
+    ["model", "Model", "Move the sliders of the corrected model, and design a controller for it.", fmu, "a diagnosis leaves it"],
   ];
 }
 
