@@ -138,7 +138,7 @@ def pack(values: Numbers) -> list[float | None] | dict[str, Any]:
     """Return a column (n,) to seven digits of its range, as base64 of 32-bit numbers where it is long."""
     column = as_column(values)
     if column.size <= PLAIN:
-        return _plain(column)
+        return plain_numbers(column)
     finite = column[np.isfinite(column)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     middle = 0.5 * (low + high)
@@ -151,7 +151,7 @@ def pack_times(values: Numbers) -> list[float | None] | dict[str, Any]:
     """Return the x of a curve (n,): first value, step and count where it is uniform, else 64-bit numbers."""
     column = as_column(values)
     if column.size <= PLAIN:
-        return _plain(column)
+        return plain_numbers(column)
     start, step = float(column[0]), float(column[-1] - column[0]) / (column.size - 1)
     if step > 0.0 and np.all(np.abs(column - (start + step * np.arange(column.size))) < 1e-6 * step):
         return {"start": start, "step": step, "count": column.size}
@@ -164,8 +164,9 @@ def as_column(values: Numbers) -> Array:
     return np.where(np.isfinite(column), column, np.nan)
 
 
-def _plain(column: Array) -> list[float | None]:
-    return [float(f"{value:.10g}") if math.isfinite(value) else None for value in column.tolist()]
+def plain_numbers(column: Array, digits: int = 10) -> list[float | None]:
+    """Return numbers as JSON holds them: rounded, and null where one is missing or not finite."""
+    return [float(f"{value:.{digits}g}") if math.isfinite(value) else None for value in column.tolist()]
 
 
 def _base64(column: NDArray[Any]) -> str:

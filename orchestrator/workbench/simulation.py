@@ -25,6 +25,7 @@ from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
 from orchestrator.plants.known import plants
+from orchestrator.reporting.plots import plain_numbers
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import LiveFound
 
@@ -78,8 +79,8 @@ class SliderModel:
                 "name": name, "unit": entry.unit, "meaning": entry.description, "value": value,
                 "low": max(entry.minimum, low), "high": min(span, entry.maximum),
             })  # fmt: skip
-        measured = {name: _as_list(values) for name, values in self._measured.items()}
-        return {"kind": self._kind, "sliders": sliders, "time": _as_list(self._time), "measured": measured}
+        measured = {name: plain_numbers(values, 9) for name, values in self._measured.items()}
+        return {"kind": self._kind, "sliders": sliders, "time": plain_numbers(self._time, 9), "measured": measured}
 
     def run(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Simulate with these values.
@@ -104,7 +105,7 @@ class SliderModel:
             given[name] = float(value)
         begun = time.perf_counter()
         result = self._session.run({f"{NAME}.{name}": value for name, value in given.items()})
-        curves = {name: _as_list(result[f"{NAME}.{name}"]) for name in self._measured}
+        curves = {name: plain_numbers(result[f"{NAME}.{name}"], 9) for name in self._measured}
         return {"curves": curves, "seconds": time.perf_counter() - begun}
 
     def _names(self) -> list[str]:
@@ -168,7 +169,3 @@ def _columns(path: Path, first: int, count: int) -> dict[str, NDArray[np.float64
     if not {"time", "u"} <= columns.keys() or columns["u"].size < LEAST_ROWS or not np.isfinite(columns["u"]).all():
         raise InputError(f"{path.parent.name} must have times and torques in {path.name}, but has not")
     return columns
-
-
-def _as_list(values: NDArray[np.float64]) -> list[float | None]:
-    return [float(f"{value:.9g}") if math.isfinite(value) else None for value in values.tolist()]

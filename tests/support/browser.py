@@ -77,9 +77,9 @@ def whole_page(driver: Any, path: Path, width: int, scheme: str) -> None:
 
 
 def open_page(driver: Any, address: str) -> None:
-    """Open a page and wait until its program has run, which shows the button for the theme."""
+    """Open a page and wait until its program has run."""
     from selenium.webdriver.support.wait import WebDriverWait
 
     driver.get(address)
-    ready = "return document.readyState === 'complete' && document.getElementById('theme')?.hidden === false"
+    ready = "return document.readyState === 'complete'"
     WebDriverWait(driver, 600).until(lambda opened: opened.execute_script(ready))

@@ -45,7 +45,6 @@ function fitted(table) {
   fit();
 }
 
-themeButton(document.getElementById("theme"));
 document.querySelectorAll("table.sortable").forEach(sortable);
 document.querySelectorAll("table.sortable").forEach(fitted);
 document.querySelectorAll("figure.plot").forEach((figure) => new Plot(figure));

@@ -1,19 +1,3 @@
-// A button that turns light into dark colours and back; until it is pressed they are those of the system.
-function themeButton(button) {
-  const root = document.documentElement;
-  const isDark = () => (root.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
-  const tell = () => {
-    button.textContent = isDark() ? "Light" : "Dark";
-    button.setAttribute("aria-label", `Use ${isDark() ? "light" : "dark"} colours`);
-  };
-  button.hidden = false;
-  button.addEventListener("click", () => {
-    root.dataset.theme = isDark() ? "light" : "dark";
-    tell();
-  });
-  tell();
-}
-
 // Making elements.
 function colour(n) {
   return `var(--s${n % 8})`;

@@ -1,4 +1,3 @@
-/* global themeButton */
 import { fill, make } from "./dom.js";
 import { isOver, refresh, session, watch } from "./state.js";
 import { jobLine } from "./parts.js";
@@ -70,5 +69,4 @@ watch(() => {
   if (held && document.activeElement === document.body) tabs.querySelector("[aria-selected=true]").focus({ preventScroll: true });  // its Stop went with the job
 });
 
-themeButton(document.getElementById("theme"));
 go(asked(), false);
