@@ -18,7 +18,7 @@ from numba import njit
 
 import orchestrator as oc
 from orchestrator.control.loops import ControlTask
-from orchestrator.control.measures import bound_time
+from orchestrator.control.measures import least_time
 from orchestrator.control.take_away import c_files
 from orchestrator.errors import OrchestratorError
 from orchestrator.records.model_file import read_model
@@ -158,7 +158,7 @@ def judge_machine(seed: int, number: int, moves: int, folder: Path) -> str:
     ours, plain = (float(np.median([run["error"] for run in both])) for both in runs)
     law = found.laws[-1]
     assert law.error is not None
-    true = bound_time(replace_gap(task, effects["alpha"]), task.impact_speed)
+    true = least_time(replace_gap(task, effects["alpha"]), task.impact_speed)
     asked, foreseen = task.impact_speed, float(np.median(law.times))
     unstable = sum(not run["stable"] for run in runs[0])
     parts = (

@@ -29,7 +29,7 @@ import orchestrator as oc
 from orchestrator.api.compensate import summarise_law
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.control.loops import FMUS, SHIFTED, ControlTask, make_loop
-from orchestrator.control.measures import bound_time, measure_loop
+from orchestrator.control.measures import least_time, measure_loop
 from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import ModelInterface, Signals, Transfer, Value, Variable
 from orchestrator.master.system import Connection, Instance, System
@@ -61,7 +61,7 @@ class PredictiveLaw:
             task.reference(),
             Tuning(task.impact_speed, 1.0, task.machine.torque_limit, TOUCH, h),
         )
-        bound = bound_time(task, task.impact_speed)
+        bound = least_time(task, task.impact_speed)
         self._steps = max(BLOCKS, round(HORIZON * bound / h))
         blocks = np.unique(np.ceil(self._steps * np.linspace(0.0, 1.0, BLOCKS + 1) ** 2).astype(int))
         held = np.zeros((self._steps, blocks.size - 1))

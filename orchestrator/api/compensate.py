@@ -18,10 +18,10 @@ from orchestrator.control.loops import COMPENSATOR, FMUS, LQR, SHIFTED, ControlT
 from orchestrator.control.machine import thesis_machine
 from orchestrator.control.measures import (
     LoopMeasures,
-    bound_path,
-    bound_time,
+    least_time,
     measure_loop,
     quickest_landing,
+    quickest_path,
 )
 from orchestrator.control.standstill import forecast_rest
 from orchestrator.control.take_away import file_names, write_loop
@@ -104,8 +104,8 @@ class CompensateResult(PlottedResult):
         ]
 
     def results(self, place: Path | None = None) -> CompensateFound:
-        times, path = bound_path(self.task, self.task.impact_speed)
-        bounds = {speed: bound_time(self.task, speed) for speed in _BOUND_SPEEDS.tolist()}
+        times, path = quickest_path(self.task, self.task.impact_speed)
+        bounds = {speed: least_time(self.task, speed) for speed in _BOUND_SPEEDS.tolist()}
         bounds = {speed: time for speed, time in bounds.items() if time > 0.0}
         return CompensateFound(
             alpha=self.task.machine.alpha,
@@ -239,7 +239,7 @@ def compensate(
         task = replace(task, state_weights=five("state_weights", state_weights, 0.0), torque_weight=1.0)
     elif said is not None:
         task = replace(task, state_weights=choose_weights(machine, sample_time), torque_weight=1.0)
-    bound = bound_time(task, task.impact_speed)
+    bound = least_time(task, task.impact_speed)
     if bound == 0.0:
         most = 0.99 * quickest_landing(task)  # so that the number that is told is possible
         text = f"`impact_speed` must be at most {most:.3g} rad/s, but is {task.impact_speed:g} rad/s"

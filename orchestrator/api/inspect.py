@@ -253,7 +253,7 @@ def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Mode
     if given and any(name in base.stated for name in said_of):
         lacking = [name for name in said_of if name not in base.stated]
         origin = {**rough.origin, **{n: OF_GIVEN for n in base.stated if n in said_of}}
-        return _completed(base, rough), origin, (f"{', '.join(lacking)} {ROUGHLY}",)
+        return _complete(base, rough), origin, (f"{', '.join(lacking)} {ROUGHLY}",)
     if not record.has_torque:
         return as_model(rough, base), rough.origin, ()
     if sure and is_of(record, base):
@@ -261,7 +261,7 @@ def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Mode
     return as_model(rough, base), rough.origin, (f"inertias, stiffness, friction and lag {ROUGHLY}",)
 
 
-def _completed(base: Model, rough: RoughMachine) -> Model:
+def _complete(base: Model, rough: RoughMachine) -> Model:
     """Return a model with rough values for what its file does not state."""
     whole = as_model(rough, base)
     return replace(whole, parameters={**whole.parameters, **{name: base.parameters[name] for name in base.stated}})

@@ -132,9 +132,9 @@ class Machine:
         normal = scale * (vectors @ (np.sqrt(np.maximum(size, 0.0)) * rng.standard_normal(size.size)))
         shifts = dict(zip(self.unknowns, normal.tolist(), strict=True))
         uniform = {name: half * float(rng.uniform(-1.0, 1.0)) for name, half in self.half_widths.items()}
-        return {name: self._moved(name, shift) for name, shift in (uniform | shifts).items()}
+        return {name: self._shift(name, shift) for name, shift in (uniform | shifts).items()}
 
-    def _moved(self, name: str, shift: float) -> float:
+    def _shift(self, name: str, shift: float) -> float:
         p = self.parameters[name]
         centre = self.alpha if name == "alpha" else p.value
         if centre > 0.0 and p.minimum >= 0.0:

@@ -73,7 +73,7 @@ def measure_loop(run: Recording, task: ControlTask) -> LoopMeasures:
     )
 
 
-def bound_time(task: ControlTask, impact_speed: float) -> float:
+def least_time(task: ControlTask, impact_speed: float) -> float:
     """Return the least time [s] of a traversal from rest that lands at ``impact_speed`` [rad/s] without torque.
 
     See :mod:`pyfmu_sources.controllers.gap_traversal`: it is reached by the whole torque in three parts. It is 0 where
@@ -88,12 +88,12 @@ def quickest_landing(task: ControlTask) -> float:
     possible = 0.0
     width = 0.5 * task.impact_speed
     while width > 1e-3 * possible:
-        possible += width if bound_time(task, possible + width) > 0.0 else 0.0
+        possible += width if least_time(task, possible + width) > 0.0 else 0.0
         width *= 0.5
     return possible
 
 
-def bound_path(task: ControlTask, impact_speed: float) -> tuple[Array, Array]:
+def quickest_path(task: ControlTask, impact_speed: float) -> tuple[Array, Array]:
     """Return times [s] and twist from the flank that is left [rad] of the traversal in the least time."""
     t = _best(task, impact_speed)
     times = np.linspace(0.0, t.first + t.second + t.third, 101)

@@ -8,7 +8,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.control.loops import ControlTask
 from orchestrator.control.machine import thesis_machine
-from orchestrator.control.measures import bound_path, bound_time, measure_loop, quickest_landing
+from orchestrator.control.measures import least_time, measure_loop, quickest_landing, quickest_path
 from orchestrator.master.result import Recording
 from orchestrator.records.model_file import read_model
 from tests.support.c_fmu import have_compiler
@@ -60,14 +60,14 @@ def test_measures_are_those_of_a_run_made_by_hand():
 
 
 def test_a_path_goes_from_one_flank_to_the_other():
-    for times, path in (measure_loop(made_run(), TASK).path, bound_path(TASK, 0.1)):
+    for times, path in (measure_loop(made_run(), TASK).path, quickest_path(TASK, 0.1)):
         assert times[0] == 0.0
         assert np.all(np.diff(path) >= 0.0)
         assert path[[0, -1]] == pytest.approx([0.0, 2.0 * TASK.machine.alpha])
 
 
 def test_a_harder_landing_has_a_shorter_bound():
-    assert bound_time(TASK, 0.3) < bound_time(TASK, 0.1) == pytest.approx(0.0360, abs=1e-4)
+    assert least_time(TASK, 0.3) < least_time(TASK, 0.1) == pytest.approx(0.0360, abs=1e-4)
 
 
 def test_an_impact_speed_that_no_traversal_reaches_is_refused_with_one_that_can_be_had(capsys):
@@ -78,7 +78,7 @@ def test_an_impact_speed_that_no_traversal_reaches_is_refused_with_one_that_can_
     assert "but is 0.3 rad/s" in error
     told = float(error.split("at most ")[1].split()[0])
     task = made_task(alpha=0.002, tau=0.2, impact_speed=0.3)
-    assert bound_time(task, told) > 0.0 == bound_time(task, 1.02 * told)
+    assert least_time(task, told) > 0.0 == least_time(task, 1.02 * told)
     assert quickest_landing(task) == pytest.approx(told / 0.99, rel=5e-3)
 
 

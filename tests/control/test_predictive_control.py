@@ -7,7 +7,7 @@ import pytest
 import orchestrator as oc
 from orchestrator.control.loops import ControlTask
 from orchestrator.control.machine import thesis_machine
-from orchestrator.control.measures import bound_time
+from orchestrator.control.measures import least_time
 from orchestrator.plants.design import DrivetrainValues, six_state_model
 from orchestrator.records.model_file import read_model
 from tests.support.c_fmu import have_compiler
@@ -62,7 +62,7 @@ def test_it_crosses_quickly_and_lands_softly(law, flank):
     A, B = sampled.A, sampled.B
     x = at_rest(task, -flank * ALPHA, angle=-0.25 * flank)
     samples = 0
-    bound = bound_time(task, task.impact_speed)
+    bound = least_time(task, task.impact_speed)
     while flank * (x[0] / task.nominal.i - x[2]) < ALPHA - TOUCH:
         request = law.request(0, x, flank, ALPHA)
         assert abs(request) <= 1.0001 * task.machine.torque_limit
