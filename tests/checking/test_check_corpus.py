@@ -1,6 +1,7 @@
 """Every broken FMU is named by its rule and by no other; the FMU they are made from has no finding."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from tests.support.broken_ball3_xml import static
 from tests.support.broken_fmus import ALONE, QUICK, Broken, corpus, good, is_of_the_day
 from tests.support.broken_plants import broken_plants
 from tests.support.c_fmu import REFERENCE, build_c_fmu, fmu_files, have_compiler, write_fmu
-from tests.support.outlined_findings import outline_of, outlines
+from tests.support.outlined_findings import outline_of, outlines, probes_for
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
@@ -45,9 +46,19 @@ def is_by_day(broken: Broken) -> bool:
     ids=lambda b: b.name,
 )
 def test_names_the_rule(broken: Broken, tmp_path: Path) -> None:
-    path = tmp_path / "broken.fmu"
+    _check_findings(broken, tmp_path, probes_for(OUTLINES[broken.name]))
+
+
+@pytest.mark.night
+@pytest.mark.parametrize("broken", [b for b in CORPUS if b.name.startswith("behaviour")], ids=lambda b: b.name)
+def test_all_probes_find_no_more(broken: Broken, tmp_path: Path) -> None:
+    _check_findings(broken, tmp_path)
+
+
+def _check_findings(broken: Broken, folder: Path, probes: tuple[str, ...] = ()) -> None:
+    path = folder / "broken.fmu"
     broken.make(path)
-    report = check_fmu(path, broken.options)
+    report = check_fmu(path, replace(broken.options, probes=probes))
     named = {f.rule for f in report.findings if f.severity != "info" or f.rule == broken.rule}
     assert named == {broken.rule} | MORE.get(broken.name, set()), "\n".join(
         f"{f.rule} {f.path}: {f.message}" for f in report.findings

@@ -33,7 +33,7 @@ from tests.support.broken_fmus import is_of_the_day
 from tests.support.c_fmu import have_compiler, write_fmu
 from tests.support.c_fmu import model_description as model_description_2
 from tests.support.fuzz_fmu import damaged_tree
-from tests.support.outlined_findings import outline_of, outlines
+from tests.support.outlined_findings import outline_of, outlines, probes_for
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
@@ -107,7 +107,8 @@ def test_discrete_inputs_stay_in_continuous_time_mode(tmp_path: Path) -> None:
 def test_what_more_a_description_promises_is_probed(
     interface: str, edits: Edits, fault: str, stage: str, tmp_path: Path
 ) -> None:
-    report = check_fmu(write_fmu(tmp_path / "more.fmu", extended(fault, interface, edits)), QUICK)
+    options = replace(QUICK, probes=("life cycle", "inputs", stage))
+    report = check_fmu(write_fmu(tmp_path / "more.fmu", extended(fault, interface, edits)), options)
     assert report.findings == ()
     assert report.executions[0].stages[stage] == ""
 
@@ -131,10 +132,10 @@ def test_a_solver_goes_on_in_shorter_steps_where_derivatives_are_discarded(tmp_p
     assert report.executed
 
 
-def _check_findings(mutant: Mutant, folder: Path) -> None:
+def _check_findings(mutant: Mutant, folder: Path, probes: tuple[str, ...] = ()) -> None:
     path = folder / "broken.fmu"
     mutant.make(path)
-    report = check_fmu(path, mutant.options)
+    report = check_fmu(path, replace(mutant.options, probes=probes))
     named = [f.rule for f in report.findings]
     assert mutant.rule in named
     assert outline_of(report) == OUTLINES[mutant.name]
@@ -161,6 +162,12 @@ def marks_of(mutant: Mutant) -> Any:
 
 @pytest.mark.parametrize("mutant", [pytest.param(m, marks=marks_of(m)) for m in BEHAVIOURAL], ids=lambda m: m.name)
 def test_behaviour_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:
+    _check_findings(mutant, tmp_path, probes_for(OUTLINES[mutant.name]))
+
+
+@pytest.mark.night
+@pytest.mark.parametrize("mutant", BEHAVIOURAL, ids=lambda m: m.name)
+def test_all_probes_find_no_more(mutant: Mutant, tmp_path: Path) -> None:
     _check_findings(mutant, tmp_path)
 
 

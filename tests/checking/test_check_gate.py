@@ -48,10 +48,13 @@ FORMAL = {
 }
 
 
+@pytest.mark.parametrize("probes", [("life cycle",), pytest.param((), marks=pytest.mark.night)], ids=["a run", "all"])
 @pytest.mark.parametrize("name", FORMAL)
-def test_a_formal_fault_is_found_and_the_fmu_runs_all_the_same(name: str, tmp_path: Path) -> None:
+def test_a_formal_fault_is_found_and_the_fmu_runs_all_the_same(
+    name: str, probes: tuple[str, ...], tmp_path: Path
+) -> None:
     rule, change = FORMAL[name]
-    report = check_fmu(write_fmu(tmp_path / "formal.fmu", change(fmu_files())), QUICK)
+    report = check_fmu(write_fmu(tmp_path / "formal.fmu", change(fmu_files())), replace(QUICK, probes=probes))
     assert {f.rule for f in report.findings} == {rule}
     assert report.executed
     assert set(report.executions[0].stages.values()) == {""}

@@ -2,6 +2,7 @@
 
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.shared.isolation.limits import Limits
 from tests.support.broken_plants import BrokenPlant, broken_plants
 from tests.support.c_fmu import have_compiler
+from tests.support.outlined_findings import probes_of
 from tests.support.plant import build_plant
 
 pytestmark = pytest.mark.skipif(
@@ -27,22 +29,25 @@ MORE = (
     "category_refused",
     "last_before", "ends_early",
 )  # fmt: skip
+# What shows these is no run of the rule's own probe.
+OF_ALL_PROBES = ("output_cached", "quiet_count", "last_before")
 CHOSEN = {(plant.cause, plant.version): plant for plant in reversed(PLANTS)}
 CHOSEN |= {
     (fault, ""): plant for n, fault in enumerate(MORE)
     for plant in sorted(PLANTS, key=lambda p: p.version == ("2.0", "3.0")[n % 2]) if plant.fault == fault
 }  # fmt: skip
 SOUND = [
-    ("2.0", "CS ME", {}),
+    pytest.param("2.0", "CS ME", {}, marks=pytest.mark.night),  # by day in test_check_unusual.py
     ("3.0", "CS ME", {"clock": "fraction"}),
     ("2.0", "CS", {"flags": 'providesDirectionalDerivative="true"', "step flags": 'canInterpolateInputs="true"'}),
-    (
+    pytest.param(
         "3.0",
         "ME",
         {
             "flags": 'providesDirectionalDerivatives="true" providesAdjointDerivatives="true" '
             'providesPerElementDependencies="true" providesEvaluateDiscreteStates="true"'
         },
+        marks=pytest.mark.night,
     ),
 ]
 
@@ -67,7 +72,8 @@ def is_of_the_night(key: tuple[str, str]) -> bool:
     ids=lambda p: p.name,
 )
 def test_a_fault_is_named_by_its_rule(plant: BrokenPlant, tmp_path: Path) -> None:
-    report = check_fmu(plant.build(tmp_path / "plant.fmu"), OPTIONS)
+    probes = () if plant.fault in OF_ALL_PROBES else probes_of(plant.rule)
+    report = check_fmu(plant.build(tmp_path / "plant.fmu"), replace(OPTIONS, probes=probes))
     assert plant.rule in {f.rule for f in report.findings}
 
 

@@ -7,6 +7,7 @@ import re
 import tempfile
 from pathlib import Path
 
+from orchestrator.checking.catalogue import RULES
 from orchestrator.checking.check import check_fmu
 from orchestrator.checking.findings import FmuFindings
 from tests.support.broken_ball3 import behavioural
@@ -29,6 +30,23 @@ def outlines(version: str) -> dict[str, list[str]]:
     """The outline of each broken FMU, by its name."""
     entries = re.findall(r"^(\S.*)\n((?: {4}.*\n)*)", (FOLDER / f"fmi{version}.txt").read_text("utf-8"), re.MULTILINE)
     return {name: [line.strip() for line in lines.splitlines()] for name, lines in entries}
+
+
+def probes_for(lines: list[str]) -> tuple[str, ...]:
+    """The probes that make the findings of an outline, and those whose runs they compare with."""
+    parts = [line.split(" | ", 2) for line in lines]
+    places = [re.fullmatch(r"\((?:\w+, )?([a-z ]+)\)", path) for _, path, _ in parts]
+    return _with_runs({RULES[rule].stage for rule, _, _ in parts} | {place[1] for place in places if place})
+
+
+def probes_of(rule: str) -> tuple[str, ...]:
+    """The probe that finds what a rule says, and those whose runs it compares with."""
+    return _with_runs({RULES[rule].stage})
+
+
+def _with_runs(probes: set[str]) -> tuple[str, ...]:
+    needed = sorted(probes - {"load", "life cycle"})
+    return ("life cycle", "inputs", *needed) if needed else ("life cycle",)
 
 
 def main() -> None:
