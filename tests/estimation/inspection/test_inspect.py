@@ -23,7 +23,7 @@ from tests.support.independent_plant import make_record, write_csv
 
 @pytest.fixture(scope="module")
 def columns() -> dict[str, np.ndarray]:
-    return make_record({"alpha": 0.01}, seed=3, duration=6.0)[0]
+    return make_record({"alpha": 0.01}, seed=3, duration=4.0)[0]
 
 
 def test_channels_say_what_they_are_rounded_to_and_where_they_end(columns) -> None:
@@ -123,7 +123,7 @@ def _held_record(seed: int, swing: float, alpha: float = 0.01):  # type: ignore[
     return record_from_columns(columns, "held")
 
 
-@pytest.mark.parametrize("seed", [41, 42])
+@pytest.mark.parametrize("seed", [41, pytest.param(42, marks=pytest.mark.night)])
 def test_inspect_and_estimate_agree_where_one_flank_is_loaded_throughout(seed: int) -> None:
     record = _held_record(seed, 8.0)
     seen = oc.inspect(record, oc.read_model())
@@ -147,7 +147,7 @@ def test_the_advice_of_a_held_record_shows_the_gap(columns) -> None:
 
 def test_the_sentence_says_what_the_table_says(columns) -> None:
     """A weak torque moves the teeth through small gaps only: a size that is not seen is in no range of the sentence."""
-    for scale in (1.0, 0.05, 0.01):
+    for scale in (0.05, 0.01):
         weak = dict(columns) | {"u": scale * columns["u"]}
         seen = oc.inspect(record_from_columns(weak, "weak"), oc.read_model())
         sizes = {size: bound < 0.25 * size for size, bound in seen.sufficiency.bounds}
