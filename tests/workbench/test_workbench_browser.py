@@ -194,7 +194,7 @@ def test_channels_that_look_alike_become_a_button_each(page: Any, served: Served
 
 def test_a_file_dropped_in_another_tab_is_told_where_it_goes(page: Any, served: Served, tmp_path: Path) -> None:
     open_workbench(page, served)
-    for tab, name in (("log", "axis.toml"), ("log", "axis.fmu"), ("machine", "axis.trc"), ("fmus", "axis2.toml")):
+    for tab, name in (("log", "axis.toml"), ("log", "axis.fmu"), ("machine", "axis.trc"), ("fmus", "axis2.html")):
         (tmp_path / name).write_text("1")
         choose_tab(page, tab)
         find(page, f"#panel-{tab} input[type=file]").send_keys(str(tmp_path / name))
