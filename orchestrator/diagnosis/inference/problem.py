@@ -59,10 +59,10 @@ class FitProblem:
                 place += 1
         return found
 
-    @property
+    @cached_property
     def effects(self) -> dict[str, CandidateEffect]:
-        """Return the effects by label."""
-        return dict(self.models[0].effects)
+        """Return the effects by label that a record shows at least, as the first one that does has them."""
+        return {label: one for model in reversed(self.models) for label, one in model.effects.items()}
 
     @property
     def start(self) -> ModelPoint:
@@ -150,8 +150,8 @@ class FitProblem:
 
     def coordinates(self, point: ModelPoint) -> list[Coordinate]:
         """Return what a fit moves: every parameter, and the values of effects that are not scanned."""
-        effects = self.models[0].effects
-        return [*range(len(self.parameters)), *((label, n) for label in point.effects for n in effects[label].fitted)]
+        fitted = ((label, n) for label in point.effects for n in self.effects[label].fitted)
+        return [*range(len(self.parameters)), *fitted]
 
     def move_point(self, point: ModelPoint, coordinates: Sequence[Coordinate], steps: Array) -> ModelPoint:
         """Return a point moved by steps (coordinates,): shares of parameters, scales of values; bounds are kept."""
@@ -166,7 +166,7 @@ class FitProblem:
                 parameters[coordinate] = entry.limit(moved)
             else:
                 label, place = coordinate
-                effect = self.models[0].effects[label]
+                effect = self.effects[label]
                 value = effects[label][place] + float(step) * effect.scales[place]
                 effects[label][place] = effect.clip_value(place, value)
         return ModelPoint(tuple(parameters), {label: tuple(values) for label, values in effects.items()})
@@ -216,7 +216,7 @@ class FitProblem:
                 values[n], slopes[n] = prior_of(self.parameters[coordinate], point.parameters[coordinate])
             else:
                 label, place = coordinate
-                effect = self.models[0].effects[label]
+                effect = self.effects[label]
                 if place in effect.prior:
                     mean, deviation = effect.prior[place]
                     values[n] = (point.effects[label][place] - mean) / deviation

@@ -19,15 +19,14 @@ SINE, COSINE = "sine", "cosine"
 
 
 def candidate_effects(model: Model, scales: SignalScales, channels: Sequence[str]) -> dict[str, CandidateEffect]:
-    """Return the effects that a model may lack, by label."""
+    """Return the effects that a model may lack, by label, also those that this record cannot show: another one may."""
     plant, own = model.plant, effects_of(model)
-    found = {}
-    for row in plant.bank:
-        if row.label in own or (row.angular and not scales.angular) or (row.both_encoders and len(channels) < 2):
-            continue
-        if row.shown(scales):
-            found[row.label] = _candidate(plant, row, scales, channels)
-    return found
+    return {
+        row.label: _candidate(plant, row, scales, channels)
+        for row in plant.bank
+        if row.label not in own and (scales.angular or not row.angular)
+        and not (row.both_encoders and len(channels) < 2)
+    }  # fmt: skip
 
 
 def effects_of(model: Model) -> tuple[str, ...]:

@@ -88,12 +88,12 @@ class TorqueBalance(ResidualModel):
         self._places = [plant.index(entry.name) for entry in self.parameters if not entry.local]
         self.active = np.array([self._active(speed) for speed in self._speeds])
         self._hidden = self._simulate_hidden_load(self.nominal)[0] if self.hides_load else np.empty((0, 2))
-        effects = candidate_effects(model, self.scales, self.channels)
-        shifted = {
-            row.label for row in plant.bank if plant.offsets and set(row.parameters.values()) <= set(plant.offsets)
-        }
+        self._known = candidate_effects(model, self.scales, self.channels)
+        hidden = {row.label for row in plant.bank if not row.shown(self.scales)}
+        if signals.zeros_set and plant.offsets:
+            hidden |= {row.label for row in plant.bank if set(row.parameters.values()) <= set(plant.offsets)}
         self.effects: Mapping[str, CandidateEffect] = {
-            label: one for label, one in effects.items() if not (signals.zeros_set and label in shifted)
+            label: one for label, one in self._known.items() if label not in hidden
         }
 
     def _uncertain(self, model: Model) -> tuple[UncertainParameter, ...]:
@@ -151,7 +151,7 @@ class TorqueBalance(ResidualModel):
             p[self.plant.index(self.plant.offsets[-1])] += self._local(ZERO, point)
         given: dict[str, float] = {}
         for label, values in point.effects.items():  # the first effect that has a parameter sets it
-            given = {**effect_parameters(self.plant, self.effects[label], values), **given}
+            given = {**effect_parameters(self.plant, self._known[label], values), **given}
         for name, value in given.items():
             p[self.plant.index(name)] = value
         return p
@@ -184,7 +184,7 @@ class TorqueBalance(ResidualModel):
         p = self.values_at(point)
         scale = np.array([self.nominal[place] / p[place] for place in self.inertias])
         scale[0] = np.sqrt(scale[0])
-        if any(self.effects[label].takes_drive for label in point.effects):
+        if any(self._known[label].takes_drive for label in point.effects):
             scale *= rms(self.drive_torque(self.nominal)) / rms(self.drive_torque(p))
         return scale
 
@@ -332,7 +332,7 @@ class TorqueBalance(ResidualModel):
     def is_possible(self, label: str, point: ModelPoint) -> bool:
         """Tell whether a machine can have an effect as a point has it; see :class:`ResidualModel`."""
         row = self.plant.effect(label)
-        named = effect_parameters(self.plant, self.effects[label], point.effects[label])
+        named = effect_parameters(self.plant, self._known[label], point.effects[label])
         short = {name: named[full] for name, full in row.parameters.items()}
         viscous = next((body.viscous for body in self.plant.bodies if body.name == row.site), "")
         short["viscous"] = self.plant.value(self.values_at(point), viscous) if viscous else 0.0

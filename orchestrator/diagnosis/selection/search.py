@@ -5,7 +5,7 @@ A further round begins beside it and under its whitening, until it stays. What d
 family.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 
@@ -163,18 +163,20 @@ class _Round:
     def fit_best(self) -> dict[Subset, FittedModel]:
         """Return the most promising subsets that are allowed, fitted in full, the reference among them.
 
-        An effect that is impossible in its first fits is not tried again: every subset of it would be.
+        An effect that is impossible in its first fits is not tried again: every subset of it would be. A subset that
+        has effects which no machine has so, or which the record does not show, is followed by what is left of it.
         """
         alone = [subset for subset in self.ranked if len(subset) == 1 and not self.has]
         known = sorted(self.earlier, key=lambda subset: -self.score.score_fit(self.earlier[subset]))
         beside = [one for label in self.has for one in (self.has - {label}, *self.rivals(label))]
         first = [*beside, *known[:KNOWN], *alone[:ALONE]]
         found, possible, impossible = {self.has: self.reference}, set(self.has), Counter[str]()
-        for subset in dict.fromkeys([*first, *self.ranked]):
-            if len(self.fits) > FITS or self.out_of_time():
-                break
-            if any(impossible[label] >= TRIALS and label not in possible for label in subset):
+        waiting, seen = deque(dict.fromkeys([*first, *self.ranked])), set[Subset]()
+        while waiting and len(self.fits) <= FITS and not self.out_of_time():
+            subset = waiting.popleft()
+            if subset in seen or any(impossible[label] >= TRIALS and label not in possible for label in subset):
                 continue
+            seen.add(subset)
             fitted = self.fit(subset)
             if fitted is None:
                 continue
@@ -183,6 +185,8 @@ class _Round:
             possible |= subset - bad
             if not bad and self.is_shown(fitted):
                 found[subset] = fitted
+            elif rest := subset - bad - self.hidden(fitted):
+                waiting.appendleft(rest)
         return found
 
     def rivals(self, label: str) -> list[Subset]:
@@ -209,9 +213,11 @@ class _Round:
 
     def is_shown(self, fitted: FittedModel) -> bool:
         """Tell whether the records show how large each effect is, and no parameter leaves the model file with them."""
-        return farthest_parameter(self.problem, fitted) < self.farthest and all(
-            size_over_error(self.problem, fitted, label) >= SHOWN for label in fitted.labels
-        )
+        return farthest_parameter(self.problem, fitted) < self.farthest and not self.hidden(fitted)
+
+    def hidden(self, fitted: FittedModel) -> set[str]:
+        """Return the effects of a model whose sizes the records do not tell from none."""
+        return {label for label in fitted.labels if size_over_error(self.problem, fitted, label) < SHOWN}
 
     def tried(self, others: Subset) -> tuple[TriedEffect, ...]:
         """Return the effects that were fitted on top of some others, by gain."""
