@@ -253,7 +253,7 @@ def test_the_ssp_file_is_a_step_of_the_loop_for_both_versions_of_fmi(taken, tmp_
 
 def test_plain_c_has_the_bits_of_the_native_fmus_and_no_heap(taken, tmp_path):
     task = make_task(machine_of(read_model(write_model(tmp_path))), 1e-3)
-    task = replace(task, state_weights=choose_weights(task.machine, 1e-3).weights, torque_weight=1.0)
+    task = replace(task, state_weights=choose_weights(task.machine, 1e-3), torque_weight=1.0)
     files = c_files("press", task)
     for name, text in files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")

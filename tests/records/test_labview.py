@@ -91,7 +91,7 @@ def test_a_time_for_each_channel(tmp_path: Path, columns: dict[str, np.ndarray])
         + _rows([time, columns["u"], time, columns["theta_m"], clock, load])
     )
     with pytest.raises(
-        RecordError, match=r"column `theta_l` has time stamps of its own: .* `resample` linear or cubic"
+        RecordError, match=r"column `theta_l` has its own time stamps: .* `resample` linear or cubic"
     ):
         read_record(path)
     record = read_record(path, None, (), Reading(resample="cubic"))
