@@ -72,7 +72,13 @@ class _Host:
         self.send(number, values)  # variables of clocks keep their values between ticks
         return self._transfers[number][1]
 
-    def advance(self, method: str, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
+    def do_step(self, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
+        return self._advance("do_step", time, step)
+
+    def step(self, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
+        return self._advance("step", time, step)
+
+    def _advance(self, method: str, time: float, step: float) -> tuple[StepOutcome | None, Undone | None]:
         try:
             return getattr(self._slave, method)(time, step), None
         except StepDiscardedError as error:
@@ -153,7 +159,7 @@ class RemoteSlave(Slave):
 
     def _advance(self, method: str, time: float, step: float) -> StepOutcome | None:
         """Do a step; return its outcome, where it has one."""
-        outcome, undone = self._ask(tuple[StepOutcome | None, Undone | None], "advance", method, time, step)
+        outcome, undone = self._ask(tuple[StepOutcome | None, Undone | None], method, time, step)
         if undone is None:
             return outcome
         if undone.how:
