@@ -136,7 +136,7 @@ class AnySweepResult(PlottedResult):
         """Read the finished cases from the journal."""
         return self.sweep.rows()
 
-    def _first_rows(self) -> Iterator[Row]:
+    def _shown_rows(self) -> Iterator[Row]:
         """Read as many of them as are shown."""
         return islice(self.rows(), MOST_ROWS_SHOWN)
 

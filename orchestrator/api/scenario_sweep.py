@@ -34,7 +34,7 @@ class ScenarioSweepResult(AnySweepResult):
     isolation: WallsFound | None = None
 
     def blocks(self) -> Sequence[Block]:
-        rows = [_last_values(row, len(self.scenario.record)) for row in self._first_rows()]
+        rows = [_last_values(row, len(self.scenario.record)) for row in self._shown_rows()]
         name = self.scenario.name
         title = f"{name}: {len(self.cases)} cases, {self.failed} failed; last values, more in sweep.csv"
         shown: list[Block] = [table(title, [*self.cases.names, *self.scenario.record], rows)]

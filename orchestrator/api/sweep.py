@@ -70,7 +70,7 @@ class SweepResult(AnySweepResult):
         return trust_of_sweep(self.statistics.values(), level, self.failed)
 
     def blocks(self) -> Sequence[Block]:
-        shown = [_cells(row, self.cases.names) for row in self._first_rows()]
+        shown = [_cells(row, self.cases.names) for row in self._shown_rows()]
         title = f"Sweep of {len(self.cases)} cases"
         if len(self.cases) > len(shown):
             title += f", the first {len(shown)}; all of them are in sweep.csv"

@@ -45,7 +45,12 @@ TRAIN = (
     {"effects.coulomb_friction.load.torque": 1e-12},
 )
 TOO_FAST = "the fastest rate of the train must be at most 1e7 1/s"
-REASONS = ("must be one that can be resolved", "must stay finite", "must stay within 1e13 rad")
+REASONS = (
+    "must be one that can be resolved",
+    "must stay finite",
+    "must stay within 1e13 rad",
+    "must be off where `backlash_model` is",
+)
 
 
 def stepped(slave, values, inputs, model=None):

@@ -90,9 +90,7 @@ def test_a_time_for_each_channel(tmp_path: Path, columns: dict[str, np.ndarray])
         _head("Multi", ["0.005", "0.005", "0.01"], names)
         + _rows([time, columns["u"], time, columns["theta_m"], clock, load])
     )
-    with pytest.raises(
-        RecordError, match=r"column `theta_l` has its own time stamps: .* `resample` linear or cubic"
-    ):
+    with pytest.raises(RecordError, match=r"column `theta_l` has its own time stamps: .* `resample` linear or cubic"):
         read_record(path)
     record = read_record(path, None, (), Reading(resample="cubic"))
     np.testing.assert_allclose(record.theta_m, columns["theta_m"], atol=1e-8)
