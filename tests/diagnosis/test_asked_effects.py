@@ -54,7 +54,7 @@ def test_what_gains_nothing_is_taken_and_stays_where_it_is_asked_for() -> None:
 def test_those_that_were_found_give_the_same_numbers(record, searched) -> None:
     again = diagnose(record, MODEL, effects=[one.label for one in searched.effects])
     assert [one.label for one in again.effects] == [PLAY, FRICTION]
-    np.testing.assert_allclose(again.workings.final, searched.workings.final, rtol=5e-3)
+    np.testing.assert_allclose(again.workings.final, searched.workings.final, rtol=1e-2)  # whitened in other turns
     assert [one.grade for one in again.effects] == [one.grade for one in searched.effects]
 
 

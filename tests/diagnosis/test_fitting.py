@@ -94,6 +94,7 @@ def test_a_value_at_its_upper_end_is_as_sure_as_the_way_back_says(fitted, monkey
     problem, model = fitted
     ended = replace(problem.effects[LABEL], lower=(0.0,), upper=(0.4,))
     monkeypatch.setattr(problem.models[0], "effects", {LABEL: ended})
+    problem = replace(problem)  # which remembers its effects
     stopped = fit_model(problem, model.point.with_effect(LABEL, (0.4,)), 0)
     assert np.ptp(stopped.jacobian[:, 1]) == 0.0
     assert stopped.covariance[1, 1] == pytest.approx(model.covariance[1, 1], rel=0.1)

@@ -34,9 +34,9 @@ def outlines(version: str) -> dict[str, list[str]]:
 
 def probes_for(lines: list[str]) -> tuple[str, ...]:
     """The probes that make the findings of an outline, and those whose runs they compare with."""
-    parts = [line.split(" | ", 2) for line in lines]
-    places = [re.fullmatch(r"\((?:\w+, )?([a-z ]+)\)", path) for _, path, _ in parts]
-    return _with_runs({RULES[rule].stage for rule, _, _ in parts} | {place[1] for place in places if place})
+    parts = [line.split(" | ")[:2] for line in lines]  # without a place the message comes second
+    places = [re.fullmatch(r"\((?:\w+, )?([a-z ]+)\)", path) for _, path in parts]
+    return _with_runs({RULES[rule].stage for rule, _ in parts} | {place[1] for place in places if place})
 
 
 def probes_of(rule: str) -> tuple[str, ...]:
