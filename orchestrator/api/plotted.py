@@ -24,13 +24,9 @@ PLOT_HEIGHT, HEAD_HEIGHT, MOST_HEIGHT = 500, 130, 1150
 
 @dataclass(frozen=True)
 class Figures:
-    """The plots of a result: a notebook shows them, to be zoomed and read as on its page.
+    """The plots of a result: a notebook shows them, to be zoomed and read as on its page."""
 
-    Attributes:
-        report: a page of the plots alone.
-    """
-
-    report: Report
+    report: Report  # a page of the plots alone
 
     @property
     def titles(self) -> tuple[str, ...]:
@@ -57,10 +53,7 @@ class PlottedResult(Result):
     """Base of results whose page has plots."""
 
     def plot(self, path: Path | str | None = None) -> Figures:
-        """Return the plots, and draw them where a path is given.
-
-        Args:
-            path: a PNG, SVG or PDF file; None: no file.
+        """Return the plots, and draw them where a path is given. ``path``: a PNG, SVG or PDF file; None: no file.
 
         Returns:
             The plots of the page, which a notebook shows.

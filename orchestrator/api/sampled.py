@@ -44,10 +44,7 @@ class SampledResult(PlottedResult):
         return {}
 
     def write_csv(self, path: Path | str) -> None:
-        """Write the samples as CSV.
-
-        Args:
-            path: of the CSV file to write.
+        """Write the samples as CSV. ``path``: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.

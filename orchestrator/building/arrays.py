@@ -14,16 +14,11 @@ _ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
 
 @dataclass(frozen=True)
 class Array:
-    """One variable of FMI 3.0: the variables of a table from ``first`` on, in row-major order.
-
-    Attributes:
-        first: place in the table, which is the value reference.
-        dimensions: sizes; none for a scalar.
-    """
+    """One variable of FMI 3.0: the variables of a table from ``first`` on, in row-major order."""
 
     name: str
-    first: int
-    dimensions: tuple[int, ...]
+    first: int  # place in the table, which is the value reference
+    dimensions: tuple[int, ...]  # sizes; none for a scalar
     variables: tuple[FmuVariable, ...]
 
 

@@ -54,9 +54,7 @@ def documentation(
 ) -> dict[str, bytes]:
     """Return members of the archive: a page, the licence and the icon.
 
-    Args:
-        description: its model description in FMI 2.0.
-        fmi: version of FMI that the FMU has, 2 or 3.
+    ``description``: its model description in FMI 2.0; ``fmi``: version of FMI that the FMU has, 2 or 3.
     """
     fragments = [f"{recipe.class_name}.html"]
     if any(v.attrib["name"] == "sample_time" for v in description.iter("ScalarVariable")):

@@ -130,10 +130,8 @@ def check_dynamic(
     """Run each interface of the FMU in a child process and report what it did.
 
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
-
-    Args:
-        chosen: names of the probes to carry out (default: all).
-        tell: called with each probe, and the share of them that are done.
+    ``chosen``: names of the probes to carry out (default: all); ``tell``: called with each probe, and the share of them
+    that are done.
 
     Returns:
         What it did wrong, and which probes were carried out.

@@ -50,29 +50,20 @@ Outcome = Literal["passed", "failed", "not run"]
 
 @dataclass(frozen=True)
 class RuleOutcome:
-    """What became of one rule on one FMU.
-
-    Attributes:
-        outcome: "failed" with a finding of the rule, "passed" when its stage was carried out without one.
-        reason: why it was not run; empty otherwise.
-    """
+    """What became of one rule on one FMU."""
 
     rule: str
-    outcome: Outcome
-    reason: str = ""
+    outcome: Outcome  # "failed" with a finding of the rule, "passed" when its stage was carried out without one
+    reason: str = ""  # why it was not run; empty otherwise
 
 
 @dataclass(frozen=True)
 class Execution:
-    """How far one interface of an FMU was executed.
+    """How far one interface of an FMU was executed."""
 
-    Attributes:
-        interface: "CoSimulation", "ModelExchange" or "ScheduledExecution".
-        stages: what was done with the running FMU, "load" and then every probe by name: empty when it was carried
-            out, otherwise why it was not.
-    """
-
-    interface: str
+    interface: str  # "CoSimulation", "ModelExchange" or "ScheduledExecution"
+    # what was done with the running FMU, "load" and then every probe by name: empty when it was carried out, otherwise
+    # why it was not
     stages: Mapping[str, str]
 
     @property
@@ -82,24 +73,16 @@ class Execution:
 
 @dataclass(frozen=True)
 class FmuFindings:
-    """All that was found about one FMU.
+    """All that was found about one FMU."""
 
-    Attributes:
-        fmu: path as the user gave it.
-        findings: sorted by severity, then in the order found.
-        version: "2.0" or "3.0"; empty where the check got not so far, or the version is another one.
-        stages: the stages that execute nothing, by name: empty when carried out, otherwise why not.
-        executions: one for each interface that was run, or tried.
-        not_executed: why nothing was executed; empty when something was.
-        facts: what is known about the FMU (name, version, platforms, …), for the reader.
-    """
-
-    fmu: str
-    findings: tuple[Finding, ...]
-    version: str = ""
+    fmu: str  # path as the user gave it
+    findings: tuple[Finding, ...]  # sorted by severity, then in the order found
+    version: str = ""  # "2.0" or "3.0"; empty where the check got not so far, or the version is another one
+    # the stages that execute nothing, by name: empty when carried out, otherwise why not
     stages: Mapping[str, str] = field(default_factory=dict)
-    executions: tuple[Execution, ...] = ()
-    not_executed: str = ""
+    executions: tuple[Execution, ...] = ()  # one for each interface that was run, or tried
+    not_executed: str = ""  # why nothing was executed; empty when something was
+    # what is known about the FMU (name, version, platforms, …), for the reader
     facts: Facts = field(default_factory=dict)
 
     @property

@@ -39,16 +39,11 @@ _MAXIMUM_CSV = 64 << 20
 
 @dataclass(frozen=True)
 class ReferenceResult:
-    """A reference result that is fit to be compared with.
+    """A reference result that is fit to be compared with."""
 
-    Attributes:
-        path: CSV file in the FMU.
-        names: of the variables of the values after the time; an array's stands as often as it has values.
-        rows: rows of time and values, Boolean ones as 0 and 1; columns of texts are left out.
-    """
-
-    path: str
-    names: tuple[str, ...]
+    path: str  # CSV file in the FMU
+    names: tuple[str, ...]  # of the variables of the values after the time; an array's stands as often as it has values
+    # rows of time and values, Boolean ones as 0 and 1; columns of texts are left out
     rows: tuple[tuple[float, ...], ...]
 
 

@@ -97,21 +97,14 @@ _HEADINGS = {
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule.
+    """A rule."""
 
-    Attributes:
-        severity: "error", "warning" or "info".
-        expects: what must hold, in a few words.
-        advice: what to do, for who broke it.
-        stage: the part of the check that judges it, such as "archive", "description" or the probe "life cycle".
-        anchor: section of the standard's text by version, empty for a rule of our own; a version that is missing
-            is one that the rule does not apply to.
-    """
-
-    severity: Severity
-    expects: str
-    advice: str
-    stage: str
+    severity: Severity  # "error", "warning" or "info"
+    expects: str  # what must hold, in a few words
+    advice: str  # what to do, for who broke it
+    stage: str  # the part of the check that judges it, such as "archive", "description" or the probe "life cycle"
+    # section of the standard's text by version, empty for a rule of our own; a version that is missing is one that the
+    # rule does not apply to
     anchor: Mapping[Version, str]
 
     @property

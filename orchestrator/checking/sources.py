@@ -42,15 +42,10 @@ _LANGUAGES = ("C", "C90", "C99", "C11", "C17")
 
 @dataclass(frozen=True)
 class SourceSet:
-    """Files that are compiled in the same way.
+    """Files that are compiled in the same way."""
 
-    Attributes:
-        files: C files, relative to sources/.
-        words: options of the compiler.
-    """
-
-    files: tuple[str, ...]
-    words: tuple[str, ...]
+    files: tuple[str, ...]  # C files, relative to sources/
+    words: tuple[str, ...]  # options of the compiler
 
 
 def check_sources(d: Description, files: FmuFiles, walls: bool = True) -> tuple[list[Finding], str]:

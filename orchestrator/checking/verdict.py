@@ -22,35 +22,22 @@ _MOST_BYTES = 64 << 20
 
 @dataclass(frozen=True)
 class Issue:
-    """A finding as the policy rates it.
-
-    Attributes:
-        severity: of its rule, by the policy.
-        fingerprint: 32 hexadecimal digits that stay the same while the finding does, on every machine.
-        known: whether the baseline has it.
-    """
+    """A finding as the policy rates it."""
 
     finding: Finding
-    severity: Severity
-    fingerprint: str
-    known: bool = False
+    severity: Severity  # of its rule, by the policy
+    fingerprint: str  # 32 hexadecimal digits that stay the same while the finding does, on every machine
+    known: bool = False  # whether the baseline has it
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What is made of one FMU.
+    """What is made of one FMU."""
 
-    Attributes:
-        report: what the checks found.
-        issues: the findings of the rules that count, worst first.
-        outcomes: of all rules of the FMU's version; a rule that does not count is not run.
-        fail_on: the least severity with which an issue fails.
-    """
-
-    report: FmuFindings
-    issues: tuple[Issue, ...]
-    outcomes: tuple[RuleOutcome, ...]
-    fail_on: Severity = "error"
+    report: FmuFindings  # what the checks found
+    issues: tuple[Issue, ...]  # the findings of the rules that count, worst first
+    outcomes: tuple[RuleOutcome, ...]  # of all rules of the FMU's version; a rule that does not count is not run
+    fail_on: Severity = "error"  # the least severity with which an issue fails
 
     @property
     def fmu(self) -> str:

@@ -33,25 +33,16 @@ LANDING = 0.4  # impact speed over the mean speed of a crossing, where none is a
 
 @dataclass(frozen=True)
 class ControlTask:
-    """A smooth move across the gap, and rest behind it.
+    """A smooth move across the gap, and rest behind it."""
 
-    Attributes:
-        machine: as the controllers know it.
-        impact_speed: at which the teeth shall meet [rad/s].
-        state_weights: of the LQR for ``REGULATOR_STATES``; these damp the load of the thesis's drivetrain.
-        torque_weight: price of the request in the LQR, in the units of the other weights per (N.m)2.
-        height: of the move [rad].
-        duration: of the move [s].
-        sample_time: [s].
-    """
-
-    machine: Machine
-    impact_speed: float
+    machine: Machine  # as the controllers know it
+    impact_speed: float  # at which the teeth shall meet [rad/s]
+    # of the LQR for ``REGULATOR_STATES``; these damp the load of the thesis's drivetrain
     state_weights: tuple[float, ...] = (10.0, 1.0, 1000.0, 500.0, 0.01)
-    torque_weight: float = 2e-3
-    height: float = 0.5
-    duration: float = 1.0
-    sample_time: float = 1e-3
+    torque_weight: float = 2e-3  # price of the request in the LQR, in the units of the other weights per (N.m)2
+    height: float = 0.5  # of the move [rad]
+    duration: float = 1.0  # of the move [s]
+    sample_time: float = 1e-3  # [s]
 
     @property
     def nominal(self) -> DrivetrainValues:

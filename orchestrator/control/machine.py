@@ -30,30 +30,18 @@ LARGEST_CHANGE = 3.0  # of the logarithm of a drawn parameter
 
 @dataclass(frozen=True)
 class Machine:
-    """A drivetrain with a gap, as a model knows it.
+    """A drivetrain with a gap, as a model knows it."""
 
-    Attributes:
-        source: the record's file.
-        parameters: of the ``Drivetrain`` FMU, by name.
-        alpha: half-gap [rad].
-        deviation: its standard deviation [rad].
-        torque_limit: of the drive [N.m].
-        noise: standard deviation of the encoders at motor and load, rounding included [rad].
-        counts: one count of each [rad]; 0: not rounded.
-        unknowns: names of the parameters that may be off.
-        covariance: of these (unknowns, unknowns).
-        half_widths: of uniform distributions, by name, for parameters that no covariance covers.
-    """
-
-    source: str
-    parameters: Mapping[str, ModelParameter]
-    alpha: float
-    deviation: float
-    torque_limit: float
-    noise: tuple[float, float]
-    counts: tuple[float, float]
-    unknowns: tuple[str, ...] = ()
-    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    source: str  # the record's file
+    parameters: Mapping[str, ModelParameter]  # of the ``Drivetrain`` FMU, by name
+    alpha: float  # half-gap [rad]
+    deviation: float  # its standard deviation [rad]
+    torque_limit: float  # of the drive [N.m]
+    noise: tuple[float, float]  # standard deviation of the encoders at motor and load, rounding included [rad]
+    counts: tuple[float, float]  # one count of each [rad]; 0: not rounded
+    unknowns: tuple[str, ...] = ()  # names of the parameters that may be off
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)  # of these (unknowns, unknowns)
+    # of uniform distributions, by name, for parameters that no covariance covers
     half_widths: Mapping[str, float] = field(default_factory=dict)
 
     @property

@@ -14,26 +14,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LoopMeasures:
-    """One run.
+    """One run."""
 
-    Attributes:
-        times: from one flank to the other [s], shape (traversals,).
-        impacts: speeds of the twist at their ends [rad/s], shape (traversals,).
-        largest_impact: of all contacts, those on the same flank included [rad/s].
-        error: root mean square error of the load from the begin of the move on [rad].
-        rest: motion of the load at the end of the run, peak to peak [counts of its encoder, or its noise].
-        contacts: at the end of the run [1/s].
-        stable: the load stays near the end of the move.
-        path: of the first traversal, times [s] and twist from the flank at its start [rad]; empty where there is none.
-    """
-
-    times: Array
-    impacts: Array
-    largest_impact: float
-    error: float
-    rest: float
-    contacts: float
-    stable: bool
+    times: Array  # from one flank to the other [s], shape (traversals,)
+    impacts: Array  # speeds of the twist at their ends [rad/s], shape (traversals,)
+    largest_impact: float  # of all contacts, those on the same flank included [rad/s]
+    error: float  # root mean square error of the load from the begin of the move on [rad]
+    rest: float  # motion of the load at the end of the run, peak to peak [counts of its encoder, or its noise]
+    contacts: float  # at the end of the run [1/s]
+    stable: bool  # the load stays near the end of the move
+    # of the first traversal, times [s] and twist from the flank at its start [rad]; empty where there is none
     path: tuple[Array, Array]
 
 

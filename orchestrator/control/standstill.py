@@ -34,19 +34,12 @@ ROUNDING = 1e-10  # of an eigenvalue's size
 
 @dataclass(frozen=True)
 class Margins:
-    """Of the sampled loop, cut at the request.
+    """Of the sampled loop, cut at the request."""
 
-    Attributes:
-        lower: factor of the gain at which it is unstable, below 1; 0 where there is none.
-        upper: the same above 1; infinite where there is none.
-        phase: least phase that makes it unstable [rad].
-        delay: least further delay that does [s].
-    """
-
-    lower: float
-    upper: float
-    phase: float
-    delay: float
+    lower: float  # factor of the gain at which it is unstable, below 1; 0 where there is none
+    upper: float  # the same above 1; infinite where there is none
+    phase: float  # least phase that makes it unstable [rad]
+    delay: float  # least further delay that does [s]
 
 
 def forecast_rest(

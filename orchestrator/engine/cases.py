@@ -25,17 +25,11 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One simulation to be run.
+    """One simulation to be run."""
 
-    Attributes:
-        index: position in the sweep, from 0; decides the order of the final table.
-        parameters: value of each varied parameter by name, in the order of the columns.
-        seed: seed of the whole sweep.
-    """
-
-    index: int
-    parameters: Mapping[str, Value]
-    seed: int
+    index: int  # position in the sweep, from 0; decides the order of the final table
+    parameters: Mapping[str, Value]  # value of each varied parameter by name, in the order of the columns
+    seed: int  # seed of the whole sweep
 
     def generator(self) -> np.random.Generator:
         """Return this case's own random generator: a function of (sweep seed, index) and of nothing else."""
@@ -68,18 +62,12 @@ class ResultColumn:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of one case.
+    """What became of one case."""
 
-    Attributes:
-        index: the case's index.
-        message: one line of plain text, empty when it went well.
-        values: one per result column when ``status`` is ``DONE``, else empty.
-    """
-
-    index: int
+    index: int  # the case's index
     status: Status
-    message: str = ""
-    values: tuple[Value, ...] = field(default=())
+    message: str = ""  # one line of plain text, empty when it went well
+    values: tuple[Value, ...] = field(default=())  # one per result column when ``status`` is ``DONE``, else empty
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "message", plain_text(self.message[:MESSAGE_LENGTH]))
@@ -95,15 +83,9 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where a run stands; every case counted in ``done`` is on the disk.
+    """Where a run stands; every case counted in ``done`` is on the disk."""
 
-    Attributes:
-        done: finished cases, failed and resumed ones included.
-        failed: finished cases whose status is not ``done``.
-        resumed: cases that were finished before this run started.
-    """
-
-    done: int
+    done: int  # finished cases, failed and resumed ones included
     total: int
-    failed: int
-    resumed: int
+    failed: int  # finished cases whose status is not ``done``
+    resumed: int  # cases that were finished before this run started

@@ -11,13 +11,9 @@ from tornado.ioloop import IOLoop
 
 
 class LoopThread:
-    """A running event loop; close it when nothing uses it any more.
+    """A running event loop; close it when nothing uses it any more."""
 
-    Attributes:
-        loop: the loop, as ``Client(loop=...)`` takes it.
-    """
-
-    loop: IOLoop
+    loop: IOLoop  # the loop, as ``Client(loop=...)`` takes it
 
     def __init__(self) -> None:
         self._ready = threading.Event()

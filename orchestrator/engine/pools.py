@@ -80,16 +80,11 @@ class LocalProcesses:
 
 @dataclass(frozen=True)
 class Tls:
-    """Files with which both ends of a connection to a cluster prove who they are (PEM).
+    """Files with which both ends of a connection to a cluster prove who they are (PEM)."""
 
-    Attributes:
-        authority: certificate of the authority that has signed those of scheduler, workers and clients.
-        key: private key of this client.
-    """
-
-    authority: Path
+    authority: Path  # certificate of the authority that has signed those of scheduler, workers and clients
     certificate: Path
-    key: Path
+    key: Path  # private key of this client
 
 
 def choose_tls(authority: Path | None, certificate: Path | None, key: Path | None) -> Tls | None:

@@ -71,13 +71,11 @@ def run_cases(
 ) -> Sweep:
     """Run every case that the journal does not hold yet, and return them all.
 
-    Memory does not grow with the number of cases: a case is made when a slot for it is near, and its outcome goes
-    to the journal as soon as it arrives, with one durable write for all that arrive together. The same cases, work and
+    Memory does not grow with the number of cases: a case is made when a slot for it is near, and its outcome goes to
+    the journal as soon as it arrives, with one durable write for all that arrive together. The same cases, work and
     version give the same rows, whatever the pool, the batches, the order in which cases end, and however often the run
-    was stopped and resumed.
-
-    Args:
-        on_progress: called whenever cases have become durable, and at least about four times a second.
+    was stopped and resumed. ``on_progress``: called whenever cases have become durable, and at least about four times a
+    second.
 
     Returns:
         The finished cases; the caller closes it.

@@ -17,27 +17,22 @@ class Work:
     """What a worker process does.
 
     ``prepare`` and ``run`` are module-level functions (they travel by name) and ``payload`` can be pickled.
-
-    Attributes:
-        prepare: ``(payload, files) -> prepared``; called once per worker process. ``files`` maps the names of
-            ``files`` below to local paths whose content is what they had on the machine that started the sweep.
-        run: ``(prepared, case) -> {column name: value}``; called once per case.
-        columns: the results' columns; ``run`` must return exactly these names. ``None`` is a missing value.
-        payload: anything else that ``prepare`` needs.
-        files: files that workers need (FMUs), by name; they travel by content hash, once per machine.
-        definition: plain JSON data that, with the cases and the files' hashes, determine every result.
-        unpacked: the files are FMUs, and ``prepare`` gets the folders into which they are unpacked.
-        walls: the files hold code that is not ours: workers read and write no other files of the user, and have no
-            network.
     """
 
+    # ``(payload, files) -> prepared``; called once per worker process. ``files`` maps the names of ``files`` below to
+    # local paths whose content is what they had on the machine that started the sweep
     prepare: Callable[[Any, Mapping[str, Path]], Any]
+    # ``(prepared, case) -> {column name: value}``; called once per case
     run: Callable[[Any, Case], Mapping[str, Value]]
+    # the results' columns; ``run`` must return exactly these names. ``None`` is a missing value
     columns: tuple[ResultColumn, ...]
-    payload: Any = None
+    payload: Any = None  # anything else that ``prepare`` needs
+    # files that workers need (FMUs), by name; they travel by content hash, once per machine
     files: Mapping[str, Path] = field(default_factory=dict)
+    # plain JSON data that, with the cases and the files' hashes, determine every result
     definition: Mapping[str, Any] = field(default_factory=dict)
-    unpacked: bool = False
+    unpacked: bool = False  # the files are FMUs, and ``prepare`` gets the folders into which they are unpacked
+    # the files hold code that is not ours: workers read and write no other files of the user, and have no network
     walls: bool = False
 
 

@@ -29,23 +29,16 @@ _COUNT = struct.Struct("<Q")
 
 @dataclass(frozen=True)
 class Assignment:
-    """What a worker process is for.
-
-    Attributes:
-        files: local path of each of the work's files.
-        time_limit: seconds that a case may take; the lane enforces it, the worker only outlives it by
-            ``ORPHAN_MARGIN`` when the lane is gone.
-        memory: bytes that the process may allocate beyond what it holds when it is prepared; 0 for no limit.
-        columns: number of result columns.
-        walls: whether the work runs what is not ours.
-    """
+    """What a worker process is for."""
 
     work: bytes
-    files: dict[str, Path]
+    files: dict[str, Path]  # local path of each of the work's files
+    # seconds that a case may take; the lane enforces it, the worker only outlives it by ``ORPHAN_MARGIN`` when the lane
+    # is gone
     time_limit: float
-    memory: int
-    columns: int
-    walls: bool
+    memory: int  # bytes that the process may allocate beyond what it holds when it is prepared; 0 for no limit
+    columns: int  # number of result columns
+    walls: bool  # whether the work runs what is not ours
 
 
 @dataclass(frozen=True)

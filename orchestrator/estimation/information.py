@@ -7,10 +7,7 @@ from orchestrator.shared.inference.inverse import pseudo_inverse
 
 
 def inverse(information: Array) -> Array:
-    """Return the inverse of an information matrix, which is scaled first.
-
-    Args:
-        information: (k, k).
+    """Return the inverse of an information matrix, which is scaled first. ``information``: (k, k).
 
     Returns:
         Shape (k, k).

@@ -239,21 +239,14 @@ class Likelihood:
 
 @dataclass(frozen=True)
 class Fit:
-    """A maximum of the likelihood.
-
-    Attributes:
-        free: (k,) indices of the unknowns that were fitted.
-        information: (k, k) Fisher information of the free unknowns, prior included.
-        converged: whether the last step changed the objective by less than the tolerance.
-        likelihood: the likelihood with what the fit has learnt of it, for the next fit.
-    """
+    """A maximum of the likelihood."""
 
     point: Point
-    free: NDArray[np.int64]
-    information: Array
+    free: NDArray[np.int64]  # (k,) indices of the unknowns that were fitted
+    information: Array  # (k, k) Fisher information of the free unknowns, prior included
     iterations: int
-    converged: bool
-    likelihood: Likelihood = field(repr=False)
+    converged: bool  # whether the last step changed the objective by less than the tolerance
+    likelihood: Likelihood = field(repr=False)  # the likelihood with what the fit has learnt of it, for the next fit
 
     @cached_property
     def covariance(self) -> Array:
@@ -291,10 +284,7 @@ def maximise(
     """Return the maximum of the likelihood reached from ``start`` over the ``free`` unknowns.
 
     Steps are damped until the objective falls; an unknown at its bound stays there while the score points outward.
-
-    Args:
-        start: (unknowns,).
-        iterations: largest number of steps of the optimiser.
+    ``start``: (unknowns,); ``iterations``: largest number of steps of the optimiser.
     """
     places = np.array(list(free), dtype=np.int64)
     lower, upper = likelihood.problem.bounds(places)

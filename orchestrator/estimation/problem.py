@@ -54,27 +54,17 @@ class Unknown:
 
 @dataclass(frozen=True)
 class GapProblem:
-    """What is unknown about a record of a drivetrain.
-
-    Attributes:
-        unknowns: every unknown, in the order of the vector; free or not is decided per fit.
-        outputs: (n, 1 or 2) measured angles [rad].
-        sliding: speeds at which dry friction of motor and load has set in [rad/s].
-        base: parameters of the model by name.
-        units: by what levels of torque noise at each body are to be multiplied for a drive as weak, or as strong, as
-            this one.
-        gap: name of the gap's size.
-        difference: step of a difference quotient, in standard deviations.
-    """
+    """What is unknown about a record of a drivetrain."""
 
     row: ClassVar[BodyNames] = DRIVETRAIN
-    gap: ClassVar[str] = ALPHA
-    difference: ClassVar[float] = 0.01
+    gap: ClassVar[str] = ALPHA  # name of the gap's size
+    difference: ClassVar[float] = 0.01  # step of a difference quotient, in standard deviations
     record: Record
-    unknowns: tuple[Unknown, ...]
-    outputs: Array
-    sliding: tuple[float, float]
-    base: Mapping[str, float]
+    unknowns: tuple[Unknown, ...]  # every unknown, in the order of the vector; free or not is decided per fit
+    outputs: Array  # (n, 1 or 2) measured angles [rad]
+    sliding: tuple[float, float]  # speeds at which dry friction of motor and load has set in [rad/s]
+    base: Mapping[str, float]  # parameters of the model by name
+    # by what levels of torque noise at each body are to be multiplied for a drive as weak, or as strong, as this one
     units: tuple[float, ...]
 
     @property
@@ -164,9 +154,7 @@ def parameter_unknowns(model: Model, without: Collection[str]) -> list[Unknown]:
 def torque_unknowns(record: Record, model: Model, lag: float, ratio: float) -> list[Unknown]:
     """Return gain, offset and lateness of the drive's torque, and dry friction of motor and load about what is stated.
 
-    Args:
-        lag: of the drive [s].
-        ratio: speed of the motor over that of the load.
+    ``lag``: of the drive [s]; ``ratio``: speed of the motor over that of the load.
     """
     rms = rms_behind_lag(record.u, record.step, lag)
     stated = record.u_scale_uncertainty / math.sqrt(3.0)

@@ -18,19 +18,12 @@ WINDOW = 0.06  # s, of the Savitzky-Golay derivatives
 
 @dataclass(frozen=True)
 class ShaftSignals:
-    """Signals seen from the load, all (n,).
+    """Signals seen from the load, all (n,)."""
 
-    Attributes:
-        twist: theta_m/i - theta_l [rad].
-        twist_rate: its derivative [rad/s], smoothed.
-        torque: shaft torque from the load's motion, J_l theta_l'' + b_l theta_l' [N.m], smoothed.
-        noise: standard deviation of ``torque`` due to the load encoder [N.m].
-    """
-
-    twist: Array
-    twist_rate: Array
-    torque: Array
-    noise: float
+    twist: Array  # theta_m/i - theta_l [rad]
+    twist_rate: Array  # its derivative [rad/s], smoothed
+    torque: Array  # shaft torque from the load's motion, J_l theta_l'' + b_l theta_l' [N.m], smoothed
+    noise: float  # standard deviation of ``torque`` due to the load encoder [N.m]
 
 
 def shaft_signals(record: Record, model: Model) -> ShaftSignals:

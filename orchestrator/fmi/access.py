@@ -29,19 +29,12 @@ FLOATS = (ctypes.c_double, ctypes.c_float)
 
 
 class Access(NamedTuple):
-    """Where one scalar value is.
+    """Where one scalar value is."""
 
-    Attributes:
-        kind: what the functions that set and read it are called after: a key of ``FMI2_TYPES`` or ``FMI3_TYPES``.
-        reference: value reference; of the whole array where it is an element of one.
-        element: place in the array.
-        size: number of the array's elements; 1: it is none.
-    """
-
-    kind: str
-    reference: int
-    element: int = 0
-    size: int = 1
+    kind: str  # what the functions that set and read it are called after: a key of ``FMI2_TYPES`` or ``FMI3_TYPES``
+    reference: int  # value reference; of the whole array where it is an element of one
+    element: int = 0  # place in the array
+    size: int = 1  # number of the array's elements; 1: it is none
 
 
 def whole_range(kind: str) -> tuple[int, int] | None:

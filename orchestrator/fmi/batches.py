@@ -20,26 +20,16 @@ Arrays = dict[int, list[Any]]
 
 @dataclass(frozen=True)
 class VariableBatch:
-    """Variables of one type that are set or read in one call.
+    """Variables of one type that are set or read in one call."""
 
-    Attributes:
-        positions: of the variables in the list asked for.
-        places: of their values in ``values``.
-        values: C array that the call reads or fills.
-        references: value references as a C array.
-        rest: elements of arrays that keep their values, but are set along with others.
-        kept: elements of arrays that are set.
-        function: its name, for messages.
-    """
-
-    positions: list[int]
-    places: list[int]
-    values: Any
-    references: Any
-    rest: Elements
-    kept: Elements
+    positions: list[int]  # of the variables in the list asked for
+    places: list[int]  # of their values in ``values``
+    values: Any  # C array that the call reads or fills
+    references: Any  # value references as a C array
+    rest: Elements  # elements of arrays that keep their values, but are set along with others
+    kept: Elements  # elements of arrays that are set
     call: Callable[[], int]
-    function: str
+    function: str  # its name, for messages
 
     @property
     def whole(self) -> bool:
@@ -63,15 +53,10 @@ class VariableBatch:
 
 @dataclass(frozen=True)
 class Functions:
-    """The functions of one instance that set and read variables.
+    """The functions of one instance that set and read variables."""
 
-    Attributes:
-        library: the FMU's, loaded.
-        component: first argument of every call.
-    """
-
-    library: Any
-    component: Any
+    library: Any  # the FMU's, loaded
+    component: Any  # first argument of every call
     version: str
     arrays: Arrays
 

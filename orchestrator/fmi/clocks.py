@@ -19,42 +19,27 @@ SELF_SAMPLING = "backlash-cosim.samples-itself"
 
 @dataclass(frozen=True)
 class EventFeatures:
-    """What an FMU has for event mode, beside its variables.
+    """What an FMU has for event mode, beside its variables."""
 
-    Attributes:
-        inside: names of the inputs that may be set in intermediate updates.
-        clocked: value references of the clocks that a variable belongs to, by its name.
-        timed: input clocks whose next tick the FMU says while it runs: value reference and kind by name.
-        told: periodic clocks whose interval the FMU is told, by name.
-        triggered: value references of output clocks.
-        self_sampling: without event mode the FMU ticks all its input clocks itself.
-    """
-
-    inside: frozenset[str] = frozenset()
+    inside: frozenset[str] = frozenset()  # names of the inputs that may be set in intermediate updates
+    # value references of the clocks that a variable belongs to, by its name
     clocked: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    # input clocks whose next tick the FMU says while it runs: value reference and kind by name
     timed: Mapping[str, tuple[int, str]] = field(default_factory=dict)
-    told: tuple[str, ...] = ()
-    triggered: frozenset[int] = frozenset()
-    self_sampling: bool = False
+    told: tuple[str, ...] = ()  # periodic clocks whose interval the FMU is told, by name
+    triggered: frozenset[int] = frozenset()  # value references of output clocks
+    self_sampling: bool = False  # without event mode the FMU ticks all its input clocks itself
 
 
 @dataclass(frozen=True)
 class Clocks:
-    """The clocks of an FMU.
+    """The clocks of an FMU."""
 
-    Attributes:
-        periodic: input clocks that the master ticks, by name.
-        triggered: input clocks that tick with output clocks of other FMUs, by name.
-        outputs: value references of output clocks, by name.
-        features: what else event mode needs to know.
-        left_out: names of those that nobody ticks.
-    """
-
-    periodic: Mapping[str, PeriodicClock]
-    triggered: Mapping[str, TriggeredClock]
-    outputs: Mapping[str, int]
-    features: EventFeatures
-    left_out: Sequence[str]
+    periodic: Mapping[str, PeriodicClock]  # input clocks that the master ticks, by name
+    triggered: Mapping[str, TriggeredClock]  # input clocks that tick with output clocks of other FMUs, by name
+    outputs: Mapping[str, int]  # value references of output clocks, by name
+    features: EventFeatures  # what else event mode needs to know
+    left_out: Sequence[str]  # names of those that nobody ticks
 
 
 def read_clocks(variables: Variables) -> Clocks:
@@ -137,15 +122,10 @@ def exact_time(text: str) -> Fraction:
 
 @dataclass(frozen=True)
 class ClockTimes:
-    """Times of a clock that are wanted in place of the FMU's own.
+    """Times of a clock that are wanted in place of the FMU's own."""
 
-    Attributes:
-        interval: [s]; None: as the FMU has it.
-        shift: of the first tick [s]; None: as the FMU has it.
-    """
-
-    interval: Fraction | None = None
-    shift: Fraction | None = None
+    interval: Fraction | None = None  # [s]; None: as the FMU has it
+    shift: Fraction | None = None  # of the first tick [s]; None: as the FMU has it
 
     def of(self, clock: PeriodicClock) -> PeriodicClock:
         return replace(

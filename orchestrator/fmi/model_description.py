@@ -23,56 +23,36 @@ MAXIMUM_XML = 64 * 2**20
 
 @dataclass(frozen=True)
 class Exchange:
-    """What it takes to integrate an FMU for model exchange.
+    """What it takes to integrate an FMU for model exchange."""
 
-    Attributes:
-        states: number of continuous states, before structural parameters are set.
-        indicators: number of event indicators, likewise.
-        completed: the FMU is to be told of every step that the integrator has completed.
-    """
-
-    states: int
-    indicators: int
-    completed: bool
+    states: int  # number of continuous states, before structural parameters are set
+    indicators: int  # number of event indicators, likewise
+    completed: bool  # the FMU is to be told of every step that the integrator has completed
 
 
 @dataclass(frozen=True)
 class FmuDescription:
-    """An FMU's interface and what it takes to load it.
+    """An FMU's interface and what it takes to load it."""
 
-    Attributes:
-        model: the interface as masters see it.
-        version: of FMI, "2.0" or "3.0".
-        guid: to be handed over at instantiation; FMI 3.0 calls it a token.
-        identifier: name of the shared library.
-        python: the FMU runs Python in this very process.
-        once: only one instance per process is allowed.
-        access: where the value of each variable is, by its name.
-        events: what event mode needs to know.
-        arrays: sizes of the dimensions of the arrays, by name.
-        structural: names of the structural parameters.
-        configured: values that these are given before an instance is initialised, where they are not the FMU's own.
-        resized: names of the elements of arrays that have no start value, for that is for another size.
-        left_out: what of the FMU is not there for the master, in words; empty for nothing.
-        exchange: what it takes to integrate it; ``None``: it integrates itself, for it is for co-simulation.
-        inputs: names of the inputs that may change while it is integrated.
-    """
-
-    model: ModelInterface
-    version: str
-    guid: str
-    identifier: str
-    python: bool
-    once: bool
-    access: Mapping[str, Access]
-    events: EventFeatures = field(default_factory=EventFeatures)
+    model: ModelInterface  # the interface as masters see it
+    version: str  # of FMI, "2.0" or "3.0"
+    guid: str  # to be handed over at instantiation; FMI 3.0 calls it a token
+    identifier: str  # name of the shared library
+    python: bool  # the FMU runs Python in this very process
+    once: bool  # only one instance per process is allowed
+    access: Mapping[str, Access]  # where the value of each variable is, by its name
+    events: EventFeatures = field(default_factory=EventFeatures)  # what event mode needs to know
+    # sizes of the dimensions of the arrays, by name
     arrays: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-    structural: frozenset[str] = frozenset()
+    structural: frozenset[str] = frozenset()  # names of the structural parameters
+    # values that these are given before an instance is initialised, where they are not the FMU's own
     configured: Mapping[str, Value] = field(default_factory=dict)
+    # names of the elements of arrays that have no start value, for that is for another size
     resized: frozenset[str] = frozenset()
-    left_out: str = ""
+    left_out: str = ""  # what of the FMU is not there for the master, in words; empty for nothing
+    # what it takes to integrate it; ``None``: it integrates itself, for it is for co-simulation
     exchange: Exchange | None = None
-    inputs: frozenset[str] = frozenset()
+    inputs: frozenset[str] = frozenset()  # names of the inputs that may change while it is integrated
 
 
 def read_description(

@@ -19,33 +19,21 @@ FLOWS = ("inflow", "outflow")
 
 @dataclass(frozen=True)
 class Member:
-    """A variable of a terminal.
+    """A variable of a terminal."""
 
-    Attributes:
-        name: by which members are matched; empty where they are matched by their order.
-        variable: name of the FMU's variable.
-        kind: ``signal``, ``inflow``, ``outflow`` or one of the FMU's own.
-    """
-
-    name: str
-    variable: str
-    kind: str
+    name: str  # by which members are matched; empty where they are matched by their order
+    variable: str  # name of the FMU's variable
+    kind: str  # ``signal``, ``inflow``, ``outflow`` or one of the FMU's own
 
 
 @dataclass(frozen=True)
 class Terminal:
-    """A group of variables.
+    """A group of variables."""
 
-    Attributes:
-        rule: how members are matched: ``plug``, ``bus``, ``sequence``, ``none`` or one of the FMU's own.
-        kind: what others it fits; empty: any.
-        parts: terminals within it, by name.
-    """
-
-    rule: str
-    kind: str
+    rule: str  # how members are matched: ``plug``, ``bus``, ``sequence``, ``none`` or one of the FMU's own
+    kind: str  # what others it fits; empty: any
     members: tuple[Member, ...]
-    parts: Mapping[str, "Terminal"]
+    parts: Mapping[str, "Terminal"]  # terminals within it, by name
 
     @property
     def has_flows(self) -> bool:
@@ -86,13 +74,9 @@ def _terminals(parent: etree._Element | None) -> dict[str, Terminal]:
 
 @dataclass(frozen=True)
 class TerminalEnd:
-    """A terminal of an instance.
+    """A terminal of an instance."""
 
-    Attributes:
-        address: ``instance.terminal``, for messages.
-    """
-
-    address: str
+    address: str  # ``instance.terminal``, for messages
     instance: str
     model: ModelInterface
     terminal: Terminal

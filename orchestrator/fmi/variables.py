@@ -24,30 +24,20 @@ TYPES = {
 
 @dataclass(frozen=True)
 class Variables:
-    """The variables of an FMU.
+    """The variables of an FMU."""
 
-    Attributes:
-        scalars: all but clocks and binaries, arrays by their elements.
-        accesses: where their values are.
-        names: names of the scalars at a value reference, those of aliases left out; of FMI 2.0 at an index.
-        clocks: the elements of the clocks, by name.
-        clocked: the value references of the clocks that a scalar belongs to, by its name.
-        inside: names of the inputs that may be set in intermediate updates.
-        binaries: names of the variables of type Binary.
-        arrays: sizes of the dimensions of the arrays, by name.
-        structural: names of the structural parameters.
-        resized: names of the elements of arrays whose start values are for another size.
-    """
-
-    scalars: list[Variable] = field(default_factory=list)
-    accesses: list[Access] = field(default_factory=list)
+    scalars: list[Variable] = field(default_factory=list)  # all but clocks and binaries, arrays by their elements
+    accesses: list[Access] = field(default_factory=list)  # where their values are
+    # names of the scalars at a value reference, those of aliases left out; of FMI 2.0 at an index
     names: dict[int, list[str]] = field(default_factory=dict)
-    clocks: dict[str, etree._Element] = field(default_factory=dict)
+    clocks: dict[str, etree._Element] = field(default_factory=dict)  # the elements of the clocks, by name
+    # the value references of the clocks that a scalar belongs to, by its name
     clocked: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    inside: list[str] = field(default_factory=list)
-    binaries: list[str] = field(default_factory=list)
-    arrays: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    structural: list[str] = field(default_factory=list)
+    inside: list[str] = field(default_factory=list)  # names of the inputs that may be set in intermediate updates
+    binaries: list[str] = field(default_factory=list)  # names of the variables of type Binary
+    arrays: dict[str, tuple[int, ...]] = field(default_factory=dict)  # sizes of the dimensions of the arrays, by name
+    structural: list[str] = field(default_factory=list)  # names of the structural parameters
+    # names of the elements of arrays whose start values are for another size
     resized: list[str] = field(default_factory=list)
 
 

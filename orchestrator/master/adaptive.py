@@ -40,23 +40,14 @@ ORDER = 5
 
 @dataclass(frozen=True)
 class _Window:
-    """A window that was tried.
+    """A window that was tried."""
 
-    Attributes:
-        parts: what the signals do in it, part by part.
-        end: where the slaves are [s]; ``None``: at its begin, for it was undone.
-        error: as a multiple of the tolerance.
-        length: that was tried [s].
-        event: a slave has an event at its end.
-        rates: derivatives at its end.
-    """
-
-    parts: tuple[Track, ...]
-    end: float | None
-    error: float
-    length: float
-    event: bool = False
-    rates: Array | None = None
+    parts: tuple[Track, ...]  # what the signals do in it, part by part
+    end: float | None  # where the slaves are [s]; ``None``: at its begin, for it was undone
+    error: float  # as a multiple of the tolerance
+    length: float  # that was tried [s]
+    event: bool = False  # a slave has an event at its end
+    rates: Array | None = None  # derivatives at its end
 
 
 def check_adaptive(layout: Layout) -> None:

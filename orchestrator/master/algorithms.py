@@ -11,15 +11,10 @@ from orchestrator.master.wiring import Array, Slots, Wiring
 
 @dataclass(frozen=True, slots=True)
 class GaussSeidel:
-    """Instances one after the other in execution order, each with the newest values there are. Fixed step [s].
+    """Instances one after the other in execution order, each with the newest values there are. Fixed step [s]."""
 
-    Attributes:
-        step: communication step [s].
-        compiled: run the loop in machine code where all slaves allow it.
-    """
-
-    step: float
-    compiled: bool = True
+    step: float  # communication step [s]
+    compiled: bool = True  # run the loop in machine code where all slaves allow it
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,21 +27,14 @@ class Jacobi:
 
 @dataclass(frozen=True, slots=True)
 class Adaptive:
-    """Error-controlled communication step with rollback, for continuous loops; see ``adaptive``.
+    """Error-controlled communication step with rollback, for continuous loops; see ``adaptive``."""
 
-    Attributes:
-        step: distance of the recorded points [s].
-        tolerance: largest error of an exchanged value per communication step, relative to ``max(1, |value|)``.
-        first: first communication step tried [s].
-        smallest: below this step [s] the run is given up.
-        largest: largest communication step [s].
-    """
-
-    step: float
+    step: float  # distance of the recorded points [s]
+    # largest error of an exchanged value per communication step, relative to ``max(1, |value|)``
     tolerance: float = 1e-9
-    first: float = 1e-4
-    smallest: float = 1e-11
-    largest: float = 0.02
+    first: float = 1e-4  # first communication step tried [s]
+    smallest: float = 1e-11  # below this step [s] the run is given up
+    largest: float = 0.02  # largest communication step [s]
 
 
 class FixedStepLoop(Protocol):

@@ -15,9 +15,7 @@ def divergence_remarks(
 ) -> list[RunRemark]:
     """Return a remark for each instance that has a signal beyond all sizes, on the one that comes there first.
 
-    Args:
-        rows: (times, names) recorded.
-        times: [s].
+    ``rows``: (times, names) recorded; ``times``: [s].
     """
     far = np.abs(rows) > BEYOND  # NaN is not: a result with it is refused
     first: dict[str, tuple[int, int]] = {}

@@ -36,17 +36,11 @@ class UnsettledError(Exception):
 
 @dataclass(frozen=True)
 class Swept:
-    """What came of the sweeps over a window.
+    """What came of the sweeps over a window."""
 
-    Attributes:
-        track: all signals, up to ``end``; of no use where that is the begin of the window.
-        end: of the window, or an event before it [s].
-        event: a slave has an event there.
-    """
-
-    track: Track
-    end: float
-    event: bool
+    track: Track  # all signals, up to ``end``; of no use where that is the begin of the window
+    end: float  # of the window, or an event before it [s]
+    event: bool  # a slave has an event there
     rates: Array
 
 

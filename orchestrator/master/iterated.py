@@ -51,17 +51,11 @@ def initialise(wiring: Wiring, cut: Slots, table: Array, tolerance: float, itera
 
 @dataclass(frozen=True, slots=True)
 class Iterated:
-    """Gauss-Seidel, each step repeated with rollback until the values that the instances of a loop exchange settle.
+    """Gauss-Seidel, each step repeated with rollback until the values that the instances of a loop exchange settle."""
 
-    Attributes:
-        step: communication step [s].
-        tolerance: largest change of an exchanged value, relative to ``max(1, |value|)``.
-        iterations: most passes per step.
-    """
-
-    step: float
-    tolerance: float = 1e-10
-    iterations: int = 50
+    step: float  # communication step [s]
+    tolerance: float = 1e-10  # largest change of an exchanged value, relative to ``max(1, |value|)``
+    iterations: int = 50  # most passes per step
 
     def run(self, wiring: Wiring, table: Array, start: float, steps: int, rows: Array, record: Slots) -> int:
         """Run on the grid, each algebraic loop until what it exchanges settles; see ``FixedStepLoop``."""

@@ -21,23 +21,14 @@ _TYPE_ORDER = {"Real": 0, "Integer": 1, "Enumeration": 1, "Boolean": 2}
 
 @dataclass(frozen=True, slots=True)
 class Feed:
-    """What an input slot gets before a step: ``round_to(quantum, factor * slots[source] + offset + signal)``.
+    """What an input slot gets before a step: ``round_to(quantum, factor * slots[source] + offset + signal)``."""
 
-    Attributes:
-        slot: the input's slot.
-        source: the output's slot, or -1.
-        factor: of the source, unit conversion included.
-        offset: in the input's unit.
-        quantum: resolution, 0 for none.
-        signal: row of the table of signals, or -1.
-    """
-
-    slot: int
-    source: int
-    factor: float
-    offset: float
-    quantum: float
-    signal: int
+    slot: int  # the input's slot
+    source: int  # the output's slot, or -1
+    factor: float  # of the source, unit conversion included
+    offset: float  # in the input's unit
+    quantum: float  # resolution, 0 for none
+    signal: int  # row of the table of signals, or -1
 
     @property
     def plain(self) -> bool:
@@ -47,44 +38,28 @@ class Feed:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One instance's part of the array.
+    """One instance's part of the array."""
 
-    Attributes:
-        name: the instance's name.
-        inputs: names of the fed inputs, in the order of their slots.
-        outputs: names of the needed outputs, in the order of their slots.
-        first_input: slot of the first input.
-        first_output: slot of the first output.
-        feeds: one per fed input, in the order of slots.
-    """
-
-    name: str
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    first_input: int
-    first_output: int
-    feeds: tuple[Feed, ...]
+    name: str  # the instance's name
+    inputs: tuple[str, ...]  # names of the fed inputs, in the order of their slots
+    outputs: tuple[str, ...]  # names of the needed outputs, in the order of their slots
+    first_input: int  # slot of the first input
+    first_output: int  # slot of the first output
+    feeds: tuple[Feed, ...]  # one per fed input, in the order of slots
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The plan of one run's signals.
+    """The plan of one run's signals."""
 
-    Attributes:
-        blocks: one per instance, in execution order.
-        slots: slot by ``instance.variable``.
-        recorded: slots of the recorded signals, in the order asked for.
-        signals: for each row of the table of signals, the sources (index into ``System.sources``, factor and offset
-            of the unit conversion, whether the value at the end of the step counts) that are added up in it.
-        system: what was laid out.
-    """
-
-    blocks: tuple[Block, ...]
+    blocks: tuple[Block, ...]  # one per instance, in execution order
     size: int
-    slots: Mapping[str, int]
-    recorded: tuple[int, ...]
+    slots: Mapping[str, int]  # slot by ``instance.variable``
+    recorded: tuple[int, ...]  # slots of the recorded signals, in the order asked for
+    # for each row of the table of signals, the sources (index into ``System.sources``, factor and offset of the unit
+    # conversion, whether the value at the end of the step counts) that are added up in it
     signals: tuple[tuple[tuple[int, float, float, bool], ...], ...]
-    system: System
+    system: System  # what was laid out
 
     def signal_table(self, times: Signals, replaced: Mapping[int, Signal]) -> NDArray[np.float64]:
         """Return what the sources add to inputs: column 0 for initialisation, column ``n + 1`` for step ``n``.

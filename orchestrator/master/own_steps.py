@@ -18,11 +18,8 @@ def own_step_remarks(system: System, names: tuple[str, ...], rows: Array, start:
     """Return a remark for each instance whose recorded continuous outputs move every so many communication points only.
 
     A slave whose own step is longer than the communication step, and is no part of it, shows outputs of another time:
-    of the future where it steps beyond the communication point, of the past where it waits.
-
-    Args:
-        start: of the run [s].
-        step: communication step [s].
+    of the future where it steps beyond the communication point, of the past where it waits. ``start``: of the run [s];
+    ``step``: communication step [s].
     """
     moves: dict[str, Array] = {}
     for name, column in zip(names, rows.T, strict=True):

@@ -8,17 +8,11 @@ from orchestrator.plain_text import plain_text
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What is wrong with a scenario, and where.
+    """What is wrong with a scenario, and where."""
 
-    Attributes:
-        path: such as ``$.connections[2].to``.
-        text: "`x` must ..., but is ...".
-        mismatch: two variables cannot be connected.
-    """
-
-    path: str
-    text: str
-    mismatch: bool = False
+    path: str  # such as ``$.connections[2].to``
+    text: str  # "`x` must ..., but is ..."
+    mismatch: bool = False  # two variables cannot be connected
 
     def __str__(self) -> str:
         return f"{self.path}: {self.text}"

@@ -26,74 +26,48 @@ Start = Mapping[str, Value | Quantity]
 
 @dataclass(frozen=True)
 class Instance:
-    """One slave to be.
+    """One slave to be."""
 
-    Attributes:
-        name: without a dot, unique in the system.
-        create: makes the slave, given the instance's name.
-        start: parameters and start values by variable name.
-        solver_tolerance: relative tolerance for the slave's own solver; None: its default.
-        resets: a reset is trusted to leave nothing of a run behind.
-    """
-
-    name: str
+    name: str  # without a dot, unique in the system
     model: ModelInterface
-    create: Callable[[str], Slave]
-    start: Start = field(default_factory=dict)
-    solver_tolerance: float | None = None
-    resets: bool = True
+    create: Callable[[str], Slave]  # makes the slave, given the instance's name
+    start: Start = field(default_factory=dict)  # parameters and start values by variable name
+    solver_tolerance: float | None = None  # relative tolerance for the slave's own solver; None: its default
+    resets: bool = True  # a reset is trusted to leave nothing of a run behind
 
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """``target = round_to(quantum, factor * source + offset)``, after the conversion of units.
+    """``target = round_to(quantum, factor * source + offset)``, after the conversion of units."""
 
-    Attributes:
-        source: ``instance.variable`` of an output.
-        target: ``instance.variable`` of an input.
-        offset: in the target's unit.
-        quantum: resolution of the target's sensor in the target's unit; 0 for none. Sources that feed the same
-            target are added before rounding.
-        unit: unit that the source must have; ``None`` leaves it unchecked.
-    """
-
-    source: str
-    target: str
+    source: str  # ``instance.variable`` of an output
+    target: str  # ``instance.variable`` of an input
     factor: float = 1.0
-    offset: float = 0.0
+    offset: float = 0.0  # in the target's unit
+    # resolution of the target's sensor in the target's unit; 0 for none. Sources that feed the same target are added
+    # before rounding
     quantum: float = 0.0
-    unit: str | None = None
+    unit: str | None = None  # unit that the source must have; ``None`` leaves it unchecked
 
 
 @dataclass(frozen=True, slots=True)
 class ClockConnection:
-    """An input clock that ticks in the instants in which an output clock is active.
+    """An input clock that ticks in the instants in which an output clock is active."""
 
-    Attributes:
-        source: ``instance.clock`` of an output clock.
-        target: ``instance.clock`` of a triggered input clock.
-    """
-
-    source: str
-    target: str
+    source: str  # ``instance.clock`` of an output clock
+    target: str  # ``instance.clock`` of a triggered input clock
 
 
 @dataclass(frozen=True, slots=True)
 class SignalSource:
-    """A signal that the master feeds into an input, added to what is connected to it.
+    """A signal that the master feeds into an input, added to what is connected to it."""
 
-    Attributes:
-        target: ``instance.variable`` of an input.
-        signal: its values over time.
-        unit: unit of the signal; ``None`` for the target's own.
-        at: ``start`` or ``end`` of a communication step: which instant's value an instance gets for the step. ``None``:
-            with a connection, the instant of the connected value; else ``end`` where an output is declared to
-            depend on the input at once (a sampled-data block), ``start`` elsewhere (an input that is held).
-    """
-
-    target: str
-    signal: Signal
-    unit: str | None = None
+    target: str  # ``instance.variable`` of an input
+    signal: Signal  # its values over time
+    unit: str | None = None  # unit of the signal; ``None`` for the target's own
+    # ``start`` or ``end`` of a communication step: which instant's value an instance gets for the step. ``None``: with
+    # a connection, the instant of the connected value; else ``end`` where an output is declared to depend on the input
+    # at once (a sampled-data block), ``start`` elsewhere (an input that is held)
     at: str | None = None
 
 
@@ -105,21 +79,13 @@ def split(address: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class System:
-    """Instances, connections, sources and, when it shall not be derived, the order of execution.
+    """Instances, connections, sources and, when it shall not be derived, the order of execution."""
 
-    Attributes:
-        instances: in the order in which ties of the execution order are broken.
-        connections: from outputs to inputs.
-        sources: signals fed into inputs.
-        order: instance names; empty to derive the order from direct feedthrough.
-        clock_connections: from output clocks to triggered input clocks.
-    """
-
-    instances: tuple[Instance, ...]
-    connections: tuple[Connection, ...] = ()
-    sources: tuple[SignalSource, ...] = ()
-    order: tuple[str, ...] = ()
-    clock_connections: tuple[ClockConnection, ...] = ()
+    instances: tuple[Instance, ...]  # in the order in which ties of the execution order are broken
+    connections: tuple[Connection, ...] = ()  # from outputs to inputs
+    sources: tuple[SignalSource, ...] = ()  # signals fed into inputs
+    order: tuple[str, ...] = ()  # instance names; empty to derive the order from direct feedthrough
+    clock_connections: tuple[ClockConnection, ...] = ()  # from output clocks to triggered input clocks
 
     def instance(self, name: str) -> Instance | None:
         """Return the instance called ``name``, if there is one."""

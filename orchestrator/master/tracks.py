@@ -14,21 +14,14 @@ class Track:
     """Signals over a window of two cells of equal length.
 
     A signal with derivatives is a cubic in each cell (Hermite), any other one parabola over both.
-
-    Attributes:
-        start: of the window [s].
-        end: of the window [s].
-        values: at begin, middle and end, shape (3, signals).
-        rates: derivatives there [1/s], shape (3, signals).
-        rated: which signals have derivatives, shape (signals,).
-        coefficients: of both cells, by powers of the passed share of the cell, shape (2, 4, signals).
     """
 
-    start: float
-    end: float
-    values: Array
-    rates: Array
-    rated: NDArray[np.bool_]
+    start: float  # of the window [s]
+    end: float  # of the window [s]
+    values: Array  # at begin, middle and end, shape (3, signals)
+    rates: Array  # derivatives there [1/s], shape (3, signals)
+    rated: NDArray[np.bool_]  # which signals have derivatives, shape (signals,)
+    # of both cells, by powers of the passed share of the cell, shape (2, 4, signals)
     coefficients: Array = field(init=False)
 
     def __post_init__(self) -> None:

@@ -20,37 +20,24 @@ Copy = tuple[View, View]
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One instance, ready to be stepped.
-
-    Attributes:
-        block: its part of the layout.
-        copies: ``(inputs, outputs)`` pairs of equal length: runs of neighbouring slots that are mere copies.
-        mixed: feeds that are more than a copy.
-        send: moves the input slots into the slave; those of clocks are not among them.
-        receive: moves the slave's outputs into its slots; likewise.
-        do_step: the slave's own.
-    """
+    """One instance, ready to be stepped."""
 
     slave: Slave
-    block: Block
+    block: Block  # its part of the layout
+    # ``(inputs, outputs)`` pairs of equal length: runs of neighbouring slots that are mere copies
     copies: tuple[Copy, ...]
-    mixed: tuple[Feed, ...]
-    send: Transfer
-    receive: Transfer
-    do_step: Callable[[float, float], None]
+    mixed: tuple[Feed, ...]  # feeds that are more than a copy
+    send: Transfer  # moves the input slots into the slave; those of clocks are not among them
+    receive: Transfer  # moves the slave's outputs into its slots; likewise
+    do_step: Callable[[float, float], None]  # the slave's own
 
 
 @dataclass(frozen=True)
 class Wiring:
-    """All stages in execution order over one array of slots.
+    """All stages in execution order over one array of slots."""
 
-    Attributes:
-        values: the slots, shape (size,).
-        view: the same memory, quicker to read one value from.
-    """
-
-    values: Signals
-    view: View
+    values: Signals  # the slots, shape (size,)
+    view: View  # the same memory, quicker to read one value from
     stages: tuple[Stage, ...]
     layout: Layout
 

@@ -44,35 +44,20 @@ SHIPPED = Path(__file__).parent / "data"
 
 
 class Calibration(msgspec.Struct, frozen=True):
-    """A calibrated map; every field is plain, so that it is stored as it is.
+    """A calibrated map; every field is plain, so that it is stored as it is."""
 
-    Attributes:
-        experiment: all values of the experiment, for the record.
-        digest: hash of experiment, sources and method.
-        version: of the project that made it.
-        smallest: smallest half-gap claimed [rad].
-        largest: largest half-gap claimed [rad].
-        log_sum: increasing values of log S.
-        log_alpha: log of the half-gap at each.
-        log_spread: standard deviation of log alpha_hat at each.
-        width: how many spreads the interval reaches to either side.
-        level: what the interval claims to cover.
-        runs: how many runs it was made from.
-        seed_branch: the branch of the seed tree that they came from.
-    """
-
-    experiment: dict[str, object]
-    digest: str
-    version: str
-    smallest: float
-    largest: float
-    log_sum: list[float]
-    log_alpha: list[float]
-    log_spread: list[float]
-    width: float
-    level: float
-    runs: int
-    seed_branch: int
+    experiment: dict[str, object]  # all values of the experiment, for the record
+    digest: str  # hash of experiment, sources and method
+    version: str  # of the project that made it
+    smallest: float  # smallest half-gap claimed [rad]
+    largest: float  # largest half-gap claimed [rad]
+    log_sum: list[float]  # increasing values of log S
+    log_alpha: list[float]  # log of the half-gap at each
+    log_spread: list[float]  # standard deviation of log alpha_hat at each
+    width: float  # how many spreads the interval reaches to either side
+    level: float  # what the interval claims to cover
+    runs: int  # how many runs it was made from
+    seed_branch: int  # the branch of the seed tree that they came from
     settings: MapSettings
 
 

@@ -32,9 +32,7 @@ class CompiledLoop:
     def run(self, alpha: float, errors: tuple[Array, Array]) -> Array:
         """Return the signals ``COLUMNS``, shape (steps + 1, 7), of a loop whose half-gap is ``alpha`` [rad].
 
-        Args:
-            alpha: half-gap [rad].
-            errors: errors [rad] of both encoders, each of shape (steps + 1,).
+        ``alpha``: half-gap [rad]; ``errors``: errors [rad] of both encoders, each of shape (steps + 1,).
         """
         e, S = self.experiment, self.estimator.S_inverse
         out = np.empty((len(self.reference), len(COLUMNS)))

@@ -46,10 +46,7 @@ def loop_system(
     """Return one loop for each of ``prefixes``, all on the same reference.
 
     Instances are called ``plant``, ``estimator`` and ``controller``, each after its loop's prefix. Without further
-    start values no loop has a gap.
-
-    Args:
-        prefixes: ``(MACHINE,)``, ``(TWIN,)`` or both.
+    start values no loop has a gap. ``prefixes``: ``(MACHINE,)``, ``(TWIN,)`` or both.
     """
     if values is None:
         values = loop_values(experiment)

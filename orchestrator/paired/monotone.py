@@ -15,15 +15,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class MonotoneCubic:
-    """Cubics between nodes, continued beyond the outer ones.
+    """Cubics between nodes, continued beyond the outer ones."""
 
-    Attributes:
-        nodes: shape (n,), increasing.
-        coefficients: shape (4, n - 1), of the cubic right of each node, highest power first.
-    """
-
-    nodes: Array
-    coefficients: Array
+    nodes: Array  # shape (n,), increasing
+    coefficients: Array  # shape (4, n - 1), of the cubic right of each node, highest power first
 
     def __call__(self, at: ArrayLike) -> Array:
         """Return the values at ``at``, of the same shape."""
@@ -48,9 +43,7 @@ class MonotoneCubic:
 def monotone_cubic(x: ArrayLike, y: ArrayLike) -> MonotoneCubic:
     """Return the cubics through all points that overshoot nowhere.
 
-    Args:
-        x: shape (n,), increasing, at least three.
-        y: shape (n,).
+    ``x``: shape (n,), increasing, at least three; ``y``: shape (n,).
     """
     nodes, values = np.array(x, dtype=np.float64), np.array(y, dtype=np.float64)
     width = np.diff(nodes)

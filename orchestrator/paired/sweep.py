@@ -38,25 +38,15 @@ OWN_PARAMETERS = frozenset({"alpha", "noise", "repetition"})
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """What a sweep varies.
+    """What a sweep varies."""
 
-    Attributes:
-        experiment: what all cases share; its encoder noise is replaced by each of ``noise``.
-        sizes: as ``read_sizes`` takes them.
-        noise: encoder noise levels [rad].
-        repetitions: runs of each size and noise level, each with noise of its own.
-        seed: of random sizes and of all noise.
-        vary: further parameters, ``NAME=SPECIFICATION`` as the engine reads them.
-        samples: draws of those that are random; not used with random sizes, which are drawn together with them.
-    """
-
-    experiment: Experiment
-    sizes: str = "random:20"
-    noise: tuple[float, ...] = (0.0,)
-    repetitions: int = 1
-    seed: int = 0
-    vary: tuple[str, ...] = ()
-    samples: int = 1
+    experiment: Experiment  # what all cases share; its encoder noise is replaced by each of ``noise``
+    sizes: str = "random:20"  # as ``read_sizes`` takes them
+    noise: tuple[float, ...] = (0.0,)  # encoder noise levels [rad]
+    repetitions: int = 1  # runs of each size and noise level, each with noise of its own
+    seed: int = 0  # of random sizes and of all noise
+    vary: tuple[str, ...] = ()  # further parameters, ``NAME=SPECIFICATION`` as the engine reads them
+    samples: int = 1  # draws of those that are random; not used with random sizes, which are drawn together with them
 
     def cases(self) -> DesignCases:
         """Return the cases, checked against the range that the experiment claims."""

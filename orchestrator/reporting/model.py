@@ -65,22 +65,17 @@ class Span:
 
 @dataclass(frozen=True)
 class Plot:
-    """A plot in which the reader can hover and zoom.
-
-    Attributes:
-        diagonal: draw the line y = x.
-        categories: names of x = 0, 1, 2, ... for an axis of named things.
-    """
+    """A plot in which the reader can hover and zoom."""
 
     title: str
     x_label: str
     y_label: str
     series: tuple[Series, ...]
     spans: tuple[Span, ...] = ()
-    diagonal: bool = False
+    diagonal: bool = False  # draw the line y = x
     log_x: bool = False
     log_y: bool = False
-    categories: tuple[str, ...] = ()
+    categories: tuple[str, ...] = ()  # names of x = 0, 1, 2, ... for an axis of named things
     note: str = ""
 
 
@@ -117,27 +112,17 @@ Section = Text | Facts | ReportTable | Plot | Findings | Fold
 
 @dataclass(frozen=True)
 class Report:
-    """A page.
+    """A page."""
 
-    Attributes:
-        title: the page's heading.
-        summary: the answer, in a sentence or two.
-        badge: the answer's colour and its word, such as ("good", "3 of 3 FMUs comply").
-        sections: in the order of the page.
-        origin: what was run and with what (command, version, seed, arguments).
-        angle_unit: in which angles are shown first: rad, deg, arcmin or turns.
-        downloads: files to hand on with the page; small ones are embedded, others linked beside it.
-        about: what the title says besides: the files that went in, the day, and who made it.
-    """
-
-    title: str
-    summary: str
-    sections: tuple[Section, ...]
-    badge: tuple[Badge, str] | None = None
-    origin: tuple[tuple[str, Cell], ...] = ()
+    title: str  # the page's heading
+    summary: str  # the answer, in a sentence or two
+    sections: tuple[Section, ...]  # in the order of the page
+    badge: tuple[Badge, str] | None = None  # the answer's colour and its word, such as ("good", "3 of 3 FMUs comply")
+    origin: tuple[tuple[str, Cell], ...] = ()  # what was run and with what (command, version, seed, arguments)
+    # files to hand on with the page; small ones are embedded, others linked beside it
     downloads: tuple[Path, ...] = field(default=())
-    angle_unit: str = "rad"
-    about: tuple[str, ...] = ()
+    angle_unit: str = "rad"  # in which angles are shown first: rad, deg, arcmin or turns
+    about: tuple[str, ...] = ()  # what the title says besides: the files that went in, the day, and who made it
 
     def all_sections(self) -> Iterator[Section]:
         """Yield the sections in the order of the page, those of folds in their place."""

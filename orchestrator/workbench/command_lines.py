@@ -58,17 +58,12 @@ def _is_effect(value: Any) -> bool:
 
 @dataclass(frozen=True)
 class CommandForm:
-    """A command as pages may ask for it.
+    """A command as pages may ask for it."""
 
-    Attributes:
-        inputs: least and most number of files.
-        options: how the value of each option becomes text; an empty text is an option without a value.
-        words: that stand behind the command's name.
-    """
-
-    inputs: tuple[int, int]
+    inputs: tuple[int, int]  # least and most number of files
+    # how the value of each option becomes text; an empty text is an option without a value
     options: Mapping[str, Reader] = field(default_factory=dict)
-    words: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()  # that stand behind the command's name
 
 
 _READING: dict[str, Reader] = {

@@ -83,10 +83,7 @@ class SliderModel:
         return {"kind": self._kind, "sliders": sliders, "time": plain_numbers(self._time, 9), "measured": measured}
 
     def run(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Simulate with these values.
-
-        Args:
-            values: of sliders; the others stay as in the result.
+        """Simulate with these values. ``values``: of sliders; the others stay as in the result.
 
         Returns:
             ``curves`` by encoder [rad] and the ``seconds`` that the run took.

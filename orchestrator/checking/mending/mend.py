@@ -28,15 +28,10 @@ _GUID = "resources/guid.txt"  # with which the launcher compares what a host han
 
 @dataclass(frozen=True)
 class Repair:
-    """What became of one FMU.
+    """What became of one FMU."""
 
-    Attributes:
-        done: what was mended, a line each; empty: nothing, and no file was written.
-        left: what could not be mended, and why.
-    """
-
-    done: tuple[str, ...]
-    left: tuple[str, ...]
+    done: tuple[str, ...]  # what was mended, a line each; empty: nothing, and no file was written
+    left: tuple[str, ...]  # what could not be mended, and why
 
 
 def mend_fmu(path: Path, target: Path, limits: ArchiveLimits | None = None) -> Repair:

@@ -18,9 +18,7 @@ def mend_structure(root: etree._Element, findings: Iterable[Finding]) -> list[st
     """Write the lists of outputs and initial unknowns anew where a finding says that they are wrong.
 
     Entries that are right keep their dependencies; a new entry has none, which means that it depends on everything.
-
-    Args:
-        root: of modelDescription.xml; it is changed.
+    ``root``: of modelDescription.xml; it is changed.
     """
     if root.find("ModelStructure") is None or not any(finding.rule in _LISTS for finding in findings):
         return []

@@ -19,25 +19,15 @@ step.discarded | W | 4.2.2 | 4.2.1 | steps of the size that is asked for are don
 
 @dataclass(frozen=True)
 class Habits:
-    """How an importer goes about what the standard leaves to it; what comes out must not depend on that.
+    """How an importer goes about what the standard leaves to it; what comes out must not depend on that."""
 
-    Attributes:
-        quiet: logging is switched off before the run.
-        alone: variables are set and read one by one, set in reverse order and read twice.
-        idle: event mode is entered after each step, without a cause.
-        again: the discrete states are updated once more than the FMU asks for.
-        completes: completed steps of the integrator are told.
-        judges_first: event indicators are read before the derivatives.
-        threads: each partition is activated in a thread of its own, as tasks of an operating system are.
-    """
-
-    quiet: bool = False
-    alone: bool = False
-    idle: bool = False
-    again: bool = False
-    completes: bool = True
-    judges_first: bool = False
-    threads: bool = False
+    quiet: bool = False  # logging is switched off before the run
+    alone: bool = False  # variables are set and read one by one, set in reverse order and read twice
+    idle: bool = False  # event mode is entered after each step, without a cause
+    again: bool = False  # the discrete states are updated once more than the FMU asks for
+    completes: bool = True  # completed steps of the integrator are told
+    judges_first: bool = False  # event indicators are read before the derivatives
+    threads: bool = False  # each partition is activated in a thread of its own, as tasks of an operating system are
 
 
 Report = Callable[..., None]

@@ -21,19 +21,12 @@ _MOST = 1.0 / 3.0  # of the points: after an event the two may differ for a whil
 
 @dataclass(frozen=True)
 class InterfaceRun:
-    """The runs of one interface.
+    """The runs of one interface."""
 
-    Attributes:
-        job: as it was after the probes.
-        quiet: what the outputs are in a run with inputs at their start values, [step][value].
-        driven: likewise in the driven run; empty where it cannot be repeated.
-        movement: what that run changes.
-    """
-
-    job: ProbeJob
-    quiet: list[list[Any]]
-    driven: list[list[Any]]
-    movement: Movement
+    job: ProbeJob  # as it was after the probes
+    quiet: list[list[Any]]  # what the outputs are in a run with inputs at their start values, [step][value]
+    driven: list[list[Any]]  # likewise in the driven run; empty where it cannot be repeated
+    movement: Movement  # what that run changes
 
 
 def compare_interfaces(a: InterfaceRun, b: InterfaceRun, report: Callable[..., None]) -> str:

@@ -33,18 +33,13 @@ class ProbedClock:
 
 @dataclass(frozen=True)
 class ProbedUnknown:
-    """An entry of ModelStructure.
+    """An entry of ModelStructure."""
 
-    Attributes:
-        section: "output", "rate", "indicator" or "initial".
-        knowns: the variables that it depends on as the description says; None where it depends on all.
-        kinds: how it depends on each of them; empty where that is not said.
-    """
-
-    section: str
+    section: str  # "output", "rate", "indicator" or "initial"
     variable: ProbedVariable
+    # the variables that it depends on as the description says; None where it depends on all
     knowns: tuple[ProbedVariable, ...] | None
-    kinds: tuple[str, ...]
+    kinds: tuple[str, ...]  # how it depends on each of them; empty where that is not said
 
 
 @dataclass(frozen=True)

@@ -32,12 +32,9 @@ _JUMP = 1e-6  # of the size of a state: less is what a solver or a projection ma
 
 
 class ModelExchange(EventDriver):
-    """Model exchange of FMI 2.0 and 3.0.
+    """Model exchange of FMI 2.0 and 3.0."""
 
-    Attributes:
-        watched: discrete variables that are to be looked at between events, with the states; None in most runs.
-    """
-
+    # discrete variables that are to be looked at between events, with the states; None in most runs
     watched: Sequence[ProbedVariable] | None = None
     leave = "EnterContinuousTimeMode"
 

@@ -22,17 +22,12 @@ Values = tuple[Any, ...]
 
 @dataclass(frozen=True)
 class Movement:
-    """What a driven run changes.
+    """What a driven run changes."""
 
-    Attributes:
-        values: of parameters and start values, which are set before the run.
-        inputs: that move in the run.
-        share: of their usual size by which continuous inputs move.
-    """
-
+    # of parameters and start values, which are set before the run
     values: Mapping[ProbedVariable, Values] = field(default_factory=dict)
-    inputs: tuple[ProbedVariable, ...] = ()
-    share: float = 1.0
+    inputs: tuple[ProbedVariable, ...] = ()  # that move in the run
+    share: float = 1.0  # of their usual size by which continuous inputs move
 
     def of_type(self, base: str, inputs: bool) -> list[ProbedVariable]:
         """The variables of a type that are set, inputs or all others."""

@@ -21,16 +21,11 @@ _PUSH = (0.5, -0.9, 1.3)
 
 @dataclass(frozen=True)
 class RestPoint:
-    """A driven run that rests at a communication point; in model exchange the states are pushed off their path.
-
-    Attributes:
-        number: of the point, from 0.
-        time: [s].
-    """
+    """A driven run that rests at a communication point; in model exchange the states are pushed off their path."""
 
     driver: Driver
-    number: int
-    time: float
+    number: int  # of the point, from 0
+    time: float  # [s]
 
     @property
     def states(self) -> tuple[ProbedVariable, ...]:

@@ -62,35 +62,25 @@ Rows = list[list[Any]] | None
 
 @dataclass
 class Context:
-    """What the probes share.
-
-    Attributes:
-        report: called with rule, message, path and the time of the first one in words (``when``).
-        trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
-            cannot be repeated, so that nothing can be compared with it.
-        plain: the same with parameters and start values as in the file, likewise.
-        tunable: whether tunable parameters can be set at communication points, as far as is known.
-        single: whether a second instance is known not to work.
-        quiet: what was watched after each step of the life cycle, [step][value].
-        resets: whether a reset has worked so far.
-        remarked: rules of warnings that have been reported.
-        notes: messages of a run after logging was switched off, and the first; None where that was refused.
-        far: movement, driven and plain run farther from the values of the file, where the ones in use are near them.
-        heard: names of variables that something has reacted to there.
-    """
+    """What the probes share."""
 
     bench: Bench
-    report: Callable[..., None]
+    report: Callable[..., None]  # called with rule, message, path and the time of the first one in words (``when``)
+    # outputs of the undisturbed run, [step][output], once there is one; None again when the run cannot be repeated, so
+    # that nothing can be compared with it
     trace: list[list[Any]] | None = None
-    plain: list[list[Any]] | None = None
-    single: bool = False
-    tunable: bool = True
+    plain: list[list[Any]] | None = None  # the same with parameters and start values as in the file, likewise
+    single: bool = False  # whether a second instance is known not to work
+    tunable: bool = True  # whether tunable parameters can be set at communication points, as far as is known
+    # what was watched after each step of the life cycle, [step][value]
     quiet: list[list[Any]] = field(default_factory=list)
-    resets: bool = True
-    remarked: set[str] = field(default_factory=set)
+    resets: bool = True  # whether a reset has worked so far
+    remarked: set[str] = field(default_factory=set)  # rules of warnings that have been reported
+    # messages of a run after logging was switched off, and the first; None where that was refused
     notes: tuple[int, str] | None = None
+    # movement, driven and plain run farther from the values of the file, where the ones in use are near them
     far: tuple[Movement, Rows, Rows] | None = None
-    heard: frozenset[str] = frozenset()
+    heard: frozenset[str] = frozenset()  # names of variables that something has reacted to there
     _watched: WatchedRun | None = None
 
     @property

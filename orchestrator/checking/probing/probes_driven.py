@@ -69,10 +69,8 @@ def inputs(context: Context) -> None:
 def _shorten(context: Context, plain: float, driven: float) -> None:
     """Let runs have fewer steps where those away from the values of the file cost the FMU far more time.
 
-    Then there is time for the runs near these values alone, where there are two kinds.
-
-    Args:
-        plain, driven: what a run from the values of the file and the driven run took [s].
+    Then there is time for the runs near these values alone, where there are two kinds. ``plain, driven``: what a run
+    from the values of the file and the driven run took [s].
     """
     bench, job = context.bench, context.bench.job
     allowed = max(_DEAR * plain, _CHEAP)

@@ -31,16 +31,11 @@ Call = tuple[str, list[Any]]
 
 @dataclass(frozen=True)
 class PromisedCall:
-    """What is promised.
+    """What is promised."""
 
-    Attributes:
-        word: the flag or the list of the description.
-        moment: "new", "initialisation", "event" or "run".
-        calls: the calls that must be accepted then, for a job; none where nothing is promised.
-    """
-
-    word: str
-    moment: str
+    word: str  # the flag or the list of the description
+    moment: str  # "new", "initialisation", "event" or "run"
+    # the calls that must be accepted then, for a job; none where nothing is promised
     calls: Callable[[ProbeJob], list[Call]]
 
 

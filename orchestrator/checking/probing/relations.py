@@ -42,19 +42,12 @@ _FEW_STEPS = 5
 
 @dataclass(frozen=True)
 class Variation:
-    """A habit that must change nothing.
+    """A habit that must change nothing."""
 
-    Attributes:
-        habits: the usual ones but for one.
-        rule: that is broken where the run is another one.
-        wanted: what must hold, in words.
-        applies: whether an interface has to do with it.
-    """
-
-    habits: Habits
-    rule: str
-    wanted: str
-    applies: Callable[[ProbeJob], bool]
+    habits: Habits  # the usual ones but for one
+    rule: str  # that is broken where the run is another one
+    wanted: str  # what must hold, in words
+    applies: Callable[[ProbeJob], bool]  # whether an interface has to do with it
 
 
 def _exchanges(job: ProbeJob) -> bool:

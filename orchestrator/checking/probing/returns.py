@@ -132,19 +132,12 @@ def _run(share: float, ended: bool = False) -> Way:
 
 @dataclass(frozen=True)
 class Reset:
-    """A reset, which leads back to the first point.
+    """A reset, which leads back to the first point."""
 
-    Attributes:
-        what: an instance that it is done to, in words.
-        go: how a new instance gets there.
-        share: of the run that follows; it is a short one after an early reset.
-        early: whether no run has begun; an FMU that breaks on it can still be looked at otherwise.
-    """
-
-    what: str
-    go: Way
-    share: float = 1.0
-    early: bool = False
+    what: str  # an instance that it is done to, in words
+    go: Way  # how a new instance gets there
+    share: float = 1.0  # of the run that follows; it is a short one after an early reset
+    early: bool = False  # whether no run has begun; an FMU that breaks on it can still be looked at otherwise
 
 
 RESETS = (

@@ -161,9 +161,7 @@ class Bench:
     ) -> list[list[Any]]:
         """Do the steps ``first`` to ``last`` and return the outputs after each one, [step][value].
 
-        Args:
-            first: first step, from 0.
-            read: whether the outputs are read; otherwise nothing is returned.
+        ``first``: first step, from 0. ``read``: whether the outputs are read; otherwise nothing is returned.
         """
         outputs = self.job.outputs()
         rows = []
@@ -181,11 +179,8 @@ class Bench:
 def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0, share: float = 1.0) -> list[float]:
     """A sine of nearly two periods over the run beside each start value, a tenth of the nominal value high.
 
-    It is beside the start value so that what integrates an input is not back where it began at any time.
-
-    Args:
-        duration: of the run [s].
-        share: of the usual height.
+    It is beside the start value so that what integrates an input is not back where it began at any time. ``duration``:
+    of the run [s]; ``share``: of the usual height.
     """
     low, high = v.limits
     wave = share * (0.4 + math.sin(3.7 * math.pi * t / duration + phase + 0.3))
@@ -204,15 +199,10 @@ def same(a: Any, b: Any) -> bool:
 
 @dataclass(frozen=True)
 class Difference:
-    """How two runs differ.
+    """How two runs differ."""
 
-    Attributes:
-        text: where they first do, in words.
-        relative: the largest difference of a signal over the range of that signal.
-    """
-
-    text: str
-    relative: float
+    text: str  # where they first do, in words
+    relative: float  # the largest difference of a signal over the range of that signal
 
     def __str__(self) -> str:
         return self.text

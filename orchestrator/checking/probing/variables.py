@@ -12,37 +12,26 @@ _SINGLE = 1e-6
 
 @dataclass(frozen=True)
 class ProbedVariable:
-    """A variable as the model description has it.
-
-    Attributes:
-        base: suffix of the functions that access it, such as "Real" or "Int32".
-        size: number of its values at the initial dimensions.
-        start: its values at the start, None when the description has none.
-        clocks: value references of its clocks; it is accessed while one of them ticks.
-        intermediate: whether it can be accessed in intermediate updates.
-        extents: its dimensions: a size, or minus one less the value reference of the parameter that has it.
-        items: the values of an enumeration; empty for other types.
-        most_bytes: of a binary, None where the description does not say.
-        has_format: whether a binary has a type that says what its bytes mean.
-    """
+    """A variable as the model description has it."""
 
     name: str
     reference: int
-    base: str
+    base: str  # suffix of the functions that access it, such as "Real" or "Int32"
     causality: str
     variability: str
     initial: str | None
-    start: tuple[Any, ...] | None
+    start: tuple[Any, ...] | None  # its values at the start, None when the description has none
     minimum: float | None
     maximum: float | None
     nominal: float | None
-    size: int = 1
-    clocks: tuple[int, ...] = ()
-    intermediate: bool = False
+    size: int = 1  # number of its values at the initial dimensions
+    clocks: tuple[int, ...] = ()  # value references of its clocks; it is accessed while one of them ticks
+    intermediate: bool = False  # whether it can be accessed in intermediate updates
+    # its dimensions: a size, or minus one less the value reference of the parameter that has it
     extents: tuple[int, ...] = ()
-    items: tuple[int, ...] = ()
-    most_bytes: int | None = None
-    has_format: bool = False
+    items: tuple[int, ...] = ()  # the values of an enumeration; empty for other types
+    most_bytes: int | None = None  # of a binary, None where the description does not say
+    has_format: bool = False  # whether a binary has a type that says what its bytes mean
 
     def resize(self, sizes: Mapping[int, int]) -> "ProbedVariable":
         """The variable after structural parameters have changed."""

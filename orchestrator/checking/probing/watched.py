@@ -18,21 +18,14 @@ _MOST_DISCRETE = 200
 
 @dataclass(frozen=True)
 class WatchedRun:
-    """What was seen.
+    """What was seen."""
 
-    Attributes:
-        variables: outputs, the time, values of narrow types, states with their derivatives; aliases once.
-        initial: their values in initialisation mode; empty where they are not read there.
-        rows: their values after each step, [step][value].
-        reached: lastSuccessfulTime of each step [s]; None: the interface has none.
-        notes: how many messages there were that are neither warnings nor errors, and the first of them.
-    """
-
+    # outputs, the time, values of narrow types, states with their derivatives; aliases once
     variables: tuple[ProbedVariable, ...]
-    initial: list[Any]
-    rows: list[list[Any]]
-    reached: list[float | None]
-    notes: tuple[int, str]
+    initial: list[Any]  # their values in initialisation mode; empty where they are not read there
+    rows: list[list[Any]]  # their values after each step, [step][value]
+    reached: list[float | None]  # lastSuccessfulTime of each step [s]; None: the interface has none
+    notes: tuple[int, str]  # how many messages there were that are neither warnings nor errors, and the first of them
 
     def values_of(self, v: ProbedVariable) -> list[Any]:
         """The first value of a variable after each step; none where it was not read."""

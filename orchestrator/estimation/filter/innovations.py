@@ -22,19 +22,12 @@ KERNELS = {1: Kernels(f"{ROOM}.kernel"), 2: Kernels(f"{ROOM}.kernel[{ROOM}.two_s
 
 @dataclass(frozen=True)
 class Innovations:
-    """Result of a filter run.
+    """Result of a filter run."""
 
-    Attributes:
-        errors: (rows, outputs) measured minus predicted [rad].
-        variances: (rows, outputs) what the filter expects of their squares.
-        states: (rows, n) state after the measurement, empty unless asked for.
-        contacts: (rows, stages) flank after the measurement, empty unless asked for.
-    """
-
-    errors: Array
-    variances: Array
-    states: Array
-    contacts: NDArray[np.int64]
+    errors: Array  # (rows, outputs) measured minus predicted [rad]
+    variances: Array  # (rows, outputs) what the filter expects of their squares
+    states: Array  # (rows, n) state after the measurement, empty unless asked for
+    contacts: NDArray[np.int64]  # (rows, stages) flank after the measurement, empty unless asked for
 
     @property
     def deviance(self) -> float:
@@ -91,9 +84,7 @@ def count_traversals(flanks: NDArray[Any]) -> int:
 def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:
     """Return the states (rows, n) of the plant that is fed ``u`` (rows,) from ``x0`` (n,), without any measurement.
 
-    Args:
-        u: requested torque, held over a sample [N.m].
-        step: sample time [s].
+    ``u``: requested torque, held over a sample [N.m]; ``step``: sample time [s].
     """
     states = np.empty((u.size, x0.size))
     KERNELS[model.stages].run_free(*_arrays(model, step), step, u, model.dry, x0, states)

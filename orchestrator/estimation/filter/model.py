@@ -14,27 +14,16 @@ FADING = 1e-3  # rad, half-gap below which the depth of a contact fades: without
 
 @dataclass(frozen=True)
 class AffineModel:
-    """A plant in its smooth modes; an index of modes has a digit for each stage, 0 to 4; see :mod:`.motion`.
+    """A plant in its smooth modes; an index of modes has a digit for each stage, 0 to 4; see :mod:`.motion`."""
 
-    Attributes:
-        matrices: (modes, n, n) A, 1/s.
-        inputs: (3, n) effect of the requested torque, and of torques on motor and load.
-        constants: (modes, n) effect of offsets and constant torques.
-        normals: (stages, n) twist = normal . x.
-        halves: (stages,) half-gaps [rad].
-        depths: (stages,) of a contact, at which its damping sets in [rad].
-        mobility: (bodies,) what a torque at a body does to its speed, 1/inertia.
-        dry: (2, 2) dry friction of motor and load [N.m], and the speed at which it has set in [rad/s].
-    """
-
-    matrices: Array
-    inputs: Array
-    constants: Array
-    normals: Array
-    halves: Array
-    depths: Array
-    mobility: Array
-    dry: Array
+    matrices: Array  # (modes, n, n) A, 1/s
+    inputs: Array  # (3, n) effect of the requested torque, and of torques on motor and load
+    constants: Array  # (modes, n) effect of offsets and constant torques
+    normals: Array  # (stages, n) twist = normal . x
+    halves: Array  # (stages,) half-gaps [rad]
+    depths: Array  # (stages,) of a contact, at which its damping sets in [rad]
+    mobility: Array  # (bodies,) what a torque at a body does to its speed, 1/inertia
+    dry: Array  # (2, 2) dry friction of motor and load [N.m], and the speed at which it has set in [rad/s]
 
     @property
     def stages(self) -> int:

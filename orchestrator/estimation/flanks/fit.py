@@ -26,27 +26,18 @@ STARTS = (0.3, 0.6, 1.0, 1.5)  # half-gaps tried, in standard deviations of the 
 
 @dataclass(frozen=True)
 class FlankFit:
-    """A maximum of the likelihood.
+    """A maximum of the likelihood."""
 
-    Attributes:
-        values: (k,) offset [rad], slope of the load's angle over the motor's, slope times lateness beyond ``base`` [s],
-            half-gap [rad], then amplitudes of the eccentricities [rad].
-        variance: of the points' noise [rad^2].
-        change: (3, 3) probabilities of the next state.
-        share: (n, 3) probability of each state at each point.
-        base: lateness at which the motor's angle is taken [s].
-        covariance: (k, k) of ``values`` if the points' noise were white, the prior of the lateness included.
-        converged: whether the likelihood had come to rest.
-    """
-
+    # (k,) offset [rad], slope of the load's angle over the motor's, slope times lateness beyond ``base`` [s], half-gap
+    # [rad], then amplitudes of the eccentricities [rad]
     values: Array
-    variance: float
-    change: Array
-    share: Array
+    variance: float  # of the points' noise [rad^2]
+    change: Array  # (3, 3) probabilities of the next state
+    share: Array  # (n, 3) probability of each state at each point
     loglik: float
-    base: float
-    covariance: Array
-    converged: bool
+    base: float  # lateness at which the motor's angle is taken [s]
+    covariance: Array  # (k, k) of ``values`` if the points' noise were white, the prior of the lateness included
+    converged: bool  # whether the likelihood had come to rest
 
     @property
     def alpha(self) -> float:
@@ -124,9 +115,7 @@ class FlankProblem:
     def _regress(self, fit: FlankFit, flank: Array, weight: Array) -> FlankFit:
         """Return the fit after weighted least squares with the flanks held.
 
-        Args:
-            flank: (n,) expected flank.
-            weight: (n,) of each point, over its variance in units of that of an edge.
+        ``flank``: (n,) expected flank; ``weight``: (n,) of each point, over its variance in units of that of an edge.
         """
         table = self._table(fit.base).copy()
         table[:, ALPHA] = -flank

@@ -20,16 +20,11 @@ class Angle:
 
     A rounded angle is known to half a count; at the moment at which the count changes it is known much better. An
     encoder that is not rounded changes in every row, and the line then goes through the middle of each two rows.
-
-    Attributes:
-        time: (n,) moments of the edges [s].
-        angle: (n,) there [rad].
-        count: step that the values are rounded to [rad]; 0.0: none.
     """
 
-    time: Array
-    angle: Array
-    count: float
+    time: Array  # (n,) moments of the edges [s]
+    angle: Array  # (n,) there [rad]
+    count: float  # step that the values are rounded to [rad]; 0.0: none
 
     def at(self, time: Array) -> Array:
         """Return the angle [rad] at some times (m,) [s], by a local cubic between the edges."""
@@ -44,23 +39,14 @@ class Angle:
 
 @dataclass(frozen=True)
 class Points:
-    """Moments at which the load's angle is known, and the motor's angle as a function of time.
+    """Moments at which the load's angle is known, and the motor's angle as a function of time."""
 
-    Attributes:
-        time: (n,) [s], rising.
-        load: (n,) the load's angle [rad].
-        variance: (n,) of it beyond what all points have, from rounding at rest [rad^2].
-        motor: the motor's angle.
-        count: of the load's encoder [rad]; 0.0: it is not rounded.
-        step: sample time [s].
-    """
-
-    time: Array
-    load: Array
-    variance: Array
-    motor: Angle
-    count: float
-    step: float
+    time: Array  # (n,) [s], rising
+    load: Array  # (n,) the load's angle [rad]
+    variance: Array  # (n,) of it beyond what all points have, from rounding at rest [rad^2]
+    motor: Angle  # the motor's angle
+    count: float  # of the load's encoder [rad]; 0.0: it is not rounded
+    step: float  # sample time [s]
 
 
 def points_of(record: Record, latest: float, most: int) -> Points:

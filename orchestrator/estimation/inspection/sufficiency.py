@@ -32,26 +32,18 @@ HELD = 0.01  # share of the time in which the shaft's torque may have the other 
 
 @dataclass(frozen=True)
 class Sufficiency:
-    """What a record shows of gaps.
+    """What a record shows of gaps."""
 
-    Attributes:
-        bounds: for each of ``SIZES`` that was tried, the bound on the standard error [rad]; infinite where the record
-            would not traverse the gap often enough. Empty where no size can be seen.
-        smallest: smallest half-gap that is seen [rad], or infinity.
-        rows: how many rows of the record the bounds are of.
-        better: excitations of the same length and limits, the best first; with their bounds for ``design_size``.
-        own: the bound of the record itself for ``design_size`` [rad].
-        design_size: half-gap [rad].
-        why: sentence on why no size can be seen, whatever the bounds; empty where one may be.
-    """
-
+    # for each of ``SIZES`` that was tried, the bound on the standard error [rad]; infinite where the record would not
+    # traverse the gap often enough. Empty where no size can be seen
     bounds: Sequence[tuple[float, float]]
-    smallest: float
-    rows: int
+    smallest: float  # smallest half-gap that is seen [rad], or infinity
+    rows: int  # how many rows of the record the bounds are of
+    # excitations of the same length and limits, the best first; with their bounds for ``design_size``
     better: Sequence[Excitation]
-    own: float
-    design_size: float
-    why: str = ""
+    own: float  # the bound of the record itself for ``design_size`` [rad]
+    design_size: float  # half-gap [rad]
+    why: str = ""  # sentence on why no size can be seen, whatever the bounds; empty where one may be
 
     def ranges(self) -> list[tuple[float, float]]:
         """Return the smallest and the largest size of each run of sizes that are seen [rad]."""

@@ -36,17 +36,13 @@ Report = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class StageFits:
-    """The best fit under each answer; ``free`` is at least as good as all others.
-
-    Attributes:
-        shared: every optimum with a gap in both stages that was found.
-    """
+    """The best fit under each answer; ``free`` is at least as good as all others."""
 
     first: Fit
     second: Fit
     both: Fit
     free: Fit
-    shared: tuple[Fit, ...]
+    shared: tuple[Fit, ...]  # every optimum with a gap in both stages that was found
 
 
 def fit_stages(likelihood: Likelihood, settings: StageSettings, report: Report) -> StageFits:

@@ -42,32 +42,20 @@ class StageGap:
 
 @dataclass(frozen=True)
 class Location:
-    """Where the gap of a train is.
+    """Where the gap of a train is."""
 
-    Attributes:
-        answers: what the record leaves possible, of "1", "2" and "both"; none where it shows no gap.
-        total: both half-gaps, seen from the load.
-        stages: half-gap of each stage, at its gear's output.
-        behind: by how much log-likelihood the best fit of each answer falls behind the best of all.
-        converged: whether the free fit did.
-        explained: whether the torque noise of the free fit is as little as that of a right model, and its size one that
-            is looked for.
-        traversals: changes of flank of either stage.
-        autocorrelation: of the one-step errors of motor and load encoder.
-        parameters: value, standard error and nominal of each fitted unknown.
-        curves: arrays for the plots, by name.
-    """
-
-    answers: tuple[str, ...]
-    total: StageGap
-    stages: tuple[StageGap, StageGap]
-    behind: dict[str, float]
-    converged: bool
+    answers: tuple[str, ...]  # what the record leaves possible, of "1", "2" and "both"; none where it shows no gap
+    total: StageGap  # both half-gaps, seen from the load
+    stages: tuple[StageGap, StageGap]  # half-gap of each stage, at its gear's output
+    behind: dict[str, float]  # by how much log-likelihood the best fit of each answer falls behind the best of all
+    converged: bool  # whether the free fit did
+    # whether the torque noise of the free fit is as little as that of a right model, and its size one that is looked
+    # for
     explained: bool
-    traversals: int
-    autocorrelation: tuple[float, float]
-    parameters: dict[str, dict[str, float]]
-    curves: dict[str, Array] = field(repr=False)
+    traversals: int  # changes of flank of either stage
+    autocorrelation: tuple[float, float]  # of the one-step errors of motor and load encoder
+    parameters: dict[str, dict[str, float]]  # value, standard error and nominal of each fitted unknown
+    curves: dict[str, Array] = field(repr=False)  # arrays for the plots, by name
 
     @property
     def answer(self) -> str:

@@ -42,16 +42,12 @@ SPEED_DEVIATIONS = (3.0, 1.0)  # rad/s of motor and load at the first row
 
 @dataclass(frozen=True)
 class StagesProblem(GapProblem):
-    """What is unknown about a record of a train of two stages; ``units`` are its drive's rms torque at each body [N.m].
-
-    Attributes:
-        lines: angle and speed of motor and load at the first row.
-    """
+    """What is unknown about a record of a train of two stages; ``units``: the drive's rms torque at each body [N.m]."""
 
     row: ClassVar[BodyNames] = TRAIN
     gap: ClassVar[str] = TOTAL
     difference: ClassVar[float] = 0.3  # long, since contacts come and go
-    lines: tuple[float, float, float, float]
+    lines: tuple[float, float, float, float]  # angle and speed of motor and load at the first row
 
     def parameters(self, values: Mapping[str, float]) -> Mapping[str, float]:
         """Return all parameters of the train by name, of the values of the unknowns."""

@@ -78,9 +78,7 @@ def _words(column: str, signal: str) -> str:
 def out_of_contact(time: Array, contact: Array) -> tuple[Span, ...]:
     """Return the spans of time in which ``contact`` is zero: the teeth do not touch. At most ``MOST_SPANS``.
 
-    Args:
-        time: (n,) [s]; NaN: unknown.
-        contact: (n,) flank of each sample, 0 inside the gap.
+    ``time``: (n,) [s]; NaN: unknown. ``contact``: (n,) flank of each sample, 0 inside the gap.
 
     Returns:
         Begin and end of each span [s].
