@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.control.machine import Machine
 from orchestrator.fmi.instances import fmu_instance
@@ -16,8 +15,7 @@ from orchestrator.master.signals import Noise, Samples
 from orchestrator.master.system import Connection, SignalSource, System
 from orchestrator.plants.design import DrivetrainValues, design_regulator, five_state_model
 from orchestrator.scenarios.definition import Scenario
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 LQR, SHIFTED, COMPENSATOR = "LQR", "shifted LQR", "compensator"
 FMUS = ("Drivetrain", "BacklashEstimator", "BacklashCompensator")

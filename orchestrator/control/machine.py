@@ -5,17 +5,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ScenarioError
 from orchestrator.plants.design import DrivetrainValues
 from orchestrator.records.model_file import Model, ModelParameter
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.normal import NORMAL_95
 from pyfmu_sources.controllers.backlash_compensator import Tuning, crossing_time
 from pyfmu_sources.controllers.state_prediction import MOST_LATE, Train
 from pyfmu_sources.laws.parameter_rows import BIG
-
-Array = NDArray[np.float64]
 
 LINEAR = ("J_m", "J_l", "k", "c", "b_m", "b_l", "i", "tau")
 OFFSET = 0.005  # standard deviation of the twist in mid-gap over the half-gap: the zeros are those of the record

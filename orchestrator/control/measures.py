@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.control.loops import REST, ControlTask
 from orchestrator.master.result import Recording
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.controllers.gap_traversal import Traversal, plan, point_at
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

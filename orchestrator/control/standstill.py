@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.errors import ScenarioError
 from orchestrator.plants.design import DrivetrainValues, LinearModel, five_state_model, rank_report, six_state_model
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.results.regulator import ForecastFound
-
-Array = NDArray[np.float64]
 
 LONGEST_PART = 2.5e-4  # of a sample, within which a contact is taken to last or not to [s]
 LONGEST = 240.0  # that a start is followed [s]

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.records import TestData
 from orchestrator.diagnosis.model.interface import ModelPoint
@@ -14,9 +13,9 @@ from orchestrator.diagnosis.selection.outcome import Dependence, EffectEvidence,
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.trust import Trust
 
-Array = NDArray[np.float64]
 NOTABLE = 3.0  # times the noise: a misfit of free runs that an engineer sees
 
 

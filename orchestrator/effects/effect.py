@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.laws.parameter_rows import Parameter
 
-Array = NDArray[np.float64]
 Starts = Mapping[str, tuple[float, ...]]
 Bounds = Mapping[str, tuple[float, float]]
 DRIVETRAIN, AXIS = "Drivetrain", "ServoAxis"  # plants

@@ -5,13 +5,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.effects import of_bodies
 from orchestrator.effects.effect import Bounds, Effect, PlaceScales, Starts
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.laws import body as laws
 
-Array = NDArray[np.float64]
 Values = tuple[float, ...]
 INPUT, OUTPUT, PORT, PARAMETER, CUT = "input", "output", "port", "parameter", "cut"
 ONCE_A_TURN = 0.03  # of a turn by which a ripple must differ from gravity, which comes once a turn

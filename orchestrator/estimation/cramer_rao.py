@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.joint import JointLikelihood
 from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.problem import ALPHA, OFFSET, STATE_NAMES, GapProblem, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 
 MODEST_TORQUE_NOISE = 1e-2  # N.m.s^0.5, where no fit has told
 NOISE_PREFIXES = ("log_noise_", "log_torque_")

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from orchestrator.estimation.filter.innovations import count_traversals
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.likelihood import Fit
 from orchestrator.estimation.problem import DRY, LEAST_TORQUE_NOISE, OFFSET
@@ -15,6 +14,7 @@ from orchestrator.estimation.profile import Profile, profile
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import GapVerdictSettings
 from orchestrator.estimation.torque_reading import torque_words
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.normal import NORMAL_95
 
 

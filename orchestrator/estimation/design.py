@@ -19,10 +19,11 @@ import numpy as np
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.filter.innovations import simulate
-from orchestrator.estimation.filter.model import AffineModel, Array, affine_model
+from orchestrator.estimation.filter.model import AffineModel, affine_model
 from orchestrator.estimation.problem import ALPHA, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import MINIMUM_ROWS, Record
+from orchestrator.shared.arrays import Array
 
 TORQUE_NOISE = 1e-2  # N.m.s^0.5
 DEFAULT_NOISE = (3.5e-4, 1.75e-4)  # rad

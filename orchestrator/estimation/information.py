@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import Array
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.inverse import pseudo_inverse
 
 

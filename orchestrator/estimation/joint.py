@@ -10,12 +10,12 @@ import numpy as np
 
 from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.filter.innovations import Innovations, count_traversals
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.problem import OFFSET, SAMPLED, SMOOTH, STATE_NAMES, GapProblem
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 
 OWN = (*STATE_NAMES, OFFSET, SAMPLED, SMOOTH)  # the unknowns that each record has for itself
 

@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from orchestrator.estimation.effort import Effort
 from orchestrator.estimation.filter.held_torque import delay, smooth_torque
 from orchestrator.estimation.filter.innovations import Innovations, innovations
-from orchestrator.estimation.filter.model import Array, NoiseLevels, affine_model
+from orchestrator.estimation.filter.model import NoiseLevels, affine_model
 from orchestrator.estimation.information import covariance_factor, inverse
 from orchestrator.estimation.problem import DRY, LATE, OFFSET, SAMPLED, SCALE, SMOOTH, TORQUE_OFFSET, GapProblem
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
+from orchestrator.shared.arrays import Array
 
 JUMP = 100.0
 START_DAMPING = 1e-6

@@ -7,10 +7,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import DEPTH, DRIVETRAIN, LOAD_TORQUE, Array, BodyNames, NoiseLevels
+from orchestrator.estimation.filter.model import DEPTH, DRIVETRAIN, LOAD_TORQUE, BodyNames, NoiseLevels
 from orchestrator.estimation.zeros import held_twist, play_of
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.noise import rms, rms_behind_lag, robust_noise
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
+from orchestrator.shared.arrays import Array
 
 MOST_PLACES = 30  # on one side, until the profile passes its level
 MOST_STARTS = 3  # of the fit anew, from a place of the profile that is better than it

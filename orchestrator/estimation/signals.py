@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.noise import robust_noise
 from orchestrator.shared.inference.normal import interval_95
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.normal import NORMAL_95
 from orchestrator.shared.output import write_columns
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ChildError, SlaveError
 from orchestrator.fmi.instances import make_slave
@@ -25,10 +24,10 @@ from orchestrator.master.protocol import (
     Value,
 )
 from orchestrator.master.result import MOST_REMARKS, RunRemark
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.isolation.jail import Answer, Jail
 from orchestrator.shared.isolation.limits import Limits
 
-Array = NDArray[np.float64]
 NOTHING = type(None)
 
 

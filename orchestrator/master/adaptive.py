@@ -25,7 +25,8 @@ from orchestrator.master.result import Statistics
 from orchestrator.master.rollback import rollback
 from orchestrator.master.signals import GRID_SLACK, Signal
 from orchestrator.master.tracks import JoinedTracks, Track
-from orchestrator.master.wiring import Array, Slots, Stage, gather
+from orchestrator.master.wiring import Slots, Stage, gather
+from orchestrator.shared.arrays import Array
 
 CUBIC_GAIN = 16.0
 """How much better cubics are between nodes over half the length."""

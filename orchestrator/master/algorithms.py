@@ -6,7 +6,8 @@ from typing import Any, Protocol
 
 from orchestrator.errors import ScenarioError
 from orchestrator.master.iterated import Iterated
-from orchestrator.master.wiring import Array, Slots, Wiring
+from orchestrator.master.wiring import Slots, Wiring
+from orchestrator.shared.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from orchestrator.master.protocol import NativeCalls, NativeTransfer
-from orchestrator.master.wiring import Array, Slots, Wiring
+from orchestrator.master.wiring import Slots, Wiring
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.machine_code import compile_library
 
 SOURCE = Path(__file__).with_name("loop.c")

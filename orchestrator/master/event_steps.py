@@ -16,7 +16,8 @@ from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.input_leads import InputLeads
 from orchestrator.master.iterated import loop_groups
 from orchestrator.master.protocol import RunEndedError, StepOutcome
-from orchestrator.master.wiring import Array, Slots, Stage, gather
+from orchestrator.master.wiring import Slots, Stage, gather
+from orchestrator.shared.arrays import Array
 
 MOST_SHORTENINGS = 100
 """Times that a window may become shorter, because slaves stop earlier and earlier when they are taken back."""

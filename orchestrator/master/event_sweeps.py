@@ -17,7 +17,7 @@ from orchestrator.master.events import EventIteration
 from orchestrator.master.pieces import piece_times, piece_weights
 from orchestrator.master.rollback import rollback
 from orchestrator.master.tracks import Track, cell_coefficients, follow_cubics
-from orchestrator.master.wiring import Array
+from orchestrator.shared.arrays import Array
 
 MOST_SWEEPS = 30
 BRIEF = 100.0

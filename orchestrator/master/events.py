@@ -19,7 +19,8 @@ from orchestrator.master.iterated import backward_slots
 from orchestrator.master.protocol import EventSlave
 from orchestrator.master.result import EventStatistics, RunRemark
 from orchestrator.master.system import split
-from orchestrator.master.wiring import Array, Wiring
+from orchestrator.master.wiring import Wiring
+from orchestrator.shared.arrays import Array
 
 Ticks = dict[str, list[str]]
 

@@ -3,11 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ConvergenceError
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 MEMORY = 6
 """Past residuals that an Anderson step is made from: enough to solve a linear loop of six signals exactly."""

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestrator.master.protocol import RunEndedError
-from orchestrator.master.wiring import Array, Slots, Stage, View, Wiring, gather
+from orchestrator.master.wiring import Slots, Stage, View, Wiring, gather
+from orchestrator.shared.arrays import Array
 
 
 def do_step(stage: Stage, time: float, step: float) -> RunEndedError | None:

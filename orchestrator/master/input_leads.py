@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.master.event_stage import EventStage, Gather
 from orchestrator.master.events import EventIteration
 from orchestrator.master.tracks import follow_cubics
-from orchestrator.master.wiring import Array
+from orchestrator.shared.arrays import Array
 
 
 class InputLeads:

@@ -12,7 +12,8 @@ from orchestrator.master.fixed_point import solve_fixed_point
 from orchestrator.master.fixed_step import step_in_turn
 from orchestrator.master.layout import Layout
 from orchestrator.master.protocol import RunEndedError
-from orchestrator.master.wiring import Array, Slots, Stage, Wiring, gather
+from orchestrator.master.wiring import Slots, Stage, Wiring, gather
+from orchestrator.shared.arrays import Array
 
 
 def backward_slots(layout: Layout, names: Iterable[str]) -> Slots:

@@ -3,12 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.master.result import RunRemark
 from orchestrator.master.system import System, split
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 FEWEST = 5
 """Moves of an output below which their distances tell nothing."""

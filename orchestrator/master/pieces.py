@@ -15,9 +15,8 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 CELLS = 2
 NODES = CELLS + 1

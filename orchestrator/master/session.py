@@ -24,7 +24,8 @@ from orchestrator.master.result import MACHINE_CODE, PYTHON, EventStatistics, Lo
 from orchestrator.master.shorter_steps import ShorterSteps
 from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, Quantity, System, split
-from orchestrator.master.wiring import Array, Slots, Wiring, gather, wire
+from orchestrator.master.wiring import Slots, Wiring, gather, wire
+from orchestrator.shared.arrays import Array
 
 if TYPE_CHECKING:
     from orchestrator.master.compiled import CompiledWiring

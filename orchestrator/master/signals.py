@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ScenarioError
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 GRID_SLACK = 1e-9
 """A time that misses an instant of change by less than this fraction of the distance between such instants is on it."""

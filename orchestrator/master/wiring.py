@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from orchestrator.master.layout import Block, Feed, Layout
 from orchestrator.master.protocol import Signals, Slave, Transfer
 
-Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
 View = Any
 """A ``memoryview`` of float64: reads and writes single values and runs of them faster than an array does."""

@@ -16,7 +16,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.building.sources import recipe_of
 from orchestrator.errors import CalibrationError
@@ -26,13 +25,13 @@ from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import difference_sum
 from orchestrator.paired.monotone import monotone_cubic
 from orchestrator.paired.settings import MapSettings
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.cache import cache_directory, is_intact, note_hash, tell_damage
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.equation_files import closure
 from orchestrator.shared.output import write_whole
 from orchestrator.shared.version import __version__
 
-Array = NDArray[np.float64]
 Each = Callable[[Callable[[Any], float], Iterable[Any]], Iterable[float]]
 """``map`` of a pool of threads."""
 

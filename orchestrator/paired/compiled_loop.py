@@ -6,15 +6,14 @@ Calibration needs thousands of runs. A test holds this loop to the co-simulated 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.paired.experiment import Experiment
 from orchestrator.plants.design import KalmanFilter
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.drivetrain.equations import parameters
 from pyfmu_sources.laws.backlash_models import BACKLASH_MODELS
 
-Array = NDArray[np.float64]
 COLUMNS = ("theta_m", "theta_l", "theta_l_hat", "u", "contact", "T_m", "T_l_hat")
 LOOP = Kernels("orchestrator.paired.loop_kernel", checked=True)
 

@@ -9,7 +9,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
@@ -19,8 +18,8 @@ from orchestrator.master.signals import Samples, Signal
 from orchestrator.master.system import Connection, Instance, SignalSource, System
 from orchestrator.paired.experiment import Experiment
 from orchestrator.plants.design import KalmanFilter
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 FMUS = ("Drivetrain", "KalmanEstimator", "LqrController")
 PARTS = ("plant", "estimator", "controller")
 ESTIMATES = ("theta_m_hat", "omega_m_hat", "theta_l_hat", "omega_l_hat", "T_l_hat", "T_m_hat")

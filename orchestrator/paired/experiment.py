@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass, field, replace
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ScenarioError
 from orchestrator.plants.design import (
@@ -27,9 +26,9 @@ from orchestrator.plants.design import (
     five_state_model,
     six_state_model,
 )
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.laws.backlash_models import MODELS
 
-Array = NDArray[np.float64]
 THESIS_SCALE = 48.0
 BACKLASH_MODELS = tuple(model.name for model in MODELS if model.gap)
 

@@ -4,11 +4,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
-
-Array = NDArray[np.float64]
 
 
 def difference_sum(with_gap: Array, without_gap: Array) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

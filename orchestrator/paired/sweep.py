@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.engine import Case, DesignCases, ResultColumn, Row, Status, Work, parse_design
 from orchestrator.engine.cases import Value
@@ -23,8 +22,8 @@ from orchestrator.paired.metric import ErrorStatistics, difference_sum, error_st
 from orchestrator.paired.pair import with_settings
 from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sizes import read_sizes
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 COLUMNS = (
     ResultColumn("S", "rad"),
     ResultColumn("estimate", "rad"),

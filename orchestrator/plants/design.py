@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import DesignError
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 REGULATOR_STATES = ("theta_m", "omega_m", "theta_l", "omega_l", "T_m")
 GAIN_UNITS = ("N.m/rad", "N.m.s/rad", "N.m/rad", "N.m.s/rad", "1")

@@ -13,7 +13,8 @@ from matplotlib.ticker import LogFormatter
 
 from orchestrator.plain_text import plain_text
 from orchestrator.reporting.model import Plot, Series
-from orchestrator.reporting.plots import Array, as_column, thin_series
+from orchestrator.reporting.plots import as_column, thin_series
+from orchestrator.shared.arrays import Array
 
 COLOURS = ("#2166ac", "#d6604d", "#4d9221", "#762a83", "#8c510a", "#555555")
 SHADE, MOMENT = "#f4d58d", "#555555"

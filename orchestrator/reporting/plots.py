@@ -18,6 +18,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from orchestrator.reporting.model import POINT_LIMIT, Numbers, Plot, Series
+from orchestrator.shared.arrays import Array
 
 SCRIPTS = ("scale.js", "units.js", "svg.js", "columns.js", "marks.js", "export.js", "figure.js", "plot.js")
 TIME = "time [s]"
@@ -32,7 +33,6 @@ PLAIN = 50
 """Columns of at most so many numbers stay readable in the page."""
 FAR = 100.0
 """A column whose middle is so many times farther from zero than it is wide is packed as a difference to its middle."""
-Array = NDArray[np.float64]
 
 
 def plot_data(plot: Plot, rows: int = CURVE_LIMIT) -> dict[str, Any]:

@@ -12,13 +12,12 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.errors import ScenarioError
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.results import as_plain
 from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn
 
-Array = NDArray[np.float64]
 AUTHOR = "BACKLASH_COSIM_AUTHOR"
 """Environment variable with the line of who makes pages, such as a name and a company."""
 INPUTS = ("record", "records", "fmu", "fmus", "map", "scenario", "file", "model")

@@ -12,8 +12,9 @@ import numpy as np
 from orchestrator.errors import InputError
 from orchestrator.records.units import ANGLES
 from orchestrator.reporting import Plot, Report, ReportTable, Series, TableColumn
-from orchestrator.reporting.plots import Array, as_column
+from orchestrator.reporting.plots import as_column
 from orchestrator.reporting.source import ResultDocument, load
+from orchestrator.shared.arrays import Array
 from orchestrator.workbench.session import is_name
 
 MOST_CURVES = 8  # of one file: with more nobody reads them

@@ -22,12 +22,12 @@ from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.formats.text import TextSource
 from orchestrator.records.preview import LogPreview, preview_opened, raw_lines
+from orchestrator.shared.arrays import Array
 
 STRETCH = 64  # rows
 SLICE = 0.1  # s of a request that go into reading on
 LARGE = 4_000_000  # bytes of a log of which a few rows are drawn first
 FEW = 30  # rows of each block, then
-Array = NDArray[np.float64]
 
 
 class CurveShown(msgspec.Struct, frozen=True):

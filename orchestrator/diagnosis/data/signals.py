@@ -19,8 +19,7 @@ from scipy.signal import butter, sosfiltfilt, welch
 from orchestrator.diagnosis.settings import BandSettings
 from orchestrator.records.arrays import interpolate_missing
 from orchestrator.records.record import Record
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

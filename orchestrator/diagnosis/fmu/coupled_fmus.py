@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.loop import LOOP
 from orchestrator.diagnosis.fmu.loop_kernel import AWAY, SET, STEP
@@ -23,8 +22,8 @@ from orchestrator.fmi.slave3 import Fmu3Slave
 from orchestrator.master.protocol import NativeTransfer, Value
 from orchestrator.master.result import MOST_REMARKS, RunRemark
 from orchestrator.master.system import split
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 BEYOND = 1.01
 """Stop time that an FMU is given, over the length of the run: some refuse steps beyond one of their own."""
 

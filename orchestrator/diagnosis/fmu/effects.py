@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.loop import LOOP
 from orchestrator.diagnosis.fmu.problem import FmuProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
 from orchestrator.effects.effect import PlaceScales
 from orchestrator.effects.of_fmus import BANK, CUT, INPUT, OUTPUT, PORT, FmuEffect
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.noise import rms
-
-Array = NDArray[np.float64]
 
 FLOWS = ("W", "kW", "m3/s", "m3/h", "l/s", "l/min", "kg/s")
 """Units of inputs that are flows of heat or matter: what they change has no direction of motion, and no cycles."""

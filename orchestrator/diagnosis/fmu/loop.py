@@ -6,11 +6,10 @@ step. Outputs come as samples ``rows`` (n,), ``step`` [s] apart.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 LOOP = Kernels("orchestrator.diagnosis.fmu.loop_kernel")
 """These laws, and the loop in which FMUs run with effects at their ports; see :mod:`loop_kernel`."""
 

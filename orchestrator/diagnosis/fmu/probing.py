@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.problem import IMPULSE, FmuModel, FmuProblem
@@ -15,8 +14,8 @@ from orchestrator.diagnosis.fmu.stepping import Progress, least_steps, settle_st
 from orchestrator.diagnosis.fmu.system import FmuSystem
 from orchestrator.diagnosis.settings import FmuSettings
 from orchestrator.errors import FmuError
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 MOVES = 1e-9  # of a variable's size by which a parameter or a port must change it
 LOUDER = 3.0  # standard deviations of chance by which a record's noise must exceed that of its map to count
 LOUDEST = 10.0  # times that noise, from which it is none: something moves

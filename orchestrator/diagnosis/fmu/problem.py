@@ -5,7 +5,6 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.coupled_fmus import Run
 from orchestrator.diagnosis.fmu.loop import delay_input, delay_output, lag_input, lag_output, limit_rate, quantise
@@ -15,9 +14,9 @@ from orchestrator.diagnosis.fmu.runner import Runner
 from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, PORT, FmuEffect
 from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import Value
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.laws.body import COMPLIANCE
 
-Array = NDArray[np.float64]
 ABSURD = 1e9  # times an output's largest value, beyond which a run has failed
 RUNAWAY = 1e4  # effort of an effect over the drive's, beyond which a run is given up: it is unstable
 IMPULSE = 0.5  # of the drive: the pulse that measures a response

@@ -18,10 +18,9 @@ from orchestrator.records.jitter import describe_jitter, fit_clock, places_on_cl
 from orchestrator.records.rows import check_clock, describe_failed, drop_failed_readings, find_repeats
 from orchestrator.records.tables import NamedColumns, Wanted, read_columns, read_unit
 from orchestrator.records.timing import has_unpadded_fractions, interpolate
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.band import content_band
 from orchestrator.shared.inference.noise import residual_noise
-
-Array = NDArray[np.float64]
 
 LARGEST = 1e15
 LEAST_ROWS = 100

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.records import TestData
 from orchestrator.diagnosis.fmu.mapping import Map
@@ -16,8 +15,8 @@ from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.report.open_test_data import open_test_data
 from orchestrator.diagnosis.result import DiagnosisOutcome, SignalMisfit, TestMisfit
 from orchestrator.diagnosis.selection.outcome import SearchResult
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 STAGES = ("nominal", "refitted", "corrected")
 
 

@@ -9,7 +9,6 @@ from copy import copy
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.effects import candidate_effects, efforts_along, find_effects, port_motions
 from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem, at_input, at_output
@@ -25,9 +24,9 @@ from orchestrator.diagnosis.model.interface import (
     as_uncertain,
 )
 from orchestrator.effects.of_fmus import CUT, INPUT, OUTPUT, PARAMETER, FmuEffect
+from orchestrator.shared.arrays import Array
 from pyfmu_sources.laws.body import COMPLIANCE
 
-Array = NDArray[np.float64]
 FAILED = 1e3  # times the span of an output: residual of a run that failed, from which every fit turns back
 START = "state at the start"
 KEPT = 3_000_000  # rows of outputs of runs that are kept

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from orchestrator.diagnosis.fmu.problem import FmuModel, FmuProblem
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 START_STATES = 4  # at the start that may be off, where the FMU does not let them be set
 START_LEAST = 1e-3  # of the largest, that a state's response must have: less is rounding

@@ -8,9 +8,6 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from orchestrator.diagnosis.fmu.coupled_fmus import Batch, Feedthrough, LoadRequest, RanBatch, Run
 from orchestrator.diagnosis.fmu.loop import LOOP
 from orchestrator.diagnosis.fmu.system import FmuSystem
@@ -18,13 +15,12 @@ from orchestrator.diagnosis.settings import FmuSettings
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
 from orchestrator.master.result import MOST_REMARKS, RunRemark
 from orchestrator.plain_text import name_folder, plain_text
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
 from orchestrator.shared.scratch import Scratch
-
-Array = NDArray[np.float64]
 
 SLACK = 1 << 20  # bytes of an answer beside its values
 TOTAL = 86_400.0  # seconds that a process may live

@@ -4,15 +4,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from orchestrator.diagnosis.fmu.coupled_fmus import Feedthrough, Run
 from orchestrator.diagnosis.fmu.problem import IMPULSE, FmuModel, FmuProblem
 from orchestrator.diagnosis.fmu.record import FmuRecord
 from orchestrator.errors import FmuError
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 STUCK = 0.15  # share of steps in which nothing moves, from which an FMU has a coarser grid
 RUNS = 20  # that the probes and the first fit take, and

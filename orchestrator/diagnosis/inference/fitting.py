@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.inference.problem import Coordinate, FitProblem
 from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 UNKNOWN = 1e3  # standard error of a value that changes nothing, in small changes of it
 
 

@@ -16,8 +16,8 @@ from orchestrator.diagnosis.model.interface import (
     Values,
 )
 from orchestrator.diagnosis.settings import FitSettings
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 Coordinate = int | tuple[str, int]
 """Place of an uncertain parameter, or label of an effect and place of one of its values."""
 

@@ -21,8 +21,8 @@ from scipy.signal import csd, welch
 
 from orchestrator.diagnosis.model.interface import ResidualModel
 from orchestrator.diagnosis.settings import FitSettings
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 MEASUREMENT_LEVELS = (1.0, 2.0, 4.0, 10.0, 30.0)  # tried, in shares of the encoder's flat noise: a count is not white
 PROCESS_LEVELS = (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5)  # tried, in shares of the residual's power

@@ -5,15 +5,14 @@ sample time [s].
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import shift as shift_samples
 from scipy.signal import lfilter
 
 from orchestrator.diagnosis.data.signals import triangle_average
 from orchestrator.effects.of_logs import LEAD, SAMPLED
 from orchestrator.plants.description import Plant
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 SHORT_LAG = 0.3  # of a sample: a lag below it is a delay as long, which no triangle average tells from it
 
 

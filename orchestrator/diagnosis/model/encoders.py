@@ -2,13 +2,9 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from orchestrator.effects.of_logs import centre_angle, eccentricity
 from orchestrator.plants.description import Plant
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 
 def centre_angles(plant: Plant, p: Array, angles: Sequence[Array]) -> list[Array]:

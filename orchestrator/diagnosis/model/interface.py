@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.records.model_file import ModelParameter
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 Values = tuple[float, ...]
 
 

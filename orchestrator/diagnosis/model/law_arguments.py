@@ -4,13 +4,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import triangle_average
 from orchestrator.diagnosis.model.interface import LawArgument, ModelPoint
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 
 def law_arguments(

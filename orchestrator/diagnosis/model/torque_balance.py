@@ -20,7 +20,6 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import (
     Signals,
@@ -47,8 +46,8 @@ from orchestrator.effects.effect import SignalScales, rms
 from orchestrator.effects.of_logs import LEAD, SAMPLED, SHIFT
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 SHORTEST = 1e-9  # rad: distance over which friction of a body that does not move builds up
 INITIAL_TORQUE = "initial torque"
 ZERO = "zero of the load's encoder"  # a value of the log: no effect of the machine is what is left of our correction

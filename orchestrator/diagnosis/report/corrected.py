@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.building.build import build_variant
 from orchestrator.checking.check import CheckOptions, check_fmu
@@ -29,8 +28,7 @@ from orchestrator.plants.description import Plant
 from orchestrator.records.fitted_record import FittedRecord
 from orchestrator.records.model_file import Model
 from orchestrator.records.model_text import describe_fit, model_text
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import norm
 from scipy.stats import t as student
@@ -23,8 +22,8 @@ from orchestrator.diagnosis.selection.outcome import EffectEvidence, RecordEvide
 from orchestrator.diagnosis.settings import DiagnosisSettings, ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.records.model_file import Model
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 Named = Callable[[Values], Mapping[str, float]]
 """Values of an effect -> its parameters by name."""
 """Misfits on test data, and by the values of a model: what it misses, how much less the final one leaves."""

@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.report.simulation import RunSignals, Simulation
 from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import state_places
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.cores import map_on_threads
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, fit_damped
-
-Array = NDArray[np.float64]
 
 CLOSE = 1.3  # rms in deviations of the noise up to which a run is close
 LOST = 0.3  # rms as a share of the motion from which a run follows nothing

@@ -1,7 +1,6 @@
 """A gap behind the motor's encoder alone: found by the estimator, and graded."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from orchestrator.diagnosis.model.plant_effects import unit_in
@@ -15,8 +14,7 @@ from orchestrator.estimation.protocol import Estimate
 from orchestrator.plants.known.drivetrain import PLANT
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
 
 
 def find_hidden_gap(record: Record, model: Model) -> Estimate | None:

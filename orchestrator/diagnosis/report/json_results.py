@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 import msgspec
 
 from orchestrator.diagnosis.model.plant_effects import effects_of
-from orchestrator.diagnosis.report.missing_torque import Array, MissingTorque, missing_torques
+from orchestrator.diagnosis.report.missing_torque import MissingTorque, missing_torques
 from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit, ValueEstimate
 from orchestrator.diagnosis.selection.outcome import Dependence, SearchResult
 from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.effects.words import effect_words
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.results.diagnose import (
     AnalysisFound,
     DependenceFound,

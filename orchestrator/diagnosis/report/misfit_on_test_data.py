@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.inference.fitting import ScoreComparison, compare_residuals, value_covariance
@@ -20,8 +19,8 @@ from orchestrator.effects.effect import rms
 from orchestrator.plants.description import Plant
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 LEAST_TORQUE_ROWS = 200
 LEAST_TRAVEL = 20.0  # in deviations of the noise, from which a test part moves
 LEAST_TEST_ROWS = 16  # whitened, about independent: four in each of four blocks

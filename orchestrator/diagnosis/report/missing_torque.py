@@ -4,13 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.model.plant_effects import unit_in
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 BINS = 40
 WIDEST_GAP = 0.2  # of what a signal takes: no line is drawn over values that it does not take
 SHOWN_SECONDS = 4.0  # of an effect that follows the time

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import first_derivative, smooth
 from orchestrator.diagnosis.model.drive import apply_lag, logged_torque, shift_signal
@@ -21,10 +20,10 @@ from orchestrator.plants.coarse_run import FINER, coarse_steps, runs_coarsely
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import is_linear, linear_run_of
 from orchestrator.records.record import Record, quantisation_step
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.noise import residual_noise
 from pyfmu_sources.laws.drive import UNASKED
 
-Array = NDArray[np.float64]
 Kernel = Callable[[Array, Array, Array, Array], None]
 """``kernel(start, early, late, out)``: requests in both pieces of each sample; fills the angles (n, 2)."""
 NOISE_WINDOW = 9  # samples of the sliding cubic whose residual is the encoder's noise

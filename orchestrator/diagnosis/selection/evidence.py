@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.inference.fitting import FittedModel, fit_model, size_over_error
 from orchestrator.diagnosis.inference.problem import FitProblem
@@ -21,8 +20,8 @@ from orchestrator.diagnosis.selection.outcome import (
 )
 from orchestrator.diagnosis.selection.settling import leave_out
 from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 FREE_SPREAD = 30.0  # of a parameter whose prior is off
 ACTIVE = 0.5  # of the largest weight, from which a row counts whole

@@ -9,7 +9,6 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.inference.fitting import (
     compare_residuals,
@@ -20,8 +19,8 @@ from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import LawArgument
 from orchestrator.diagnosis.selection.outcome import Dependence, SearchResult
 from orchestrator.diagnosis.settings import SelectionSettings
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 KNOTS = 11
 SURE = 2.5  # paired errors by which a gain is no chance
 EDGE = 0.005  # share of the rows beyond the first and the last knot

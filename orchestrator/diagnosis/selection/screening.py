@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.inference.fitting import FittedModel
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, Values
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 MOST_PEAKS = 8  # cycles of a wave that are tried in full
 TEETH = 15  # values of a comb
 WHOLE = 0.25  # of an effect tried as it is: below this share of it in the fit, its gain counts by that share

@@ -10,15 +10,14 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.diagnosis.inference.fitting import FittedModel, block_errors
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, Values
 from orchestrator.diagnosis.selection.screening import Screening
 from orchestrator.diagnosis.settings import SelectionSettings
+from orchestrator.shared.arrays import Array
 
-Array = NDArray[np.float64]
 Subset = frozenset[str]
 PARTNERS = 8  # effects that are tried in pairs with every other one
 LEADING = 14  # effects that larger subsets are made of

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import Array
+from orchestrator.shared.arrays import Array
 
 
 def delay(u: Array, step: float, late: float) -> Array:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
-from orchestrator.estimation.filter.model import AffineModel, Array, NoiseLevels
+from orchestrator.estimation.filter.model import AffineModel, NoiseLevels
+from orchestrator.shared.arrays import Array
 
 LEAST_LAG = 5e-4  # of the drive, in samples: a shorter one acts the same, and would take a contact thousands of pieces
 ROOM = "orchestrator.estimation.filter"

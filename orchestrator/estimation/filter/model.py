@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from orchestrator.shared.arrays import Array
+
 LOAD_TORQUE = "effects.load_torque.torque"
 DEPTH = "contact_depth"
 FADING = 1e-3  # rad, half-gap below which the depth of a contact fades: without one, nothing touches

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.building.translation.kernels import Kernels
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.flanks.chain import STATES
 from orchestrator.estimation.flanks.points import Points
 from orchestrator.estimation.settings import FlankSettings
+from orchestrator.shared.arrays import Array
 
 CHAIN = Kernels("orchestrator.estimation.flanks.chain")
 TURN = 2.0 * math.pi

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import Array
 from orchestrator.records.arrays import runs_of
 from orchestrator.records.record import Record, quantisation_step
+from orchestrator.shared.arrays import Array
 
 REST_ROWS = 5  # in which neither encoder moves by more than a count: the machine rests
 

@@ -4,14 +4,12 @@ import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.records.arrays import runs_of
 from orchestrator.records.record import Record, quantisation_step
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.noise import robust_noise
 from orchestrator.shared.results.inspect import BandFound, ChannelFound
-
-Array = NDArray[np.float64]
 
 BANDS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)  # Hz, edges of the bands of the excitation
 LONGEST_LAG = 0.1  # s, of one encoder behind the other

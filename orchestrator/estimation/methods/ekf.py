@@ -7,11 +7,11 @@ import numpy as np
 
 from orchestrator.building.translation.kernels import Kernels
 from orchestrator.estimation.filter.innovations import count_traversals
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.normal import NORMAL_95
 from pyfmu_sources.estimators.backlash_estimator import NoiseSettings
 

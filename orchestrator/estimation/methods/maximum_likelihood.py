@@ -19,7 +19,7 @@ from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import describe, describe_unfinished
 from orchestrator.estimation.effort import Effort, Stop, StoppedError, never
 from orchestrator.estimation.filter.innovations import count_traversals
-from orchestrator.estimation.filter.model import DEPTH, Array
+from orchestrator.estimation.filter.model import DEPTH
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
 from orchestrator.estimation.problem import (
@@ -37,6 +37,7 @@ from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSetting
 from orchestrator.estimation.torque_reading import settle_torque
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 
 GRID = (0.0, *(3e-4 * 1.28**n for n in range(31)))  # to half a radian
 # Torque noise [N.m.s^0.5] of motor and load, from the start of the continuation on.

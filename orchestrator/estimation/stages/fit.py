@@ -15,11 +15,11 @@ import numpy as np
 
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import block_variance
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.likelihood import Fit, Likelihood, Point, maximise
 from orchestrator.estimation.settings import StageSettings
 from orchestrator.estimation.stages.problem import BODIES, GAPS, SHARE, TOTAL, TWIST
+from orchestrator.shared.arrays import Array
 
 GRID = tuple(1e-3 * 1.4**n for n in range(18))  # rad, to a third of a radian
 SHARES = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)

@@ -18,7 +18,6 @@ from orchestrator.errors import RecordError
 from orchestrator.estimation.description import autocorrelation, block_variance, block_variance_along, stillness_note
 from orchestrator.estimation.effort import Effort, Stop, never
 from orchestrator.estimation.filter.innovations import count_traversals
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.likelihood import Fit, Likelihood
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings, StageSettings
@@ -26,6 +25,7 @@ from orchestrator.estimation.stages.fit import GRID, Report, StageFits, fit_stag
 from orchestrator.estimation.stages.problem import BODIES, ENCODERS, GAPS, OFFSET, SHARE, TOTAL, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.normal import NORMAL_95
 
 FIRST, SECOND, BOTH = "1", "2", "both"

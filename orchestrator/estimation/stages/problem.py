@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from orchestrator.estimation.filter.model import TRAIN, Array, BodyNames, NoiseLevels
+from orchestrator.estimation.filter.model import TRAIN, BodyNames, NoiseLevels
 from orchestrator.estimation.problem import (
     DRY,
     OFFSET,
@@ -22,6 +22,7 @@ from orchestrator.estimation.problem import (
 )
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.noise import rms_behind_lag
 
 GAPS = ("alpha_1", "alpha_2")

@@ -15,8 +15,9 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     parameter_table,
 )
 from orchestrator.reporting.pages.generic import folds_of
-from orchestrator.reporting.source import Array, ResultDocument
+from orchestrator.reporting.source import ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import misfit_tables

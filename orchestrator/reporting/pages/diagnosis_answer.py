@@ -6,7 +6,8 @@ from orchestrator.effects.words import place_words
 from orchestrator.reporting.model import Plot, Section, Series, Span, Text
 from orchestrator.reporting.pages.diagnosis_tables import label_words
 from orchestrator.reporting.quantities import interval_words
-from orchestrator.reporting.source import Array, words
+from orchestrator.reporting.source import words
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.results.diagnose import EffectFound, NuisanceFound, SignalMisfitFound, TestFound, ValueFound
 from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn
 

@@ -3,10 +3,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.reporting.model import Kind, Plot, Section, Series, Span
 from orchestrator.reporting.source import ResultDocument
+from orchestrator.shared.arrays import Array
 
 SIGNALS = {
     "theta_m": ("Motor angle", "rad"),
@@ -24,7 +24,6 @@ RUNS = {"before": "model as given", "after": "corrected model"}
 HELD = frozenset({"u"})  # from sample to sample
 ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
 MOST_SPANS = 1000
-Array = NDArray[np.float64]
 Table = Mapping[str, Array]
 
 

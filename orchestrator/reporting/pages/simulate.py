@@ -9,7 +9,8 @@ from orchestrator.reporting.model import Facts, Plot, Report, Section, Series, S
 from orchestrator.reporting.pages import generic
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.record import out_of_contact
-from orchestrator.reporting.source import Array, ResultDocument
+from orchestrator.reporting.source import ResultDocument
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.results import PairFound, SignalsFound, as_plain, read
 from orchestrator.shared.results.fields import Cell
 
