@@ -76,7 +76,7 @@ def _extremes(v: ProbedVariable) -> Iterator[Any]:
     elif v.base == "String":
         yield (v.start or (b"",))[0] + _TEXT
     elif v.numeric and v.limits[0] < v.limits[1] and all(map(math.isfinite, v.limits)):
-        yield from v.limits if v.real else map(int, v.limits)
+        yield from v.limits
 
 
 def judge_late_setting(context: Context, movement: Mapping[ProbedVariable, Values]) -> None:

@@ -46,8 +46,8 @@ class ProbedVariable:
     def limits(self) -> tuple[float, float]:
         """The smallest and the largest value that the description allows; infinite where it names none."""
         low, high = self.minimum, self.maximum
-        least = -math.inf if low is None or math.isnan(low) else float(low)
-        return least, math.inf if high is None or math.isnan(high) else float(high)
+        least = -math.inf if low is None or math.isnan(low) else low
+        return least, math.inf if high is None or math.isnan(high) else high
 
     @property
     def numeric(self) -> bool:
