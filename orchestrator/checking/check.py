@@ -41,7 +41,7 @@ class CheckOptions:
 def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     """All findings on an FMU, a file or unpacked; nothing of it is executed unless ``executed`` is set."""
     options = options or CheckOptions()
-    result = check_static(path, options.archive)
+    digest, result = _digest(path), check_static(path, options.archive)
     findings = list(result.findings)
     executions: tuple[Execution, ...] = ()
     reason = "nothing is executed, as was asked" if options.static else _obstacle(result)
@@ -68,7 +68,7 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
         if result.files is not None:
             result.files.close()
     walls = "none (trusted)" if options.trust else support().in_words
-    facts = result.facts | _digest(path) | ({"walls": walls} if executions else {})
+    facts = result.facts | digest | ({"walls": walls} if executions else {})
     version = "" if result.description is None else result.description.dialect.version
     return FmuFindings(str(path), shown, version, result.stages, executions, reason, facts)
 
@@ -86,5 +86,8 @@ def _digest(path: Path) -> dict[str, str]:
     """Return the hash of an FMU's file, for the reader to know which one was checked; none of an unpacked one."""
     if not path.is_file():
         return {}
-    with path.open("rb") as stream:
-        return {"sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
+    try:
+        with path.open("rb") as stream:
+            return {"sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
+    except OSError:  # which is a finding of the archive
+        return {}
