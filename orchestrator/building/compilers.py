@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from orchestrator.errors import FmuError
 from orchestrator.shared.cache import remember
 from orchestrator.shared.machine_code import UNFOLDED, local_compiler, run_compiler
 from orchestrator.shared.scratch import Scratch
@@ -135,7 +136,11 @@ def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder
     ]
     if target.system == "linux":
         command.append("-lm")
-    run_compiler(compiler.identity, command, folder, f"{name}.c for {target.folder}")
+    what = f"{name}.c for {target.folder}"
+    lines = run_compiler(compiler.identity, command, folder, what)
+    warning = next((line for line in lines if "warning:" in line), None)
+    if warning is not None:
+        raise FmuError(f"{what} must compile without warnings, but {compiler.identity} says: {warning}")
     return (folder / library).read_bytes()
 
 
