@@ -15,7 +15,6 @@ from orchestrator.shared.scratch import Scratch
 
 _HERE = Path(__file__).parent
 _SHARED = ("fmi2_types.h", "log_categories.h", "slave_types.h")  # with native FMUs
-FILES = (*sorted((_HERE / "native").iterdir()), *(_HERE / "native_fmu" / name for name in _SHARED))
 SOURCE = "launcher.c"
 
 
@@ -69,7 +68,7 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
         found = os.stat(compiler)
     except OSError as error:
         raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
-    files = (part for path in FILES for part in (path.name, path.read_bytes()))
+    files = (part for path in _files() for part in (path.name, path.read_bytes()))
     made_by = f"{toolchain.compiler} {found.st_size} {found.st_mtime_ns} {toolchain.identity}"
     return remember("launcher", (made_by, wrapper, *files), lambda: _compile(toolchain, compiler, wrapper))
 
@@ -77,7 +76,7 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
 def _compile(toolchain: Toolchain, compiler: str, wrapper: str) -> bytes:
     with Scratch("compile") as scratch:
         folder = scratch.path
-        for path in FILES:
+        for path in _files():
             shutil.copy(path, folder)
         library = str(toolchain.libpython) if toolchain.libpython else ""
         command = [
@@ -90,6 +89,10 @@ def _compile(toolchain: Toolchain, compiler: str, wrapper: str) -> bytes:
         ]
         run_compiler(compiler, command, folder, SOURCE)
         return (folder / "launcher.so").read_bytes()
+
+
+def _files() -> tuple[Path, ...]:
+    return (*sorted((_HERE / "native").iterdir()), *(_HERE / "native_fmu" / name for name in _SHARED))
 
 
 def _quote(text: str) -> str:

@@ -346,7 +346,8 @@ def _rule_of(error: StatusError) -> str:
 
 
 def _files(folder: Path, left_out: str) -> list[str]:
-    """Files below ``folder`` but for one subfolder; links, and ``os.walk``, which calls itself, are not followed."""
+    """Files below ``folder`` but for one subfolder; links are not followed."""
+    # Not by os.walk, which calls itself for every level: an FMU may make thousands.
     found: list[str] = []
     waiting = [str(folder)]
     while waiting and len(found) <= _MOST_FINDINGS:

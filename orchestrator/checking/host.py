@@ -346,7 +346,6 @@ class Host:
                 info = _EventInfo()
                 return (ctypes.byref(info),), lambda: [*(bool(getattr(info, f"flag{i}")) for i in range(5)), info.next]
         read: Callable[[], Any] | None = None
-        count = 1
         if not kind.startswith(">"):
             value = next(given)
             count = len(value) if bracket else 1

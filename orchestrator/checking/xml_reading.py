@@ -103,8 +103,7 @@ def check_grammar(root: etree._Element, version: str, file: str = "modelDescript
     """Findings about elements and attributes; equal faults of one kind of element are one finding."""
     for fault in xml_grammar.grammar_faults(root, _grammar(version)):
         more = f" (and {fault.count - 1} more elements of its kind)" if fault.count > 1 else ""
-        path = f"{file}:{fault.element.getroottree().getpath(fault.element)}"
-        yield Finding("schema.invalid", path, fault.message + more)
+        yield Finding("schema.invalid", xpath(fault.element, name=file), fault.message + more)
 
 
 def _grammar(version: str) -> str:

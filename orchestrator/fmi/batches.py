@@ -39,9 +39,13 @@ class VariableBatch:
     def take(self, given: Signals) -> None:
         """Take what is to be set, unless it lies in place, then ``complete``."""
         if not shares(self.values, given):
-            for place, position in zip(self.places, self.positions, strict=True):
-                self.values[place] = in_c(given[position], self.values)
+            self.fill(given)
         self.complete()
+
+    def fill(self, given: Sequence[Any] | Signals) -> None:
+        """Write what is to be set into the array of C."""
+        for place, position in zip(self.places, self.positions, strict=True):
+            self.values[place] = in_c(given[position], self.values)
 
     def complete(self) -> None:
         """Note the elements of arrays that are about to be set, and fill in those that keep their values."""

@@ -27,7 +27,6 @@ class EventFeatures:
     # input clocks whose next tick the FMU says while it runs: value reference and kind by name
     timed: Mapping[str, tuple[int, str]] = field(default_factory=dict)
     told: tuple[str, ...] = ()  # periodic clocks whose interval the FMU is told, by name
-    triggered: frozenset[int] = frozenset()  # value references of output clocks
     self_sampling: bool = False  # without event mode the FMU ticks all its input clocks itself
 
 
@@ -73,7 +72,6 @@ def read_clocks(variables: Variables) -> Clocks:
         dict(variables.clocked),
         timed,
         tuple(told),
-        frozenset(outputs.values()),
         bool(inputs)
         and all(clock.find(f"Annotations/Annotation[@type='{SELF_SAMPLING}']") is not None for clock in inputs),
     )

@@ -36,6 +36,7 @@ def library_of(name: str, path: Path, folder: Path, identifier: str, version: st
 
 def load_library(path: Path, python: bool) -> Any:
     """Load a shared library, or raise an OSError; one that runs Python is called with the interpreter's lock held."""
+    # Libraries beside it are found where the system looks in the current directory.
     with contextlib.chdir(path.parent):
         return (ctypes.PyDLL if python else ctypes.CDLL)(str(path))
 

@@ -147,7 +147,7 @@ def _describe(
     found = read_scalars(root) if is_old else read_variables(root, configured)
     names = _unique([v.name for v in found.scalars])
     variables = dict(zip(names, found.scalars, strict=True))
-    exchange = None if interface.tag == "CoSimulation" else _read_exchange(root, interface)
+    exchange = None if interface.tag == "CoSimulation" else _read_exchange(root, interface, is_old)
     is_free = ("input", "Real", "continuous")  # may change while time goes on
     free = (v.name for v in variables.values() if (v.causality, v.type, v.variability) == is_free)
     inputs = frozenset(free if exchange else ())
@@ -189,15 +189,14 @@ def _describe(
     )
 
 
-def _read_exchange(root: etree._Element, interface: etree._Element) -> Exchange:
+def _read_exchange(root: etree._Element, interface: etree._Element, is_old: bool) -> Exchange:
     """Return what a description says; in FMI 3.0 the FMU itself says better."""
-    yes = {"true", "1"}
-    if root.get("fmiVersion") == "2.0":
+    if is_old:
         states, indicators = root.findall("ModelStructure/Derivatives/Unknown"), root.get("numberOfEventIndicators")
-        not_needed = interface.get("completedIntegratorStepNotNeeded") in yes
-        return Exchange(len(states), int(indicators or 0), not not_needed)
+        is_needed = not _flag(interface, "completedIntegratorStepNotNeeded")
+        return Exchange(len(states), int(indicators or 0), is_needed)
     states, found = (root.findall(f"ModelStructure/{tag}") for tag in ("ContinuousStateDerivative", "EventIndicator"))
-    return Exchange(len(states), len(found), interface.get("needsCompletedIntegratorStep") in yes)
+    return Exchange(len(states), len(found), _flag(interface, "needsCompletedIntegratorStep"))
 
 
 def _note_on_unusable(binaries: Sequence[str], clocks: Sequence[str]) -> str:

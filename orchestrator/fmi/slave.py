@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.access import Access
-from orchestrator.fmi.batches import Functions, VariableBatch, in_c, native_calls, shares
+from orchestrator.fmi.batches import Functions, VariableBatch, native_calls, shares
 from orchestrator.fmi.extraction import content_hash, extract_fmu
 from orchestrator.fmi.messages import DISCARD, ERROR, FATAL, OK, PENDING, STATUS, WARNING, Inbox
 from orchestrator.fmi.model_description import FmuDescription, read_description
@@ -200,8 +200,7 @@ class FmuSlave(Slave):
         if not last or not all(map(operator.is_, last, given)):
             last[:] = []
             for batch in batches:
-                for place, position in zip(batch.places, batch.positions, strict=True):
-                    batch.values[place] = in_c(given[position], batch.values)
+                batch.fill(given)
             last[:] = given
         for batch in batches:
             batch.complete()

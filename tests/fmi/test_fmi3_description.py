@@ -48,7 +48,6 @@ def test_the_ball_of_the_tests_is_read_with_all_that_it_has() -> None:
         "tick": PeriodicClock(Fraction(1, 10), Fraction(1, 20), ("count", "smooth", "old"), 100)
     }
     assert ball.events.inside == {"u"}
-    assert ball.events.triggered == {101}
     assert dict(ball.model.output_clocks) == {"hit": 101}
     assert "Binary blob" in ball.left_out
     assert "blob" not in variables

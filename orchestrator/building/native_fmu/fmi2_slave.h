@@ -138,9 +138,6 @@ SET_VALUES(fmi2SetInteger, int, IS_WHOLE(r[k]), set_whole)
 NO_VALUES(Boolean, Boolean, 0)
 NO_VALUES(String, const char *, "")
 
-
-
-
 /* --- Saved states ------------------------------------------------------------------------------------------------------ */
 
 SAVED_STATE_CALLS(fmi2GetFMUstate, fmi2SetFMUstate, fmi2FreeFMUstate, fmi2SerializedFMUstateSize, fmi2SerializeFMUstate,
