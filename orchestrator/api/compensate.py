@@ -31,7 +31,7 @@ from orchestrator.records.model_file import Model, read_model
 from orchestrator.scenarios.scenario import simulate
 from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns
-from orchestrator.shared.results.compensate import UPPER, CompensateFound, LawFound, laws_tables
+from orchestrator.shared.results.compensate import HARD, UPPER, CompensateFound, LawFound, laws_tables
 from orchestrator.shared.results.regulator import ForecastFound
 
 # Least and largest value of each argument: rad, s, rad/s, N.m, N.m, s, plants, seed.
@@ -54,7 +54,7 @@ CYCLES = (
     "No weights were found with which the loop comes to rest without friction: the chosen ones have the smallest limit "
     "cycle. The table states whether friction stops it; `state_weights` sets other weights."
 )
-HARD, HARD_SHARE = 1.5, 0.05  # of the impact speed that is asked for; of the plants that may land harder
+HARD_SHARE = 0.05  # of the plants that may land harder than ``HARD``
 LAWS = (LQR, SHIFTED, COMPENSATOR)
 MEDIANS = ("impact", "error", "rest", "contacts")
 _BOUND_SPEEDS = np.geomspace(0.02, 2.0, 30)  # of the curve beside the traversals [rad/s]

@@ -14,17 +14,18 @@ if TYPE_CHECKING:
 
 FORMATS = "CSV of any dialect, Parquet, MDF, MAT or NumPy"
 RATES = (1.0, 1e6)  # Hz
+FOR_FITS = "the rate that the motion needs, in records of 40,000 rows or more"
 
 
-def add_reading_arguments(parser: argparse.ArgumentParser, rate_too: str = "") -> None:
-    """Add the options; ``rate_too`` is what else ``--rate`` means to the command."""
+def add_reading_arguments(parser: argparse.ArgumentParser, usual: str, rate_too: str = "") -> None:
+    """Add the options; ``usual``: what is read without ``--rate``, ``rate_too``: what else it means to the command."""
     group = parser.add_argument_group("reading of records")
     group.add_argument("--part", metavar="START:END", help="keep this part of each record [s], from its first row on")
     text = "if times are not uniform: treat the samples as uniform, or interpolate (default: decide by the motion)"
     group.add_argument("--resample", choices=RESAMPLING, help=text)
     text = "line of a text file with the column names; 0: none (default: detected)"
     group.add_argument("--header", type=int, metavar="LINE", help=text)
-    text = "reduce to this sample rate with an anti-alias filter (default: all samples)"
+    text = f"reduce to this sample rate with an anti-alias filter (default: {usual})"
     group.add_argument("--rate", type=float, metavar="HZ", help=f"{text}{rate_too}")
 
 

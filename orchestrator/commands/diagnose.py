@@ -9,6 +9,7 @@ from pathlib import Path
 from orchestrator.commands._console import next_step, print_blocks, say
 from orchestrator.commands._parser import options_for
 from orchestrator.commands._reading import (
+    FOR_FITS,
     FORMATS,
     add_reading_arguments,
     add_settings_argument,
@@ -49,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--time-limit", type=float, metavar="SECONDS", help="end the search after this time, with the result so far"
     )
-    add_reading_arguments(parser)
+    add_reading_arguments(parser, FOR_FITS)
 
 
 def run(args: argparse.Namespace) -> int:

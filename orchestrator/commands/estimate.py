@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.commands._reading import FORMATS, add_reading_arguments, add_settings_argument, reading_of
+from orchestrator.commands._reading import FOR_FITS, FORMATS, add_reading_arguments, add_settings_argument, reading_of
 from orchestrator.errors import ScenarioError
 from orchestrator.estimation.protocol import DEFAULT_SIZE, FITTED, METHODS, WITHOUT_TORQUE
 from orchestrator.estimation.settings import EstimationSettings
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--time-limit", type=float, metavar="S", help="stop without a result after this time (default: never)"
     )
     add_settings_argument(parser)
-    add_reading_arguments(parser, "; with --design also those of the proposed record (default: 200)")
+    add_reading_arguments(parser, FOR_FITS, "; with --design also those of the proposed record (default: 200)")
     parser.add_argument(
         "--no-diagnose", action="store_true", help="run no diagnosis if the model does not explain the record"
     )

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     text = "print the chosen columns, or the variables of an FMU or SSP file, as JSON, and stop"
     parser.add_argument("--columns", action="store_true", help=text)
-    add_reading_arguments(parser)
+    add_reading_arguments(parser, "all samples")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -26,6 +26,7 @@ PAIR_ONLY = frozenset({"experiment", "backlash_model", *PAIR_DEFAULTS})
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what a sweep takes."""
     add_experiment_arguments(parser)
+    usual = PAIR_DEFAULTS | {"seed": 0}
     for name, kind, metavar, text in (
         ("sizes", str, "SPEC", "half-gaps [rad]: 0.01,0.02 or range:LOW:HIGH:N or logrange:LOW:HIGH:N or random:N"),
         ("noise", str, "LIST", "encoder noise [rad]"),
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("seed", int, "N", "seed of random sizes and of all noise"),
     ):
         told = f"{text} (default: %(default)s)"
-        parser.add_argument(f"--{name}", type=kind, default=PAIR_DEFAULTS.get(name, 0), metavar=metavar, help=told)
+        parser.add_argument(f"--{name}", type=kind, default=usual[name], metavar=metavar, help=told)
     text = "also vary a parameter, such as plant.J_l=range:5.3:5.9:5; also list, logrange, random, sobol"
     parser.add_argument("--vary", action="append", default=[], metavar="NAME=SPEC", help=text)
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="sweep this TOML scenario instead of the pair")

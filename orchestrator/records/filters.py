@@ -19,7 +19,6 @@ CUT_OFF = 0.5  # of the new rate
 LARGEST_MISSING = 0.1  # weight of missing samples in a new one, beyond which it is missing too
 ENOUGH_ROWS = 20_000  # above which rows beyond those that the motion needs add time only
 PER_BAND = 20.0  # rows per period of the fastest motion that shows
-SHOWS = 4.0  # power over that of the noise from which motion shows
 MOST_ABOVE = 0.01  # share of the squared speed above that frequency
 PANE = 4096  # rows of a spectrum's pane at most
 
@@ -33,7 +32,7 @@ def follow_motion(record: Record, least: float) -> Record:
     if record.size < 2 * ENOUGH_ROWS:
         return record
     angles = [interpolate_missing(angle) for angle in (record.theta_m, record.theta_l) if angle is not None]
-    bands = [content_band(y, record.step, robust_noise(y), SHOWS, MOST_ABOVE, PANE) for y in angles]
+    bands = [content_band(y, record.step, robust_noise(y), MOST_ABOVE, PANE) for y in angles]
     enough = ENOUGH_ROWS / (record.size * record.step)
     fewer = decimate(record, max(PER_BAND * max(bands), least, enough))
     if fewer is record:

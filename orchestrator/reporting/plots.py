@@ -6,7 +6,6 @@ with what ``plot_data`` returns.
 
 import base64
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -18,7 +17,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from orchestrator.reporting.model import POINT_LIMIT, Numbers, Plot, Series
-from orchestrator.shared.arrays import Array
+from orchestrator.shared.arrays import Array, plain_numbers
 
 SCRIPTS = ("scale.js", "units.js", "svg.js", "columns.js", "marks.js", "export.js", "figure.js", "plot.js")
 TIME = "time [s]"
@@ -162,11 +161,6 @@ def as_column(values: Numbers) -> Array:
     """Return numbers as an array; what is missing or not finite is NaN."""
     column = np.asarray(values, dtype=float)
     return np.where(np.isfinite(column), column, np.nan)
-
-
-def plain_numbers(column: Array, digits: int = 10) -> list[float | None]:
-    """Return numbers as JSON holds them: rounded, and null where one is missing or not finite."""
-    return [float(f"{value:.{digits}g}") if math.isfinite(value) else None for value in column.tolist()]
 
 
 def _base64(column: NDArray[Any]) -> str:

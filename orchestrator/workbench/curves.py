@@ -4,7 +4,6 @@ Of a channel the smallest and the largest value of each stretch of ``STRETCH`` r
 text is first drawn of a few rows of each of its blocks, and is read whole meanwhile: ``SLICE`` seconds a request.
 """
 
-import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -22,7 +21,7 @@ from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.formats.text import TextSource
 from orchestrator.records.preview import LogPreview, preview_opened, raw_lines
-from orchestrator.shared.arrays import Array
+from orchestrator.shared.arrays import Array, plain_numbers
 
 STRETCH = 64  # rows
 SLICE = 0.1  # s of a request that go into reading on
@@ -155,7 +154,7 @@ def _reduce(low: Array, high: Array, begin: int, end: int, stretches: int) -> tu
 
 
 def _plain(values: Array) -> tuple[float | None, ...]:
-    return tuple(float(f"{value:.7g}") if math.isfinite(value) else None for value in values.tolist())
+    return tuple(plain_numbers(values, 7))
 
 
 class LogReader:

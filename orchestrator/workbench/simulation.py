@@ -25,8 +25,8 @@ from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
 from orchestrator.plants.known import plants
-from orchestrator.reporting.plots import plain_numbers
 from orchestrator.reporting.source import ResultDocument
+from orchestrator.shared.arrays import plain_numbers
 from orchestrator.shared.results import LiveFound
 
 SPAN = 2.0  # s: what a slider moves at once

@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.api.shown import plain_block
 from orchestrator.shared.results import TrustFound, as_plain
-from orchestrator.shared.results.fields import Display, TableColumn, displays, fields_facts, fields_table
+from orchestrator.shared.results.fields import Display, TableColumn, displays, fields_table
 
 
 class Gear(msgspec.Struct, frozen=True):
@@ -40,11 +40,10 @@ def test_of_a_mapping_the_names_come_first_and_no_item_leaves_the_head():
     assert len(fields_table("Gears", (), of=Gear).columns) == len(HEADS)
 
 
-def test_text_has_the_digits_and_facts_the_headings_of_the_description():
+def test_text_has_the_digits_of_the_description():
     shown = plain_block(fields_table("Gears", GEARS))
     assert shown.columns == HEADS
     assert shown.rows == (("a", "3.12", "0.1", "–", "green", "x, y"), ("–",) * 6)
-    assert fields_facts(GEARS[0])[2:4] == (("95 % from [rad]", 0.1), ("to [rad]", None))
 
 
 def test_json_is_not_touched_by_a_description():

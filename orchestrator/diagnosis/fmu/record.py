@@ -28,7 +28,6 @@ MOST_MISSING = 0.05  # of the rows: what is put in their place is no measurement
 LONGEST_GAP = 3  # rows
 LOST = 0.5  # of a sample by which a step of time shows that a row is lost or there twice
 WHOLE = 0.1  # of a sample by which it may miss whole ones then: else the stamps jitter
-SHOWS = 4.0  # power over that of the noise from which motion shows
 PANE = 1024  # samples of a spectrum's pane at most
 CLOCK_CURE = "put {step} s times the row there"
 RATE_ROUNDING = 0.02  # of a rate that time stamps may be off by
@@ -242,7 +241,7 @@ def decimation_factor(record: FmuRecord, settings: FmuSettings = DEFAULT) -> int
     if n < 2 * settings.rows:
         return 1
     fastest = max(
-        content_band(y, record.step, residual_noise(y, 0.0), SHOWS, settings.most_above, PANE)
+        content_band(y, record.step, residual_noise(y, 0.0), settings.most_above, PANE)
         for y in record.outputs.T
     )  # fmt: skip
     rate = (1.0 + RATE_ROUNDING) / record.step

@@ -183,10 +183,11 @@ class _Round:
             bad = self.impossible(fitted)
             impossible.update(bad)
             possible |= subset - bad
-            if not bad and self.is_shown(fitted):
+            rest = subset - bad - self.hidden(fitted)
+            if rest != subset:
+                waiting.extendleft([rest] if rest else [])
+            elif self.is_near(fitted):
                 found[subset] = fitted
-            elif rest := subset - bad - self.hidden(fitted):
-                waiting.appendleft(rest)
         return found
 
     def rivals(self, label: str) -> list[Subset]:
@@ -213,7 +214,11 @@ class _Round:
 
     def is_shown(self, fitted: FittedModel) -> bool:
         """Tell whether the records show how large each effect is, and no parameter leaves the model file with them."""
-        return farthest_parameter(self.problem, fitted) < self.farthest and not self.hidden(fitted)
+        return self.is_near(fitted) and not self.hidden(fitted)
+
+    def is_near(self, fitted: FittedModel) -> bool:
+        """Tell whether no parameter leaves the model file."""
+        return farthest_parameter(self.problem, fitted) < self.farthest
 
     def hidden(self, fitted: FittedModel) -> set[str]:
         """Return the effects of a model whose sizes the records do not tell from none."""

@@ -6,9 +6,7 @@ from orchestrator.reporting.model import Badge, Plot, Report, Series, Text
 from orchestrator.reporting.pages.regulator import rest_facts
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
-from orchestrator.shared.results.compensate import CompensateFound, LawFound, laws_tables
-
-SOFT = 1.5  # of the impact speed that was asked for: what still counts as soft, as in the command's own doubts
+from orchestrator.shared.results.compensate import HARD, CompensateFound, LawFound, laws_tables
 
 
 def build(source: ResultDocument) -> Report:
@@ -55,9 +53,9 @@ def _recommend(laws: Sequence[LawFound], speed: float) -> tuple[tuple[Badge, str
     ]
     if not stable:
         return ("bad", "none is stable"), "No law is stable on every plant, so none is recommended."
-    soft = [(impact, error, name) for impact, error, name in stable if impact <= SOFT * speed]
+    soft = [(impact, error, name) for impact, error, name in stable if impact <= HARD * speed]
     impact, error, best = min(soft, key=lambda law: law[1]) if soft else min(stable)
-    why = f"it follows best of those that land with at most {SOFT:g} times the {speed:g} rad/s asked for"
+    why = f"it follows best of those that land with at most {HARD:g} times the {speed:g} rad/s asked for"
     why = why if soft else f"it lands most softly, but harder than the {speed:g} rad/s asked for"
     numbers = f"In the median over plants its largest impact is {impact:.3g} rad/s and its error {error:.3g} rad rms."
     return ("good" if soft else "warn", f"take the {best}"), f"Take the {best}: {why}. {numbers}"

@@ -4,8 +4,10 @@ import numpy as np
 
 from orchestrator.shared.arrays import Array
 
+SHOWS = 4.0  # power over that of the noise from which motion shows
 
-def content_band(values: Array, step: float, noise: float, shows: float, most_above: float, pane: int) -> float:
+
+def content_band(values: Array, step: float, noise: float, most_above: float, pane: int) -> float:
     """Return the frequency [Hz] below which nearly all of a squared speed lies that shows above measurement noise.
 
     Args:
@@ -20,7 +22,7 @@ def content_band(values: Array, step: float, noise: float, shows: float, most_ab
     slope = np.abs(1.0 - np.exp(-2j * np.pi * frequency / rate)) ** 2
     power = power[1:] / slope[1:]
     floor = max(2.0 * noise**2 / rate, float(np.median(power[-len(power) // 8 :])))
-    speed = np.where(power > shows * floor, power - floor, 0.0) * frequency[1:] ** 2
+    speed = np.where(power > SHOWS * floor, power - floor, 0.0) * frequency[1:] ** 2
     share = np.cumsum(speed) / max(float(np.sum(speed)), 1e-300)
     beyond = np.maximum.accumulate(power[::-1])[::-1]  # largest power at a frequency or above it
     twice = beyond[np.minimum(2 * np.arange(power.size) + 1, power.size - 1)]

@@ -10,6 +10,8 @@ from orchestrator.shared.results import ResultData
 from orchestrator.shared.results.fields import Display, ReportTable, TableColumn, fields_table
 from orchestrator.shared.results.regulator import ForecastFound
 
+HARD = 1.5  # times the impact speed that is asked for: beyond it a landing is no longer soft
+
 
 class LawFound(msgspec.Struct, frozen=True):
     """One law on all plants: medians, 95 % quantiles in ``upper``, and every traversal.

@@ -126,12 +126,3 @@ def fields_table(
         columns.insert(0, TableColumn(names))
         rows = [[name, *row] for name, row in zip(items, rows, strict=True)]
     return ReportTable(title, tuple(columns), tuple(map(tuple, rows)), note)
-
-
-def fields_facts(item: msgspec.Struct) -> tuple[tuple[str, Cell], ...]:
-    """Return heading and value of each field that is told."""
-    return tuple(
-        (column.heading, cell)
-        for name, q in displays(type(item)).items()
-        for column, cell in zip(q.columns, q.cells(getattr(item, name)), strict=True)
-    )

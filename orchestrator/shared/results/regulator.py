@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated
 
 import msgspec
 
 from orchestrator.shared.results import ResultData
-from orchestrator.shared.results.fields import Display, ReportTable, TableColumn
+from orchestrator.shared.results.fields import ReportTable, TableColumn
 
 
 class ForecastFound(msgspec.Struct, frozen=True):
@@ -17,16 +16,16 @@ class ForecastFound(msgspec.Struct, frozen=True):
     it is still. None: there is no such margin.
     """
 
-    cycles: Annotated[bool, Display("limit cycle without friction and load")]
-    twist: Annotated[float, Display("amplitude of the twist", "half-gaps")]
-    load: Annotated[float, Display("amplitude of the load", "half-gaps")]
-    frequency: Annotated[float, Display("frequency", "Hz")]
-    phase_margin: Annotated[float, Display("phase margin without a gap", "rad")]
-    delay_margin: Annotated[float | None, Display("delay margin without a gap", "s")]
-    rank: Annotated[int, Display("controllable states, of six")]
+    cycles: bool
+    twist: float  # amplitude, in half-gaps
+    load: float  # amplitude, in half-gaps
+    frequency: float  # [Hz]
+    phase_margin: float  # [rad]
+    delay_margin: float | None  # [s]
+    rank: int  # controllable states, of six
     settled: bool = True
-    lower_gain: Annotated[float | None, Display("lower gain margin without a gap, as a factor")] = None
-    upper_gain: Annotated[float | None, Display("upper gain margin without a gap, as a factor")] = None
+    lower_gain: float | None = None  # as a factor, like the upper one
+    upper_gain: float | None = None
 
     def rest_text(self, loop: str) -> str:
         """Say in one line what ``loop`` does at rest by its gains alone."""

@@ -20,7 +20,7 @@ export function inputs() {
 // Options that all commands have for reading a log, kept for a tab; `options()` gives what the user has filled in.
 export function reading(tab) {
   const part = kept(`${tab}.part`, make("input", { placeholder: "all, or 2:30" }));
-  const rate = kept(`${tab}.rate`, numberInput({ placeholder: "all samples" }));
+  const rate = kept(`${tab}.rate`, numberInput({ placeholder: "what the motion needs" }));
   const stamps = make("select", {}, [["", "are uniform"], ["uniform", "jitter, the samples do not"], ["linear", "interpolate linearly"], ["cubic", "interpolate by cubics"]]
     .map(([value, text]) => make("option", { value }, text)));
   kept(`${tab}.stamps`, stamps);

@@ -1,7 +1,7 @@
 import { check, choice, field, fill, make, numberIn, numberInput } from "./dom.js";
 import { action, fileChoice, jobView, kept, message } from "./parts.js";
 import { sliders } from "./sliders.js";
-import { choices, choose, isOver, session, start, watch } from "./state.js";
+import { choices, choose, isOfFmu, isOver, session, start, watch } from "./state.js";
 
 const CORRECTED = /(^|\/)corrected\.toml$/;
 
@@ -13,7 +13,7 @@ export function build(panel) {
 // The model of a result under sliders.
 function simulation() {
   const said = message(), moving = make("div", {}), which = make("div", { class: "field grows" });
-  const able = () => session.jobs.filter((job) => isOver(job) && ["diagnose", "estimate"].includes(job.command) && job.files.includes(`${job.command}.csv`)).map((job) => job.name);
+  const able = () => session.jobs.filter((job) => isOver(job) && ["diagnose", "estimate"].includes(job.command) && !isOfFmu(job) && job.files.includes(`${job.command}.csv`)).map((job) => job.name);
   const chosen = () => { const names = able(); return names.includes(choices.fields.sliders) ? choices.fields.sliders : names.at(-1) ?? ""; };
   let shown = "";
   const draw = () => {

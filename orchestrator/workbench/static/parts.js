@@ -12,7 +12,8 @@ export const isFmu = (name) => /\.(fmu|ssp)$/i.test(name);
 // All files of the session of one kind: model files and FMUs of results, too.
 export function filesOf(kind) {
   const uploads = session.files.filter((file) => file.kind === kind).map((file) => [file.file, file.name]);
-  const made = { model: isModel, fmu: isFmu, map: (name) => /map\.toml$/.test(name) }[kind] ?? (() => false);
+  const isMap = (name) => /map\.toml$/.test(name);
+  const made = { model: (name) => isModel(name) && !isMap(name), fmu: isFmu, map: isMap }[kind] ?? (() => false);
   const results = session.jobs.flatMap((job) => job.files.filter(made).map((name) => [`results/${job.name}/${name}`, `${job.name}: ${name}`]));
   return [...uploads, ...results];
 }

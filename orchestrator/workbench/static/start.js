@@ -1,13 +1,13 @@
 import { upload } from "./api.js";
 import { fill, make } from "./dom.js";
 import { action, message } from "./parts.js";
-import { choices, choose, refresh, session, watch } from "./state.js";
+import { choices, choose, isOfFmu, refresh, session, watch } from "./state.js";
 
 const EXAMPLE = "example-drive.csv";
 
 // The latest result of a command that was made of the chosen log.
 const resultOf = (command) =>
-  session.jobs.filter((job) => job.command === command && job.state === "done" && choices.log && job.asked.inputs?.[0] === choices.log).at(-1);
+  session.jobs.filter((job) => job.command === command && job.state === "done" && !isOfFmu(job) && choices.log && job.asked.inputs?.[0] === choices.log).at(-1);
 const fileName = (reference) => reference.split("/").at(-1);
 
 // Tab, title, what it is for; then what is done, and what is missing: one of the two is empty.

@@ -126,9 +126,12 @@ const PLACES = {
   calibrate: ["fmus", "fmu"], compensate: ["model", "control"], regulator: ["model", "control"],
 };
 
+// Whether a result compares a log with an FMU of any kind, which the tab of FMUs asks for, and not with a plant of ours.
+export const isOfFmu = (job) => Boolean(job.asked.options?.fmu);
+
 // Show a result in its tab, beside the log and the model file that it was made of.
 export function open(job) {
-  const [tab, view] = PLACES[job.command], [log] = job.asked.inputs ?? [], { model = "" } = job.asked.options ?? {};
+  const [tab, view] = isOfFmu(job) ? PLACES.check : PLACES[job.command], [log] = job.asked.inputs ?? [], { model = "" } = job.asked.options ?? {};
   const ofLog = ["log", "gap", "diagnosis"].includes(tab) && log;
   choose({ shown: { [view]: job.name }, ...(ofLog ? { log } : {}), ...(ofLog && tab !== "log" ? { model } : {}) });
   location.hash = tab;
