@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.records import record_to_fit
+from orchestrator.api.records import records_to_fit
 from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.data.records import check_record
 from orchestrator.diagnosis.report.misfit_on_test_data import misfit_on_record
@@ -74,7 +74,7 @@ def diagnose(
 
     Args:
         record: a measured record, or its path; one encoder or two, at least 200 rows. Or several of one machine, which
-            then share parameters and effects.
+            then share parameters and effects. Long files come to the rate of their motion.
         model: what it is compared with (default: ``read_model()``), or the path of its TOML file, or the path of any
             co-simulation FMU of FMI 2.0 or 3.0.
         map: with an FMU, the TOML file of columns, uncertain parameters and ports; it runs in a child process.
@@ -117,9 +117,9 @@ def diagnose(
     records = [record] if isinstance(record, (Record, Path, str)) else list(record)
     if not records:
         raise ScenarioError("`record` must be at least one record, but is empty", "record")
-    measured, *more = (comparable_record(one, model) for one in records)
-    other = None if validate is None else comparable_record(validate, model)
-    tested = None if test is None else comparable_record(test, model)
+    measured, *more = comparable_records(records, model)
+    (other,) = (None,) if validate is None else comparable_records([validate], model)
+    (tested,) = (None,) if test is None else comparable_records([test], model)
     begun, fits = time.monotonic(), itertools.count(1)
     with numeric_errors(f"{measured.source}: no model can be fitted to this record"):
         found = diagnosing.diagnose(
@@ -154,9 +154,10 @@ def _of_an_fmu(
     return diagnose_fmu(records, fmu, given, progress=lambda what: progress(next(done), 0, what), **options)
 
 
-def comparable_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
-    """Return a record that the model can be compared with."""
-    record = set_zeros(record_to_fit(given, model, holes=True, **reading), model)
-    check_record(record)
-    check_plausible(max(record.parts_between_holes(), key=lambda part: part.size), model)
-    return record
+def comparable_records(given: Sequence[Record | Path | str], model: Model, **reading: Any) -> list[Record]:
+    """Return records that the model can be compared with."""
+    records = [set_zeros(record, model) for record in records_to_fit(given, model, holes=True, **reading)]
+    for record in records:
+        check_record(record)
+        check_plausible(max(record.parts_between_holes(), key=lambda part: part.size), model)
+    return records

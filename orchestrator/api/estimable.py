@@ -1,9 +1,10 @@
 """What the estimators take: records that can be of the machine, and models that they see whole."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.records import record_to_fit
+from orchestrator.api.records import records_to_fit
 from orchestrator.errors import ScenarioError
 from orchestrator.estimation.zeros import set_zeros
 from orchestrator.plants.known.two_stage_train import TRAIN
@@ -12,13 +13,17 @@ from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
 
 
-def plausible_record(record: Record | Path | str, model: Model, motor_only: bool, **reading: Any) -> Record:
-    """Return a record that fits the model at all."""
-    measured = record_to_fit(record, model, torque_needed=motor_only, **reading)
-    measured = measured.without_load_encoder() if motor_only else measured
-    if measured.has_torque:  # without one the plant plays no part
-        check_plausible(measured, model)
-    return set_zeros(measured, model)
+def plausible_records(
+    given: Sequence[Record | Path | str], model: Model, motor_only: bool, **reading: Any
+) -> list[Record]:
+    """Return records that fit the model at all."""
+    records = records_to_fit(given, model, torque_needed=motor_only, **reading)
+    if motor_only:
+        records = [record.without_load_encoder() for record in records]
+    for record in records:
+        if record.has_torque:  # without one the plant plays no part
+            check_plausible(record, model)
+    return [set_zeros(record, model) for record in records]
 
 
 def require_linear(model: Model) -> None:

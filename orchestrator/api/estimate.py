@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 import orchestrator
-from orchestrator.api.estimable import plausible_record, require_linear
+from orchestrator.api.estimable import plausible_records, require_linear
 from orchestrator.api.live import live_fitted_model
 from orchestrator.api.methods import MethodResult, describe_record, method_entry
 from orchestrator.api.numerics import numeric_errors
@@ -243,7 +243,8 @@ def estimate(
     """Estimate the half-gap of a machine from a measured record.
 
     Args:
-        record: a measured record, or its path; several of one machine are fitted together.
+        record: a measured record, or its path; several of one machine are fitted together. Long files come to the
+            rate of their motion; a ``Record`` stays as it is.
         model: what it is compared with (default: ``read_model()``).
         method: a key of ``METHODS``, such as "maximum_likelihood" or "ekf", or "all" (default: "maximum_likelihood",
             or "two_encoders" where a record has no torque).
@@ -277,7 +278,7 @@ def estimate(
     given_records = [record] if isinstance(record, (Record, Path, str)) else list(record)
     if not given_records:
         raise ScenarioError("`record` must be at least one record, but is none", "record")
-    measured, *more = (plausible_record(one, model, motor_only) for one in given_records)
+    measured, *more = plausible_records(given_records, model, motor_only)
     if any((other.theta_l is None) != (measured.theta_l is None) for other in more):
         raise ScenarioError("`record` must be records with the same encoders, or `motor_only`", "record", "motor_only")
     method = method or default_method([measured, *more])

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from orchestrator.api.estimate import EstimateResult
 from orchestrator.api.methods import describe_record
 from orchestrator.api.numerics import numeric_errors
-from orchestrator.api.records import record_to_fit
+from orchestrator.api.records import records_to_fit
 from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, doubts_of
 from orchestrator.errors import RecordError, ScenarioError
@@ -149,7 +149,8 @@ def locate_gap(
     """Find out in which stage of a train of two stages the gap is.
 
     Args:
-        record: a measured record with torque, motor and load angle, or its path.
+        record: a measured record with torque, motor and load angle, or its path: a long file comes to the rate of its
+            motion.
         model: of a ``TwoStageTrain``, as ``read_model`` returns it.
         time_limit: [s], after which the fit is given up (default: never).
         settings: thresholds, or the path of a TOML file with those that differ from the default.
@@ -180,7 +181,7 @@ def locate_gap(
 
 def complete_record(record: Record | Path | str, model: Model, **reading: Any) -> Record:
     """Return a record that has all that a train needs and can be one of it."""
-    measured = record_to_fit(record, model, **reading)
+    (measured,) = records_to_fit([record], model, **reading)
     if measured.theta_l is None:
         raise RecordError(
             f"{measured.source}: column `theta_l` must be there to tell in which stage the gap is, but is not: log the "

@@ -1,6 +1,6 @@
 """Records and models: what a user brings."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -92,9 +92,14 @@ def as_record(given: Record | Path | str, model: Model, torque_needed: bool = Tr
     return given
 
 
-def record_to_fit(given: Record | Path | str, model: Model, rate: float | None = None, **reading: Any) -> Record:
-    """Return a record to be fitted: where a path is given without a ``rate``, at the rate that the motion asks for."""
-    record = as_record(given, model, rate=rate, **reading)
-    if rate is not None or isinstance(given, Record):
-        return record
-    return follow_motion(record, ROWS_PER_RADIAN * natural_frequency(model))
+def records_to_fit(
+    given: Sequence[Record | Path | str], model: Model, rate: float | None = None, **reading: Any
+) -> list[Record]:
+    """Return records to be fitted: those of paths, without a ``rate``, at the one that the motion in them asks for."""
+    records = [as_record(one, model, rate=rate, **reading) for one in given]
+    read = [n for n, one in enumerate(given) if rate is None and not isinstance(one, Record)]
+    if read:
+        least = ROWS_PER_RADIAN * natural_frequency(model)
+        for n, record in zip(read, follow_motion([records[n] for n in read], least), strict=True):
+            records[n] = record
+    return records

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
-from orchestrator.api.estimable import plausible_record, require_linear
+from orchestrator.api.estimable import plausible_records, require_linear
 from orchestrator.api.estimate import DIAGNOSIS, EstimateResult, estimate
 from orchestrator.api.locate_gap import TRAIN, complete_record, locate_gap, require_train
 from orchestrator.api.shown import Block, write_page
@@ -45,7 +45,7 @@ def estimate_or_design(
 ) -> int:
     """Estimate the gap from records, design an experiment that would show it, or both."""
     require_linear(model)
-    records = [plausible_record(path, model, args.motor_only, **reading) for path in args.records]
+    records = plausible_records(args.records, model, args.motor_only, **reading)
     tell_rates(records, args.rate)
     if args.cost:
         _tell_cost(records, model, args, settings)

@@ -67,13 +67,13 @@ def run(args: argparse.Namespace) -> int:
 
     model = read_model(args.model)
     # Seconds of libraries, for which mistakes in flags and model file need not wait.
-    from orchestrator.api.diagnose import comparable_record, diagnose
+    from orchestrator.api.diagnose import comparable_records, diagnose
     from orchestrator.api.diagnosed import DiagnosisResult
 
-    records = [comparable_record(path, model, **reading) for path in args.records]
+    records = comparable_records(args.records, model, **reading)
     tell_rates(records, args.rate)
-    other = None if args.validate is None else comparable_record(args.validate, model, **reading)
-    tested = None if args.test is None else comparable_record(args.test, model, **reading)
+    (other,) = (None,) if args.validate is None else comparable_records([args.validate], model, **reading)
+    (tested,) = (None,) if args.test is None else comparable_records([args.test], model, **reading)
     files = {"record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}
     files["test"] = args.test
     given = {name: path and str(path) for name, path in files.items()}

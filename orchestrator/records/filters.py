@@ -1,6 +1,7 @@
 """Decimation of a record with an anti-alias filter."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from operator import itemgetter
 
@@ -23,22 +24,32 @@ MOST_ABOVE = 0.01  # share of the squared speed above that frequency
 PANE = 4096  # rows of a spectrum's pane at most
 
 
-def follow_motion(record: Record, least: float) -> Record:
-    """Return a long record at the rate that its motion asks for; a short one as it is.
+def follow_motion(records: Sequence[Record], least: float) -> list[Record]:
+    """Return long records at the rate that the motion in them asks for, one for all; short ones as they are.
+
+    Repeats of one experiment keep rows that can be compared.
 
     Args:
         least: samples per second that the result has at least [1/s].
     """
-    if record.size < 2 * ENOUGH_ROWS:
-        return record
+    long = [record for record in records if record.size >= 2 * ENOUGH_ROWS]
+    if not long:
+        return list(records)
+    band = max(map(_highest_frequency, long))
+    rate = max(PER_BAND * band, least, *(ENOUGH_ROWS / (record.size * record.step) for record in long))
+    note = f"the motion shows up to {band:.3g} Hz, for which this rate is enough; `rate` chooses another"
+
+    def follow(record: Record) -> Record:
+        fewer = decimate(record, rate)
+        return record if fewer is record else replace(fewer, notes=(*fewer.notes, note))
+
+    return [follow(record) if record.size >= 2 * ENOUGH_ROWS else record for record in records]
+
+
+def _highest_frequency(record: Record) -> float:
+    """Return the frequency [Hz] up to which the motion of an encoder shows."""
     angles = [interpolate_missing(angle) for angle in (record.theta_m, record.theta_l) if angle is not None]
-    bands = [content_band(y, record.step, robust_noise(y), MOST_ABOVE, PANE) for y in angles]
-    enough = ENOUGH_ROWS / (record.size * record.step)
-    fewer = decimate(record, max(PER_BAND * max(bands), least, enough))
-    if fewer is record:
-        return record
-    note = f"the motion shows up to {max(bands):.3g} Hz, for which this rate is enough; `rate` chooses another"
-    return replace(fewer, notes=(*fewer.notes, note))
+    return max(content_band(y, record.step, robust_noise(y), MOST_ABOVE, PANE) for y in angles)
 
 
 def decimate(record: Record, rate: float) -> Record:

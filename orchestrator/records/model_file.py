@@ -8,6 +8,7 @@ A model file is TOML::
     [parameters.J_l]
     value = 5.6
     relative_uncertainty = 0.05     # off by at most 5 % (or: uncertainty = 0.28, in the parameter's unit)
+    assumed = true                  # a draft's value, which nobody stated: a fit that leaves its range is no doubt
 
     [encoders.theta_m]
     resolution = 6.2832e-4          # one count [rad]; 0: not rounded; absent: found from the record

@@ -85,12 +85,15 @@ def test_a_long_record_comes_to_the_rate_of_its_motion_and_a_short_one_stays() -
     def of(angle: np.ndarray) -> Record:
         return Record(time, np.zeros(rows), angle + rng.normal(0.0, 1e-4, rows))
 
-    found = follow_motion(of(slow), 0.0)
+    (found,) = follow_motion([of(slow)], 0.0)
     assert 20_000 * 0.9 < found.size <= 20_000  # the motion alone would do with less
     assert found.averaged == 10
     assert "the motion shows up to" in found.notes[-1]
-    assert follow_motion(of(slow), 2000.0).averaged == 2  # of a stiff shaft
+    assert follow_motion([of(slow)], 2000.0)[0].averaged == 2  # of a stiff shaft
     quick = of(slow + 0.3 * np.sin(2.0 * np.pi * 60.0 * time))
-    assert follow_motion(quick, 0.0).averaged in (3, 4)  # twenty rows a period
+    assert follow_motion([quick], 0.0)[0].averaged in (3, 4)  # twenty rows a period
     short = quick.part(0, 39_000)
-    assert follow_motion(short, 0.0) is short
+    assert follow_motion([short], 0.0)[0] is short
+    longer, shorter = of(slow), of(slow).part(0, 90_000)  # repeats, whose rows are compared
+    pair = follow_motion([longer, short, shorter], 0.0)
+    assert [one.averaged for one in pair] == [4, 1, 4]
