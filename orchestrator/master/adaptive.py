@@ -1,54 +1,113 @@
-"""Continuous loops to a tolerance: windows of iterated waveforms that end at events, with rollback and error control.
+"""Continuous loops to a tolerance: windows of iterated waveforms, with rollback and error control.
 
-A window of time is swept again and again until what the slaves exchange settles (``event_sweeps``). Its error is
-estimated by step doubling: the window once as a whole, then in two halves, for which the whole is so good a guess that
-few sweeps do. The halves are kept. Slaves with events say themselves where those are, so that nothing is bisected: a
-window ends there, all slaves go through the event together, and the next window begins with what they show then. A jump
-or a kink that no slave tells of, such as a tooth that makes contact, shows as a large difference: the window is undone
-and shortened until its effect is below the tolerance. Windows end where a source jumps.
+A window of time is cut into two cells. Each sweep restores all slaves to the start of the window and steps them one
+after the other through it; the outputs read at the three nodes give, by quadratic interpolation, the inputs of the
+slaves that take them, as constant pieces with the right moments (``pieces``). The first sweep starts from extrapolated
+outputs; two sweeps leave an error of order five in the window's length, so that smooth loops converge with order four.
+
+The error is estimated by step doubling: the window once as a whole, then in two halves, for which the whole is so good
+a guess that two sweeps do. The halves are kept. A jump or a kink inside a window, such as a tooth that makes contact,
+shows as a large difference: the window is undone and shortened until the event's effect is below the tolerance, then
+windows grow again, no faster than the time since the event. They end where a source jumps.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from orchestrator.errors import ConvergenceError, ScenarioError, SlaveError
+from orchestrator.errors import ConvergenceError, ScenarioError
 from orchestrator.master.algorithms import Adaptive
-from orchestrator.master.event_stage import slack
-from orchestrator.master.event_sweeps import BRIEF, Sweeper, Swept, UnsettledError
-from orchestrator.master.events import EventIteration
 from orchestrator.master.layout import Layout
+from orchestrator.master.pieces import CELLS, NODES, piece_times, piece_weights
 from orchestrator.master.protocol import RunEndedError, StepDiscardedError
 from orchestrator.master.result import Statistics
 from orchestrator.master.rollback import rollback
 from orchestrator.master.signals import GRID_SLACK, Signal
-from orchestrator.master.tracks import JoinedTracks, Track
-from orchestrator.master.wiring import Slots, Stage, gather
+from orchestrator.master.waveform import Waveform
+from orchestrator.master.wiring import Slots, Stage, Wiring
 from orchestrator.shared.arrays import Array
 
-CUBIC_GAIN = 16.0
-"""How much better cubics are between nodes over half the length."""
-
-QUARTIC_SHARE = 0.03
-"""Largest error of a polynomial between five nodes as a share of the differences of the next order."""
-
+SWEEPS = 2
 SAFETY, SHRINK, GROW = 0.9, 0.1, 8.0
+EVENT_SHARE = 0.03
+"""Error allowed over an event: halving the window does not reduce it much, as it does in a smooth window."""
+
+SHORT = 0.02
+"""A window that is shorter than this part of the longest one is so because of an event."""
+
+SUSPICIOUS = 100.0
+"""Error beyond which a window is taken to hold an event rather than to be too long."""
+
+TELLING = 0.05
+"""A window that is shorter than this part of the next one tells nothing of the error between that one's nodes."""
+
+CAUTION = 1.0
+"""Longest window after an event as a multiple of the time since then."""
+
+HOPELESS = 30.0
+"""Error at the middle of a window beyond which its second half is not worth stepping."""
 ORDER = 5
 """Order, in a smooth window's length, of the error after it."""
 
 
 @dataclass(frozen=True)
-class _Window:
-    """A window that was tried."""
+class _Attempt:
+    """What came of one window."""
 
-    parts: tuple[Track, ...]  # what the signals do in it, part by part
-    end: float | None  # where the slaves are [s]; ``None``: at its begin, for it was undone
-    error: float  # as a multiple of the tolerance
-    length: float  # that was tried [s]
-    event: bool = False  # a slave has an event at its end
-    rates: Array | None = None  # derivatives at its end
+    outputs: Waveform | None  # over the window; ``None`` when it was undone
+    guess: Waveform | None  # for the next window
+    error: float  # estimate as a multiple of the tolerance
+    length: float  # of the window [s]
+    trouble: float  # time [s] by which the trouble has come, for a window that was undone
+
+
+@dataclass(frozen=True)
+class _Event:
+    """A jump or kink somewhere between ``start``, where a window failed, and ``end`` [s], with that window's error."""
+
+    start: float
+    end: float
+    error: float
+
+    def window_end(self, time: float) -> float:
+        """Return where to try next: across the event if it is near enough for its effect to pass, else half way."""
+        left, tried = self.end - time, self.end - self.start
+        across = math.isfinite(self.error) and self.error * left <= 0.5 * EVENT_SHARE * tried
+        return self.end if across else time + 0.5 * left
+
+    def was_none(self, attempt: _Attempt) -> bool:
+        """Whether a good window's error fits a smooth one, so that the failed window was merely too long."""
+        smooth = self.error * (attempt.length / (self.end - self.start)) ** ORDER
+        return attempt.error > 0.1 * smooth
+
+
+@dataclass
+class _Counts:
+    accepted: int = 0
+    rejected: int = 0
+    sweeps: int = 0
+
+
+def run_adaptive(
+    wiring: Wiring,
+    signals: Mapping[int, Signal],
+    start: float,
+    stop: float,
+    settings: Adaptive,
+    rows: Array,
+    record: NDArray[np.int64],
+) -> Statistics:
+    """Run from ``start`` to ``stop`` [s]; ``rows`` has shape (grid points, recorded) with row 0 already there.
+
+    Args:
+        signals: signals in place of those of ``System.sources``, by index.
+        record: (recorded,) slots of the recorded signals.
+    """
+    check_adaptive(wiring.layout)
+    return _Run(wiring, signals, start, stop, settings, rows, record).run()
 
 
 def check_adaptive(layout: Layout) -> None:
@@ -82,181 +141,216 @@ def next_length(length: float, error: float, largest: float) -> float:
     return min(length * min(max(factor, SHRINK), GROW), largest)
 
 
-class AdaptiveRun:
-    """A run under ``adaptive``.
+def largest_difference(values: Array, reference: Array, slots: Slots, tolerance: float) -> float:
+    """Return the largest difference of some slots as a multiple of the tolerance; shape (..., slots) each."""
+    a, b = values[..., slots], reference[..., slots]
+    error = float(np.max(np.abs(a - b) / (tolerance * np.maximum(1.0, np.abs(b))), initial=0.0))
+    return error if math.isfinite(error) else math.inf
 
-    Args:
-        events: the slaves and their event mode; those that have events are after their first instants.
-        signals: signals in place of those of ``System.sources``, by index.
-        start: [s].
-        stop: [s].
-        settings: tolerance and bounds of the step.
-    """
+
+def source_nodes(layout: Layout, signals: Sequence[Signal], times: Array, jumps: bool, stop: float) -> Array:
+    """Return what the sources add at times, shape (rows, times): the left limit at the last where one ``jumps``."""
+    inside = times.copy()
+    if jumps:
+        # Signals take a time just before a jump for the jump itself, by up to GRID_SLACK of their period.
+        inside[-1] -= max(1e-6 * (times[-1] - times[0]), 4.0 * GRID_SLACK * max(1.0, abs(stop)))
+    table = np.zeros((len(layout.signals), len(times)))
+    for k, parts in enumerate(layout.signals):
+        for index, factor, offset, _ in parts:
+            table[k] += factor * signals[index].sample(inside) + offset
+    return table
+
+
+class _Run:
+    """One run: the windows, their lengths and the recorded points."""
 
     def __init__(
-        self, events: EventIteration, signals: Mapping[int, Signal], start: float, stop: float, settings: Adaptive
+        self,
+        wiring: Wiring,
+        signals: Mapping[int, Signal],
+        start: float,
+        stop: float,
+        settings: Adaptive,
+        rows: Array,
+        record: NDArray[np.int64],
     ) -> None:
-        self.events, self.wiring, self.settings = events, events.wiring, settings
+        self.wiring, self.settings, self.rows, self.record = wiring, settings, rows, record
         self.start, self.stop = start, stop
-        layout = self.wiring.layout
-        check_adaptive(layout)
-        self.replaced = signals
-        sources = [signals.get(k, source.signal) for k, source in enumerate(layout.system.sources)]
-        self.breaks = sorted({t for signal in sources for t in signal.breaks(start, stop)} | {stop})
-        self.sweeper = Sweeper(events, self._sources, self._difference)
-        outputs = [k for stage in events.stages for k in range(stage.outputs.start, stage.outputs.stop)]
-        self.outputs = np.array([k for k in outputs if not self.sweeper.held[k]], dtype=np.int64)
-        self.accepted = self.rejected = 0
+        system = wiring.layout.system
+        self.signals = [signals.get(k, source.signal) for k, source in enumerate(system.sources)]
+        self.breaks = sorted({t for s in self.signals for t in s.breaks(start, stop)} | {stop})
+        self.held = np.array([self._is_held(address) for address in wiring.layout.slots], dtype=bool)
+        self.outputs = np.array(
+            [b.first_output + j for b in wiring.layout.blocks for j in range(len(b.outputs))], dtype=np.int64
+        )
+        self.outputs = self.outputs[~self.held[self.outputs]]
+        self.closing = {b.name: self._feeds_through(b.name) for b in wiring.layout.blocks}
+        self.before: Waveform | None = None  # the window before the present one, unless a jump lies between them
+        self.counts = _Counts()
+        self.calls = dict.fromkeys((b.name for b in wiring.layout.blocks), 0)
 
-    def run(self, rows: Array, record: Slots) -> Statistics:
-        """Run; a row holds the values after the events at its time.
+    def _is_held(self, address: str) -> bool:
+        variable = self.wiring.layout.system.variable(address)
+        return variable is not None and (variable.type != "Real" or variable.variability == "discrete")
 
-        Args:
-            rows: results, shape (grid points, recorded); row 0 is already there.
-        """
-        time, length, row = self.start, min(self.settings.first, self.settings.largest), 1
-        guess: Track | None = None
-        rates, longest = self.events.rates(), self.settings.largest / GROW
-        while time < self.stop - slack(self.stop):
-            jump = next(t for t in self.breaks if t > time + slack(time))
-            target = min(jump, self.events.next_time())
-            window = self._attempt(time, window_end(time, length, target), rates, guess, record)
-            if window.end is not None:
-                assert window.rates is not None
-                self.accepted += 1
-                time, rates = window.end, window.rates
-                self.events.raise_end(time)
-                guess = window.parts[-1] if window.parts else guess
-                row = self._write(window.parts, rows, record, row)
-            else:
-                self.rejected += 1
-            length = next_length(window.length, window.error, self.settings.largest)
-            if self._take_events(time, window, jump):
-                guess, rates, length = None, self.events.rates(), min(length, longest)
-                if row and abs(self._grid(row - 1) - time) <= slack(time):
-                    np.take(self.wiring.values, record, out=rows[row - 1], mode="clip")
-            elif window.end is None and length < self.settings.smallest:
-                raise ConvergenceError(
-                    f"t = {time:.9g} s: a tolerance of {self.settings.tolerance:g} would take a step below "
-                    f"{self.settings.smallest:g} s; use a larger tolerance, or algorithm 'iterated' for an algebraic "
-                    "loop"
-                )
-        calls = {stage.name: stage.steps for stage in self.events.stages}
-        return Statistics(self.accepted, self.rejected, calls, self.sweeper.sweeps, events=self.events.statistics())
+    def _feeds_through(self, name: str) -> bool:
+        block = next(b for b in self.wiring.layout.blocks if b.name == name)
+        instance = self.wiring.layout.system.instance(name)
+        assert instance is not None
+        outputs = [o for o in block.outputs if instance.model.variables[o].causality == "output"]
+        return any(i in instance.model.depends_on(o) for o in outputs for i in block.inputs)
 
-    def _grid(self, row: int) -> float:
-        return self.start + row * self.settings.step
+    def run(self) -> Statistics:
+        time, length = self.start, min(self.settings.first, self.settings.largest)
+        row, longest = 1, 0.0
+        for target in self.breaks:
+            guess = self.before = None
+            # Nothing is known yet of what comes after the jump, and nothing shows what a window does between its nodes.
+            length = min(length, self.settings.largest / GROW)
+            event: _Event | None = None
+            crossed = -math.inf
+            while time < target:
+                end = window_end(time, length, target) if event is None else event.window_end(time)
+                short = event is not None or end - time < SHORT * longest
+                share = EVENT_SHARE if short else 1.0
+                attempt = self._attempt(time, end, guess, share)
+                guess = attempt.guess
+                if attempt.outputs is None:
+                    self.counts.rejected += 1
+                    if event is not None or attempt.error > SUSPICIOUS:
+                        event = _Event(time, attempt.trouble, attempt.error)
+                    length = next_length(attempt.length, attempt.error / share, self.settings.largest)
+                    self._give_up(time, (event.window_end(time) - time) if event else length)
+                    continue
+                row = self._write(attempt.outputs, row)
+                self.before = attempt.guess
+                self.counts.accepted += 1
+                longest = max(longest, attempt.length)
+                length = next_length(attempt.length, attempt.error / share, self.settings.largest)
+                if event is not None and (end >= event.end or event.was_none(attempt)):
+                    crossed, event = end, None
+                time = end
+                # Held inputs must not take a slave back across the event that it has just passed.
+                length = min(length, max(attempt.length, CAUTION * (time - crossed)))
+        return Statistics(self.counts.accepted, self.counts.rejected, self.calls, self.counts.sweeps)
 
-    def _take_events(self, time: float, window: _Window, jump: float) -> bool:
-        """Take what is due at ``time`` [s]; return whether there was anything."""
-        if window.end is None:
-            return False
-        column = self._sample(np.array([time]))
+    def _give_up(self, time: float, length: float) -> None:
+        if length < self.settings.smallest:
+            raise ConvergenceError(
+                f"t = {time:.9g} s: a tolerance of {self.settings.tolerance:g} would take a step below "
+                f"{self.settings.smallest:g} s; use a larger tolerance, or algorithm 'iterated' for an algebraic loop"
+            )
 
-        def fill(stage: Stage) -> None:
-            gather(stage, self.wiring.view, column, 0)
-
-        jumps = jump - time <= slack(time) and jump < self.stop
-        if jumps and not window.event:
-            self.events.jump(time, fill)
-        return self.events.catch_up(time, fill, window.event) or jumps
-
-    def _sources(self, times: Array) -> Array:
-        """Return what the sources add at nodes: the left limit at the last where one jumps."""
-        inside = times.copy()
-        if min(abs(t - times[-1]) for t in self.breaks) <= slack(times[-1]):
-            # Signals take a time just before a jump for the jump itself, by up to GRID_SLACK of their period.
-            inside[-1] -= max(1e-6 * (times[-1] - times[0]), 4.0 * GRID_SLACK * max(1.0, abs(self.stop)))
-        return self._sample(inside)
-
-    def _sample(self, times: Array) -> Array:
-        """Return what the sources add at times (n,) [s], shape (rows, n)."""
-        layout = self.wiring.layout
-        rows = [layout.signal_values(row, times, self.replaced) for row in range(len(layout.signals))]
-        return np.array(rows).reshape(len(rows), len(times))
-
-    def _difference(self, values: Array, reference: Array) -> float:
-        """Return the largest difference of outputs as a multiple of the tolerance; shape (..., slots) each."""
-        a, b = values[..., self.outputs], reference[..., self.outputs]
-        error = float(np.max(np.abs(a - b) / (self.settings.tolerance * np.maximum(1.0, np.abs(b))), initial=0.0))
-        return error if math.isfinite(error) else math.inf
-
-    def _attempt(self, begin: float, end: float, rates: Array, guess: Track | None, record: Slots) -> _Window:
-        """Try a window; leave the slaves at its end when its error is within the tolerance, else at its begin."""
-        length = end - begin
+    def _attempt(self, start: float, end: float, guess: Waveform | None, share: float) -> _Attempt:
+        """Try one window; leave the slaves at its end when its error is within ``share``, else at its start."""
+        middle, length = 0.5 * (start + end), end - start
         with rollback(self.wiring) as restore:
             try:
-                return self._sweep_whole_and_halves(begin, end, rates, guess, record, restore)
-            except RunEndedError as error:
-                raise SlaveError(f"{error}: it wants the run to end, which `adaptive` does not do") from None
-            except (UnsettledError, StepDiscardedError) as error:
+                whole = self._sweep(start, end, guess)
                 restore()
-                if isinstance(error, StepDiscardedError) and length < self.settings.smallest:
-                    raise SlaveError(str(error)) from None
-                return _Window((), None, math.inf, length)
-
-    def _sweep_whole_and_halves(
-        self, begin: float, end: float, rates: Array, guess: Track | None, record: Slots, restore: Callable[[], None]
-    ) -> _Window:
-        whole = self.sweeper.sweep(begin, end, rates, guess)
-        track, length = whole.track, whole.end - begin
-        if length <= 1.01 * BRIEF * slack(begin):
-            parts: tuple[Track, ...] = (track,) if length > 0.0 else ()
-            return _Window(parts, whole.end, 0.0, end - begin, whole.event, whole.rates)
-        restore()
-        middle = 0.5 * (begin + whole.end)
-        first = self.sweeper.sweep(begin, middle, rates, track)
-        error, halves = self._compare(track, first), [first]
-        if not first.event and first.end == middle:
-            halves.append(self.sweeper.sweep(middle, whole.end, first.rates, track))
-            read = np.union1d(self._recorded(track, record), self.events.exchanged if whole.event else record[:0])
-            error = max(error, self._compare(track, halves[1]), self._between(track, halves, read))
-        if error > 1.0:
+                first = self._sweep(start, middle, whole)
+                error = self._difference(whole.nodes[CELLS // 2], first.nodes[-1])
+                if error > HOPELESS:
+                    restore()
+                    return _Attempt(None, first, error, length, end)
+                second = self._sweep(middle, end, whole)
+            except RunEndedError:
+                raise
+            except StepDiscardedError:
+                restore()
+                return _Attempt(None, None, math.inf, length, end)
+            error = self._difference(whole.nodes[-1], second.nodes[-1])
+            if error <= share:
+                both = Waveform(start, end, np.concatenate((first.nodes, second.nodes[1:])))
+                # Beside an event the window before may have held it, and tells nothing of this one.
+                between = self._between(both) if share == 1.0 else 0.0
+                if between <= 1.0:
+                    return _Attempt(both, second, max(error, between), length, end)
+                error = min(between, SUSPICIOUS)
             restore()
-            return _Window((), None, error, end - begin)
-        last = halves[-1]
-        parts = tuple(half.track for half in halves if half.end > half.track.start)
-        return _Window(parts, last.end, error, length, last.event, last.rates)
+            return _Attempt(None, whole if math.isfinite(error) else None, error, length, end)
 
-    def _compare(self, track: Track, half: Swept) -> float:
-        """Return how far a half is from the whole at its end."""
-        if half.end == half.track.start:
-            return 0.0
-        return self._difference(track.at(np.array([half.end]))[0], half.track.values[2])
-
-    def _recorded(self, track: Track, record: Slots) -> Slots:
-        """Return the recorded slots where a recorded point is within the window."""
+    def _between(self, window: Waveform) -> float:
+        """Return the error of recorded points between the nodes as a multiple of the tolerance."""
         step = self.settings.step
-        inside = math.floor((track.end - self.start) / step) > math.floor((track.start - self.start) / step)
-        return record if inside else record[:0]
-
-    def _between(self, track: Track, halves: Sequence[Swept], read: Slots) -> float:
-        """Return the error of slots between nodes as a multiple of the tolerance.
-
-        Between nodes recorded points are read, and the inputs by which a slave has placed the event at the end.
-        """
-        if not len(read):
+        first = math.ceil((window.start - self.start) / step * (1.0 + 1e-12) + 1e-9)
+        times = self.start + step * np.arange(first, math.ceil((window.end - self.start) / step - 1e-9))
+        before = self.before
+        if before is None or not len(times) or before.end - before.start < TELLING * (window.end - window.start):
             return 0.0
-        rated, held = self.sweeper.rated[read], self.sweeper.held[read]
-        rough = JoinedTracks(tuple(half.track for half in halves)).roughness()[read]
-        worst = 0.0
-        for half in halves:
-            time, values = 0.5 * (half.track.start + half.track.end), half.track.values[1, read]
-            cubic = np.abs(track.at(np.array([time]))[0, read] - values) / CUBIC_GAIN
-            error = np.where(rated, cubic, QUARTIC_SHARE * rough)
-            scale = self.settings.tolerance * np.maximum(1.0, np.abs(values))
-            worst = max(worst, float(np.max((error / scale)[~held], initial=0.0)))
-        return worst
+        signals = self.record[~self.held[self.record]]
+        scale = self.settings.tolerance * np.maximum(1.0, np.abs(window.nodes[-1, signals]))
+        error = float(np.max(np.abs(window.error_between(before, times)[:, signals]) / scale, initial=0.0))
+        return error if math.isfinite(error) else SUSPICIOUS
 
-    def _write(self, parts: tuple[Track, ...], rows: Array, record: Slots, row: int) -> int:
+    def _difference(self, values: Array, reference: Array) -> float:
+        return largest_difference(values, reference, self.outputs, self.settings.tolerance)
+
+    def _sweep(self, start: float, end: float, guess: Waveform | None) -> Waveform:
+        """Step all slaves from ``start`` to ``end`` [s], ``SWEEPS`` times over, and return the outputs in between."""
+        times = start + (end - start) * np.arange(NODES) / CELLS
+        initial = self.wiring.values.copy()
+        nodes = np.tile(initial, (NODES, 1))
+        if guess is not None:
+            guessed = guess.at(times)[:, self.outputs]
+            nodes[1:, self.outputs] = guessed[1:] + (initial[self.outputs] - guessed[0])
+        feeds = source_nodes(self.wiring.layout, self.signals, times, times[-1] in self.breaks, self.stop)
+        with rollback(self.wiring) as restore:
+            for sweep in range(SWEEPS):
+                if sweep:
+                    restore()
+                self.counts.sweeps += 1
+                for stage in self.wiring.stages:
+                    self._advance(stage, start, end, nodes, feeds)
+        return Waveform(start, end, nodes)
+
+    def _advance(self, stage: Stage, start: float, end: float, nodes: Array, feeds: Array) -> None:
+        """Step one slave through the window and read its outputs at the nodes."""
+        block, values = stage.block, self.wiring.values
+        closing = self.closing[block.name]
+        inputs = slice(block.first_input, block.first_input + len(block.inputs))
+        outputs = slice(block.first_output, block.first_output + len(block.outputs))
+        constants = piece_weights(closing) @ self._input_nodes(stage, nodes, feeds)
+        times, at_node = piece_times(start, end, closing)
+        node = 1
+        for k, ends_cell in enumerate(at_node):
+            if block.inputs:
+                values[inputs] = constants[k]
+                stage.send()
+            stage.do_step(times[k], times[k + 1] - times[k])
+            self.calls[block.name] += 1
+            if ends_cell:
+                stage.receive()
+                nodes[node, outputs] = values[outputs]
+                nodes[node, inputs] = values[inputs]
+                node += 1
+
+    def _input_nodes(self, stage: Stage, nodes: Array, feeds: Array) -> Array:
+        columns = np.empty((NODES, len(stage.block.feeds)))
+        for k, feed in enumerate(stage.block.feeds):
+            column = np.full(NODES, feed.offset)
+            if feed.source >= 0:
+                source = nodes[:, feed.source]
+                column += feed.factor * (source[0] if self.held[feed.source] else source)
+            if feed.signal >= 0:
+                column += feeds[feed.signal]
+            columns[:, k] = column
+        return columns
+
+    def _write(self, waveform: Waveform, row: int) -> int:
         """Fill in the recorded points up to the end of the window; return the next one's number."""
+        step, last = self.settings.step, len(self.rows) - 1
+        slack = 1e-9 * step
         first = row
-        end = parts[-1].end if parts else -math.inf
-        while row < len(rows) and self._grid(row) <= end + slack(end):
+        while row <= last and self.start + row * step <= waveform.end + slack:
             row += 1
         if row > first:
-            tracks = JoinedTracks(parts)
-            times = np.minimum(self._grid(0) + self.settings.step * np.arange(first, row), end)
-            held = self.sweeper.held
-            rows[first:row] = np.where(held, tracks.values_before(times), tracks.at(times))[:, record]
+            times = np.minimum(self.start + step * np.arange(first, row), waveform.end)
+            block = waveform.at(times)
+            last_node = len(waveform.nodes) - 1
+            node = np.floor((times - waveform.start) / (waveform.end - waveform.start) * last_node + 1e-9).astype(
+                np.int64
+            )
+            block[:, self.held] = waveform.nodes[node][:, self.held]
+            self.rows[first:row] = block[:, self.record]
         return row

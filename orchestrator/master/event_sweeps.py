@@ -1,4 +1,4 @@
-"""All slaves of a system through one window, again and again until what they exchange settles.
+"""All slaves of a system with events through one window, again and again until what they exchange settles.
 
 A sweep restores all slaves to the begin of the window and steps them one after the other through its two cells; their
 outputs at the three nodes, with derivatives where slaves know them, are the inputs of the next sweep. A slave that
@@ -26,7 +26,7 @@ BRIEF = 100.0
 FAR = 40.0
 """Length of a window as a multiple of the one before, beyond which that one's polynomials tell nothing."""
 
-SETTLED = 1.0
+SETTLED = 0.1
 """Change of an output in the last sweep, as a multiple of the tolerance."""
 
 

@@ -149,8 +149,6 @@ class EventIteration:
 
     def jump(self, time: float, gather: Gather) -> None:
         """Take all slaves through an instant because a source jumps at ``time`` [s]."""
-        if not self._taking:
-            return
         self.enter()
         self._settle(time, gather)
         self.catch_up(time, gather)

@@ -71,6 +71,15 @@ def _integral(u: Polynomial) -> float:
     return float(primitive(1.0) - primitive(0.0))
 
 
+@cache
+def dense_matrix(nodes: int) -> Array:
+    """Return the matrix from values at equidistant nodes to the coefficients of the polynomial in ``s``, square.
+
+    Row ``k`` holds the coefficients of ``s**k``, ``s`` being the fraction of the window.
+    """
+    return np.array([p.coef for p in _node_basis(nodes)]).T.copy()
+
+
 def piece_times(start: float, end: float, closing: bool) -> tuple[list[float], list[bool]]:
     """Return the instants between which a slave is stepped from ``start`` to ``end`` [s], and which are nodes."""
     edges = _breakpoints(closing)

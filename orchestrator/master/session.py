@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from orchestrator.errors import FmuError, ScenarioError, SimulationError, SlaveError
-from orchestrator.master.adaptive import AdaptiveRun
+from orchestrator.master.adaptive import run_adaptive
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Jacobi, step_count
 from orchestrator.master.clocks import TickSamples, clock_problems
 from orchestrator.master.divergence import divergence_remarks
 from orchestrator.master.event_steps import FixedSteps
+from orchestrator.master.event_windows import EventWindows
 from orchestrator.master.events import EventIteration
 from orchestrator.master.fixed_step import run_fixed_step
 from orchestrator.master.iterated import Iterated, backward_slots, initialise
@@ -251,9 +252,10 @@ class Session:
                 return Statistics(
                     steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), steps, loop
                 )
+            case Adaptive() if self._events is not None:
+                return EventWindows(self._events, signals, self.start, self.stop, algorithm).run(rows, record)
             case Adaptive():
-                events = self._events or EventIteration(wiring)
-                return AdaptiveRun(events, signals, self.start, self.stop, algorithm).run(rows, record)
+                return run_adaptive(wiring, signals, self.start, self.stop, algorithm, rows, record)
             case _:
                 sweeps = algorithm.run(wiring, table, self.start, steps, rows, record)
         return Statistics(steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), sweeps)

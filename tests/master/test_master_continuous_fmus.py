@@ -98,4 +98,4 @@ def test_error_controlled_master_reaches_a_microradian_with_backlash(
 ) -> None:
     result = run(folder, f'algorithm = "adaptive"\nstep = 1e-3\ntolerance = {tolerance}', 2.0, alpha)
     assert error(result, alpha) < bound
-    assert max(result.statistics.do_steps.values()) <= 100_000
+    assert max(result.statistics.do_steps.values()) <= 70_000
