@@ -170,7 +170,10 @@ LINES = st.one_of(
 COUNT = iter(range(1000))
 
 
-@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
+EXAMPLES = 10 if settings.default.derandomize else 25  # by day, by night
+
+
+@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
 @given(programs=st.lists(st.lists(LINES, min_size=1, max_size=6), min_size=4, max_size=4))
 @example(
     programs=[["a = math.sin(math.sqrt(abs(max(b, 0.20783536533066993))))"]]
@@ -178,7 +181,7 @@ COUNT = iter(range(1000))
 def test_random_programs_give_the_bits_of_python(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, programs: list[list[str]]
 ) -> None:
-    """40 programs, four in each library; others each night."""
+    """40 programs by day, 100 others each night, four in each library."""
     bodies = []
     for number, lines in enumerate(programs):
         text = "\n".join(f"        {line}" for line in lines)

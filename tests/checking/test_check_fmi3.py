@@ -104,10 +104,11 @@ def test_discrete_inputs_stay_in_continuous_time_mode(tmp_path: Path) -> None:
         "interval",
     ],
 )
+@pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.night)], ids=["its probe", "all probes"])
 def test_what_more_a_description_promises_is_probed(
-    interface: str, edits: Edits, fault: str, stage: str, tmp_path: Path
+    interface: str, edits: Edits, fault: str, stage: str, every: bool, tmp_path: Path
 ) -> None:
-    options = replace(QUICK, probes=("life cycle", "inputs", stage))
+    options = replace(QUICK, probes=() if every else ("life cycle", "inputs", stage))
     report = check_fmu(write_fmu(tmp_path / "more.fmu", extended(fault, interface, edits)), options)
     assert report.findings == ()
     assert report.executions[0].stages[stage] == ""

@@ -77,6 +77,13 @@ def test_a_fault_is_named_by_its_rule(plant: BrokenPlant, tmp_path: Path) -> Non
     assert plant.rule in {f.rule for f in report.findings}
 
 
+@pytest.mark.night
+@pytest.mark.parametrize("plant", CHOSEN.values(), ids=lambda p: p.name)
+def test_a_fault_is_named_among_all_probes(plant: BrokenPlant, tmp_path: Path) -> None:
+    report = check_fmu(plant.build(tmp_path / "plant.fmu"), OPTIONS)
+    assert plant.rule in {f.rule for f in report.findings}
+
+
 def test_each_cause_has_many_faults_of_both_versions() -> None:
     counts = Counter((p.cause, p.version) for p in PLANTS)
     assert min(counts.values()) >= 8

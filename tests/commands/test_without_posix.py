@@ -121,7 +121,7 @@ def test_the_workbench_runs_a_job(tmp_path: Path) -> None:
         assert job["state"] == "done", served.ask("GET", f"results/{job['name']}/output.txt")
         stopped = served.start("estimate", [log], no_diagnose=True)
         assert served.ask("POST", f"jobs/{stopped}/stop", {})[0] < 300
-        assert served.wait(stopped)["state"] != "running"
+        assert served.wait(stopped)["state"] == "stopped"
 
 
 def test_a_child_without_a_group_is_ended_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,6 +56,9 @@ def test_those_that_were_found_give_the_same_numbers(record, searched) -> None:
     assert [one.label for one in again.effects] == [PLAY, FRICTION]
     np.testing.assert_allclose(again.workings.final, searched.workings.final, rtol=1e-2)  # whitened in other turns
     assert [one.grade for one in again.effects] == [one.grade for one in searched.effects]
+    for one, other in zip(again.effects, searched.effects, strict=True):
+        for name, size in one.parameters.items():
+            assert size.value == pytest.approx(other.parameters[name].value, rel=1e-3)
 
 
 def test_one_that_was_not_found_is_in_the_corrected_model_with_its_own_grade(asked, searched, tmp_path: Path) -> None:

@@ -94,7 +94,8 @@ def test_trust_names_what_is_only_likely() -> None:
 
     assert reasons(graded(Grade.CERTAIN, 0.6, 8.0)) == ()
     (reason,) = reasons(graded(Grade.LIKELY, 0.6, 8.0))
-    assert reason.startswith("likely, not certain: torque ripple at the motor")
+    told = "likely, not certain: torque ripple at the motor: another effect may stand there"
+    assert reason == f"{told}; make the record that is advised"
 
 
 def test_friction_that_would_drive_the_axis_in_one_direction_is_no_law(model: Model) -> None:
@@ -191,6 +192,7 @@ def test_a_possible_name_widens_the_sizes_of_the_others() -> None:
     assert np.mean(drawn > wide.interval[1]) == pytest.approx(0.025, abs=0.002)
     alike = open_to(other, replace(other), SETTINGS.report).parameters["alpha"]
     assert alike.interval == pytest.approx(other.parameters["alpha"].interval)
+    assert (alike.value, alike.standard_error) == pytest.approx((8.0, 2.0))
 
 
 def test_the_drift_of_free_runs_is_what_values_off_make(model: Model) -> None:

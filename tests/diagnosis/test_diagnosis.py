@@ -9,7 +9,7 @@ import orchestrator as oc
 from orchestrator.diagnosis.data.records import check_model, check_record
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.report.estimates import find_drive_gain
-from orchestrator.diagnosis.report.summary import play_of, summarise
+from orchestrator.diagnosis.report.summary import play_of, summarise, value_words
 from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.diagnosis.selection.outcome import Grade
 from orchestrator.effects.of_logs import centre_angle
@@ -117,7 +117,8 @@ def test_an_encoder_off_its_centre_is_of_the_log(body: str) -> None:
     low, high = nuisance.parameters["amplitude"].interval
     assert low < 0.02 < high < 1.1 * low
     assert nuisance.parameters["phase"].value == pytest.approx(0.9, abs=0.05)
-    assert f"`theta_{body[0]}` is off by up to 0.0" in "".join(summarise(found))
+    told = value_words(nuisance.parameters["amplitude"])
+    assert f"`theta_{body[0]}` is off by up to {told} once a turn" in "".join(summarise(found))
 
 
 def test_an_angle_is_centred_exactly() -> None:
@@ -158,10 +159,11 @@ def test_another_record_can_be_the_test_data() -> None:
     assert found.workings.records[0].size == record.size
 
 
-def test_missing_samples_are_passed_over() -> None:
+@pytest.mark.parametrize("effects", [["coulomb_friction@motor"], pytest.param(None, marks=pytest.mark.night)])
+def test_missing_samples_are_passed_over(effects: list[str] | None) -> None:
     columns, _ = make_record({"Fc_m": 0.8}, 21, 16.0, substeps=50)
     columns["theta_m"][500:530] = np.nan
-    found = diagnose(record_from_columns(columns, "gaps"), MODEL, effects=["coulomb_friction@motor"])
+    found = diagnose(record_from_columns(columns, "gaps"), MODEL, effects=effects)
     assert likely(found) == ["coulomb_friction@motor"]
     assert found.effects[0].parameters["torque"].value == pytest.approx(0.8, rel=0.05)
     assert not found.test[0].is_worse(0.05, 0.1)

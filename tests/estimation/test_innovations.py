@@ -141,12 +141,13 @@ def test_dry_friction_is_not_seen() -> None:
     assert np.array_equal(seen.inputs, smooth.inputs)
 
 
+@pytest.mark.parametrize("flank", [1, -1])
 @pytest.mark.parametrize("depth", [0.003, -0.003])
-def test_damping_sets_in_at_a_depth(depth: float) -> None:
+def test_damping_sets_in_at_a_depth(depth: float, flank: int) -> None:
     """Against small steps of a shaft whose spring acts from the half-gap on, its damper from the depth beyond that."""
     alpha, parts = 0.02, 4800
     p = dt.parameters(alpha=alpha, c=40.0)
-    torque = np.repeat([60.0, -60.0, 60.0], 40)
+    torque = flank * np.repeat([60.0, -60.0, 60.0], 40)
     model = affine_model(p._asdict() | {DEPTH: depth * np.hypot(alpha, FADING) / alpha})
     assert model.depths == pytest.approx(depth)
     found = simulate(model, torque, H, np.zeros(5))
@@ -164,7 +165,7 @@ def test_damping_sets_in_at_a_depth(depth: float) -> None:
             assert np.allclose(found[n * len(torque) // parts], x, atol=2e-4 * (1.0 + np.abs(x))), n
         u = torque[n * len(torque) // parts]
         x = x + h * rates(x + 0.5 * h * rates(x, u), u)
-    assert np.ptp(x) > 0.0
+    assert np.max(flank * (found[:, 0] / p.i - found[:, 2])) > alpha + abs(depth)
 
 
 def test_the_depth_of_a_contact_fades_with_the_gap() -> None:

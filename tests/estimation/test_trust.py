@@ -84,7 +84,8 @@ def test_a_value_far_outside_is_red_where_the_half_gap_hangs_on_it(correlation: 
 
 def test_a_value_outside_its_stated_range_is_named_with_both() -> None:
     (reason,) = trust_of_estimates([fitted("J_l", 1.078)], default_model())["maximum_likelihood"].reasons
-    assert reason.startswith("`J_l` is fitted as 6.037, but stated as 5.6 to within 0.28: ")
+    said = "`J_l` is fitted as 6.037, but stated as 5.6 to within 0.28: something may be missing that it stands for"
+    assert reason == f"{said}; check its value and its unit"
 
 
 def test_a_range_that_nobody_stated_is_no_reason() -> None:

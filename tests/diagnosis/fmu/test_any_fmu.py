@@ -32,6 +32,9 @@ from tests.support.c_fmu import have_compiler
 pytestmark = pytest.mark.skipif(not have_compiler(), reason="no C compiler")
 SPRING, TWO_MASS, CIRCUIT, TANKS = DOMAINS
 DRAG = "quadratic_drag@port"
+# What a search names where something else is tested is looked at by night.
+AT_NIGHT = pytest.param(True, marks=pytest.mark.night)
+SEARCHES = pytest.mark.parametrize("search", [False, AT_NIGHT], ids=["asked", "named"])
 
 
 @pytest.fixture
@@ -168,13 +171,15 @@ def test_a_drafted_map_can_be_used_as_it_is(made, tmp_path):
      *(pytest.param(name, marks=pytest.mark.night)
        for name in ("reset_refused", "reset_keeps_parameters", "terminate_refused", "stop_told"))],
 )  # fmt: skip
-def test_an_fmu_that_misbehaves_mildly_is_diagnosed_all_the_same(made, fault):
+@SEARCHES
+def test_an_fmu_that_misbehaves_mildly_is_diagnosed_all_the_same(made, fault, search):
     case, *files = made(SPRING, ("quadratic_drag",), rows=500, fault=fault)
     if fault == "input_reversed":
         text = files[2].read_text().replace('hold = "zero"', 'hold = "zero", factor = -1.0')
         files[2].write_text(text)
-    found = diagnose(*files, effects=[DRAG])
+    found = diagnose(*files, effects=None if search else [DRAG])
     found.close()
+    assert [effect.name for effect in found.effects] == ["quadratic_drag"]
     size = found.effects[0].parameters["coefficient"].value
     assert size == pytest.approx(case.sizes[0], rel=0.02)
     assert max(one.final / one.noise for one in found.test[0].signals) < 2.0
@@ -267,9 +272,10 @@ def test_a_search_that_is_cut_short_says_so_and_names_nothing(made):
     assert any("time limit" in note for note in found.notes)
 
 
-def test_an_fmu_with_a_step_of_its_own_is_stepped_by_it(made):
+@SEARCHES
+def test_an_fmu_with_a_step_of_its_own_is_stepped_by_it(made, search):
     _, *files = made(SPRING, rows=300, fault="own_grid")
-    found = diagnose(*files, search=False)
+    found = diagnose(*files, search=search)
     found.close()
     assert found.diagnosis.workings.problem.m == 1
     assert any("has a fixed step" in note for note in found.notes)
@@ -290,12 +296,13 @@ def test_an_fmu_that_goes_by_its_own_clock_is_kept_in_time(made, domain):
     assert max(one.final / one.noise for one in found.validation.signals) < 1.2  # another record is compared as late
 
 
-def test_the_clock_of_an_fmu_that_rests_at_first_is_seen(made):
+@SEARCHES
+def test_the_clock_of_an_fmu_that_rests_at_first_is_seen(made, search):
     case, path, *files = made(SPRING, fault="own_clock")
     rest = 12
     u, y = (np.concatenate([np.zeros((rest, *v.shape[1:])), v[:-rest]]) for v in (case.u, case.y))
     write_record(path, dataclasses.replace(case, u=u, y=y))
-    found = diagnose(path, *files, search=False)
+    found = diagnose(path, *files, search=search)
     found.close()
     assert found.diagnosis.workings.problem.short != 0.0
     assert found.verdict in ("none", "parameters")
@@ -315,16 +322,18 @@ def test_a_second_record_shows_the_misfit_and_settings_are_followed(made, tmp_pa
     assert misfit["final"] > 1.5 * misfit["noise"]  # it was made without the drag, and with other parameters
 
 
-def test_an_fmu_that_changes_from_run_to_run_is_made_anew_for_each(made):
+@SEARCHES
+def test_an_fmu_that_changes_from_run_to_run_is_made_anew_for_each(made, search):
     _, *files = made(SPRING, rows=300, fault="drifts")
-    found = diagnose(*files, search=False)
+    found = diagnose(*files, search=search)
     found.close()
     assert any("new instance" in note for note in found.notes)
 
 
-def test_parameters_that_do_nothing_are_left_out(made):
+@SEARCHES
+def test_parameters_that_do_nothing_are_left_out(made, search):
     _, *files = made(SPRING, rows=300, fault="parameters_ignored")
-    found = diagnose(*files, search=False)
+    found = diagnose(*files, search=search)
     found.close()
     assert any("changes nothing" in note for note in found.notes)
 

@@ -147,7 +147,7 @@ def test_the_advice_of_a_held_record_shows_the_gap(columns) -> None:
 
 def test_the_sentence_says_what_the_table_says(columns) -> None:
     """A weak torque moves the teeth through small gaps only: a size that is not seen is in no range of the sentence."""
-    for scale in (0.05, 0.01):
+    for scale in (1.0, 0.05, 0.01):
         weak = dict(columns) | {"u": scale * columns["u"]}
         seen = oc.inspect(record_from_columns(weak, "weak"), oc.read_model())
         sizes = {size: bound < 0.25 * size for size, bound in seen.sufficiency.bounds}
