@@ -14,7 +14,6 @@ import numpy as np
 from orchestrator.building.build import ensure_built
 from orchestrator.estimation.design import plant_of
 from orchestrator.estimation.filter.innovations import simulate
-from orchestrator.estimation.filter.model import Array
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.fmi.instances import fmu_instance
@@ -24,6 +23,7 @@ from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.arrays import Array
 from orchestrator.shared.inference.normal import interval_95
 from pyfmu_sources.drivetrain.equations import PARAMETERS
 
