@@ -11,16 +11,9 @@ def follow(
 ) -> None:  # fmt: skip
     """Fill twist and load angle at each sample, over the half-gap.
 
-    Args:
-        gap: (k, k) step of a part of a sample within the gap.
-        contact: (k, k) the same on the upper flank; on the lower one all signs are turned.
-        sample: (k, k) what the controller does at a sample.
-        state: (k,) the plant's, the requests under way, and 1; moved on in place.
-        moved: (k,) scratch, filled anew at every part.
-        parts: into how many a sample is cut.
-        i: turns of the motor for one of the load.
-        twist: (n,) filled: motor angle over the gear ratio less load angle.
-        load: (n,) filled: angles of the load.
+    ``gap`` and ``contact`` (k, k) step one of the ``parts`` of a sample within the gap and on the upper flank; on the
+    lower one all signs are turned. ``sample`` (k, k) is what the controller does at a sample. ``state`` (k,) is the
+    plant's, the requests under way, and 1; it moves on in place, through the scratch ``moved`` (k,).
     """
     size = len(state)
     for n in range(len(load)):

@@ -44,12 +44,7 @@ class Margins:
 def forecast_rest(
     values: DrivetrainValues, gains: tuple[float, ...], sample_time: float, delay: int = 0
 ) -> ForecastFound:
-    """Return what the loop ``u = -K x`` does at rest.
-
-    Args:
-        gains: for ``REGULATOR_STATES``.
-        sample_time: of the controller [s].
-        delay: of the request [samples].
+    """Return what the loop ``u = -K x`` of ``REGULATOR_STATES`` does at rest; ``delay``: of the request [samples].
 
     Raises:
         ScenarioError: the loop is unstable even without a gap.

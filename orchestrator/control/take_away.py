@@ -26,13 +26,7 @@ DELAYS = {"estimator": 1.0, "controller": 2.0}  # further samples, in a host tha
 
 
 def write_loop(folder: Path, name: str, task: ControlTask, native: bool, fmi: int) -> None:
-    """Write everything into a folder that exists.
-
-    Args:
-        name: suffix of the FMUs' names.
-        native: FMUs that need no Python.
-        fmi: 2, or 3 with ``native``.
-    """
+    """Write everything into a folder; FMUs have the suffix ``name``, and FMI 3 only where they are ``native``."""
     recipes = recipes_for(name, task)
     paths = {
         kind: build_native(recipe, folder, fmi)

@@ -21,11 +21,7 @@ def default_method(records: Sequence[Record]) -> str:
 
 
 def apply_method(name: str, records: Sequence[Record], model: Model, options: Mapping[str, Any]) -> Estimate:
-    """Return the estimate of one method; one that does not take what the records have does not apply.
-
-    Args:
-        options: of all methods, by their names in ``OPTIONS``.
-    """
+    """Return the estimate of one method, which takes its own of the ``options``, and may not apply to such records."""
     record, *more = records
     taken = OPTIONS.get(name, ())
     if name != WITHOUT_TORQUE and not all(one.has_torque for one in records):

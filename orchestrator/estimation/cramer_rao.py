@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.joint import JointLikelihood
@@ -27,8 +26,7 @@ def error_bound(
 ) -> float:
     """Return the bound [rad] on alpha at known true ``values`` of the unknowns, for a deterministic plant.
 
-    Args:
-        noise: true standard deviation [rad] of each encoder, rounding included.
+    ``noise``: true standard deviation [rad] of each encoder, rounding included.
     """
     likelihood = Likelihood(problem, threads) if isinstance(problem, GapProblem) else JointLikelihood(problem, threads)
     problem = likelihood.problem
@@ -42,26 +40,15 @@ def error_bound(
         elif name.startswith("log_noise_"):
             theta[n] = math.log(noise[0] if name.endswith("theta_m") else noise[1])
     free = np.array([n for n, name in enumerate(problem.names) if not name.startswith(NOISE_PREFIXES)])
-    information = _refine_information(likelihood, theta, free)
+    point = likelihood.at(theta)
+    for _ in range(4):  # differences that match the standard errors which they imply
+        _, information, likelihood = likelihood.derivatives(point, free)
     column = list(free).index(problem.index(ALPHA))
     return math.sqrt(inverse(information)[column, column])
 
 
-def _refine_information(likelihood: Likelihood, theta: Array, free: NDArray[np.int64]) -> Array:
-    """Return the Fisher information, its differences matched to the standard errors that it implies."""
-    point = likelihood.at(theta)
-    information = np.eye(free.size)
-    for _ in range(4):
-        _, information, likelihood = likelihood.derivatives(point, free)
-    return information
-
-
 def truth_values(linear: Mapping[str, float], alpha: float, *states: Array) -> dict[str, float]:
-    """Return true values by the names of the unknowns: linear parameters, alpha and initial states (5,); no offset.
-
-    Args:
-        alpha: true half-gap [rad].
-    """
+    """Return true values by the names of the unknowns: linear parameters, half-gap [rad] and initial states (5,)."""
     values = {**linear, ALPHA: alpha, OFFSET: 0.0}
     for number, state in enumerate(states, start=1):
         names = STATE_NAMES if number == 1 else [f"{name}@{number}" for name in STATE_NAMES]
@@ -70,11 +57,7 @@ def truth_values(linear: Mapping[str, float], alpha: float, *states: Array) -> d
 
 
 def error_bound_at(record: Record, model: Model, alpha: float) -> float:
-    """Return the bound [rad] for a half-gap ``alpha`` on a record, for the nominal plant and modest torque noise.
-
-    Args:
-        alpha: [rad].
-    """
+    """Return the bound [rad] for a half-gap [rad] on a record, for the nominal plant and modest torque noise."""
     problem = make_problem(record, model)
     noise = tuple(math.exp(u.mean) for u in problem.unknowns if u.name.startswith("log_noise_"))
     return error_bound(problem, {ALPHA: alpha}, noise, MODEST_TORQUE_NOISE)

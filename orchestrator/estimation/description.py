@@ -33,7 +33,7 @@ def _widening(fit: Fit) -> float:
 
     Kent (Biometrika 69(1), 1982): twice the drop of the log likelihood is chi-squared times that ratio.
     """
-    return max(_misfit_variance(fit), block_variance(fit, fit.column, fit.likelihood.settings.verdict.blocks))
+    return max(_misfit_variance(fit), block_variance(fit, fit.slope(), fit.likelihood.settings.verdict.blocks))
 
 
 def describe_unfinished(fit: Fit, why: str) -> Estimate:
@@ -97,12 +97,7 @@ def _describe(fit: Fit, curve: Profile, wider: float, interval: tuple[float, flo
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
 
 
-def block_variance(fit: Fit, column: int, blocks: int) -> float:
-    """Return :func:`block_variance_along` of one unknown."""
-    return block_variance_along(fit, np.eye(fit.free.size)[column], blocks)
-
-
-def block_variance_along(fit: Fit, slope: Array, blocks: int) -> float:
+def block_variance(fit: Fit, slope: Array, blocks: int) -> float:
     """Return the variance of a value that blocks of the record show, over that of white one-step errors.
 
     ``slope`` (k,) is the derivative of the value by the free unknowns. The result is one where it is no more than
@@ -160,11 +155,7 @@ def stillness_note(outputs: Array, noise: tuple[float, ...], settings: GapVerdic
 
 
 def friction_note(fit: Fit, reach: float) -> str:
-    """Return the advice where much of the half-gap's variance is that of dry friction, or nothing.
-
-    Args:
-        reach: half of the interval over the half-gap.
-    """
+    """Return the advice where much of the half-gap's variance is dry friction's; ``reach``: half interval over gap."""
     settings, names = fit.likelihood.settings.verdict, fit.likelihood.problem.names
     rest = [n for n, place in enumerate(fit.free) if names[place] not in DRY]
     column = rest.index(fit.column)
@@ -180,11 +171,7 @@ def friction_note(fit: Fit, reach: float) -> str:
 def _model_warning(
     diagnostics: dict[str, Any], drive: float, ratio: float, rows: int, settings: GapVerdictSettings
 ) -> str:
-    """Return the warning that the model lacks something, or nothing.
-
-    Args:
-        drive: effective value of the motor's torque [N.m].
-    """
+    """Return the warning that the model lacks something, or nothing; ``drive``: rms of the motor's torque [N.m]."""
     worst = max(abs(value) for value in diagnostics["innovation_autocorrelation"])
     motor, load = diagnostics["torque_noise"]
     if max(motor, load / ratio) < settings.notable_torque_noise * drive and worst < max(

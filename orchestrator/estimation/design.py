@@ -69,11 +69,7 @@ def design(
     motor_only: bool = False,
     tell: Callable[[int, int], None] | None = None,
 ) -> tuple[Array, list[Excitation]]:
-    """Return the time grid (n,) [s] and all candidates, the best first.
-
-    Args:
-        alpha: half-gap that shall be measured, or the smallest that shall be seen [rad].
-    """
+    """Return the time grid (n,) [s] and all candidates for a half-gap ``alpha`` [rad], the best first."""
     for name, value in (("torque", limits.torque), ("speed", limits.speed), ("alpha", alpha), ("rate", rate)):
         if not (math.isfinite(value) and value > 0.0):
             raise DesignError(f"`{name}` must be a positive finite number, but is {value:g}")
@@ -97,11 +93,7 @@ def design(
 def simple_candidates(
     model: Model, alpha: float, limits: MachineLimits, duration: float, rate: float, motor_only: bool = False
 ) -> list[Excitation]:
-    """Return square pulses and multisines alone, without a search; the best first. See ``design``.
-
-    Args:
-        alpha: half-gap that shall be measured [rad].
-    """
+    """Return square pulses and multisines alone, without a search; the best first. See ``design``."""
     time = np.arange(round(duration * rate)) / rate
     found = [_judge(*entry, _Task(time, model, alpha, limits, motor_only)) for entry in _simple_shapes(time)[::2]]
     return sorted(found, key=lambda candidate: candidate.bound)
@@ -209,13 +201,9 @@ def plant_of(model: Model, alpha: float) -> AffineModel:
 def error_bound_of_excitation(
     model: Model, time: Array, u: Array, alpha: float, noise: tuple[float, float], motor_only: bool
 ) -> float:
-    """Return the bound [rad] on a half-gap ``alpha`` that a torque would give on the model's plant, from rest.
+    """Return the bound [rad] on a half-gap [rad] that a torque (n,) [N.m] would give on the model's plant, from rest.
 
-    Args:
-        time: (n,) [s], uniform.
-        u: (n,) torque [N.m].
-        alpha: half-gap [rad].
-        noise: standard deviation of each encoder [rad].
+    ``time``: (n,) [s], uniform; ``noise``: standard deviation of each encoder [rad].
     """
     plant = plant_of(model, alpha)
     states = simulate(plant, u, float(time[1] - time[0]), np.zeros(5))

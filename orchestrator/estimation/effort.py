@@ -16,21 +16,19 @@ class StoppedError(ConvergenceError):
     """Work was asked to end before it was done; the text says why."""
 
 
+Report = Callable[[str, float], None]
+"""Takes what is done, and the share of the work that lies behind."""
+
+
 def never() -> str:
     """Return no reason to end."""
     return ""
 
 
 class Effort:
-    """The leave to go on, and the best fit so far.
-
-    Args:
-        deadline: of ``time.monotonic()``, at which a fit is given up.
-        stop: asked before each run.
-    """
+    """The leave to go on until a deadline of ``time.monotonic()``, or ``stop`` says why; and the best fit so far."""
 
     def __init__(self, deadline: float = math.inf, stop: Stop = never) -> None:
-        """Begin with nothing found."""
         self._deadline, self._stop = deadline, stop
         self.best: Any = None
         self._merit = (0, -math.inf)

@@ -7,11 +7,7 @@ from orchestrator.shared.inference.inverse import pseudo_inverse
 
 
 def inverse(information: Array) -> Array:
-    """Return the inverse of an information matrix, which is scaled first. ``information``: (k, k).
-
-    Returns:
-        Shape (k, k).
-    """
+    """Return the inverse (k, k) of an information matrix (k, k), which is scaled first."""
     diagonal = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / np.outer(diagonal, diagonal)
     return pseudo_inverse(scaled, hermitian=True) / np.outer(diagonal, diagonal)

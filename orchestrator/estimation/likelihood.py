@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,24 +120,10 @@ class Likelihood:
         )
         return NoiseLevels(measured, torque)
 
-    def with_options(
-        self,
-        *,
-        soft: bool | None = None,
-        information: Array | None = None,
-        problem: GapProblem | None = None,
-        effort: Effort | None = None,
-    ) -> Self:
-        """Return the likelihood with other flanks, information, bounds of the unknowns, or leave to go on.
-
-        Args:
-            information: (unknowns, unknowns) of the unknowns (default: the last one).
-        """
+    def with_options(self, **changes: Any) -> Self:
+        """Return the likelihood with another ``problem``, ``soft``, ``information`` or ``effort``."""
         other = copy(self)
-        other.soft = self.soft if soft is None else soft
-        other.information = self.information if information is None else information
-        other.problem = self.problem if problem is None else problem
-        other.effort = self.effort if effort is None else effort
+        other.__dict__.update(changes)
         return other
 
     @property
@@ -263,6 +249,10 @@ class Fit:
     def column(self) -> int:
         """Return the place of the gap's size among the free unknowns."""
         return list(self.free).index(self.likelihood.size)
+
+    def slope(self, name: str = "") -> Array:
+        """Return the derivative (k,) of an unknown, or else of the gap's size, by the free unknowns."""
+        return np.asarray(self.free == (self.likelihood.problem.index(name) if name else self.likelihood.size), float)
 
     @property
     def size_deviation(self) -> float:

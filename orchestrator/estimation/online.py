@@ -28,16 +28,8 @@ def follow(
 ) -> None:  # fmt: skip
     """Fill the estimate over a record; a sample with a missing (NaN) angle updates nothing.
 
-    Args:
-        u: (n,) requested torque [N.m].
-        theta_m: (n,) motor angle [rad].
-        theta_l: (n,) load angle [rad].
-        plant: (8,) as ``Model`` of the source.
-        settings: (9,) as ``NoiseSettings``.
-        step: [s].
-        alpha: (n,) filled: half-gap [rad].
-        deviation: (n,) filled: its standard deviation [rad].
-        flank: (n,) filled: -1, 0, 1.
+    ``plant`` (8,) and ``settings`` (9,) are as ``Model`` and ``NoiseSettings`` of the source. Filled, (n,) each:
+    half-gap and its standard deviation [rad], and flank (-1, 0 or 1).
     """
     m = (plant[0], plant[1], plant[2], plant[3], plant[4], plant[5], plant[6], plant[7])
     s = tuple(settings[n] for n in range(9))

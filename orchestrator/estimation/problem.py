@@ -32,10 +32,10 @@ OFFSET = "effects.sensor_offset.load.offset"
 LEAST_DEPTH, DEPTH_SHARE = 1e-3, 0.05
 OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
-# White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record, and one whose contact
-# law is not the machine's is too sure of itself; a least noise of motor and load keeps both honest.
+# White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record: a least noise of motor
+# and load keeps it honest.
 LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-9, 30.0
-LEAST_WHERE_INEXACT = (1e-4, 1e-3)
+LEAST_WITH_ONE_ENCODER = (1e-4, 1e-3)
 # Least and largest rms of the drive's torque [N.m], at motor and load, for which levels of torque noise hold as they
 # are. They were found with the thesis's gear.
 DRIVES = ((3.0, 20.0), (12.0, 80.0))
@@ -134,7 +134,7 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
         unknowns.append(encoder_unknown(record, model, column))
     exact = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE)
-    lows = scale_noise(exact if both else LEAST_WHERE_INEXACT, units)
+    lows = scale_noise(exact if both else LEAST_WITH_ONE_ENCODER, units)
     highs = scale_noise((LARGEST_TORQUE_NOISE, LARGEST_TORQUE_NOISE), units)
     for side, low, high in zip(("motor", "load"), lows, highs, strict=True):
         unknowns.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(high)))

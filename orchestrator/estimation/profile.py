@@ -21,13 +21,9 @@ class Profile:
     drop: Array
 
     def interval(self, best: float, limit: float) -> tuple[float, float]:
-        """Return where ``drop`` crosses ``limit`` on both sides of ``best`` (linear in its square root).
+        """Return where ``drop`` crosses ``limit`` on both sides of the ``best`` [rad], linear in its square root.
 
-        Args:
-            best: the estimate [rad].
-
-        Returns:
-            Lower and upper end [rad]; the upper one is infinite where the profile does not reach it.
+        The upper end is infinite where the profile does not reach it.
         """
         signed = np.sign(self.alpha - best) * np.sqrt(np.maximum(self.drop, 0.0))
         edge = math.sqrt(limit)

@@ -5,18 +5,12 @@ Call order: :func:`orchestrator.records.record.read_record`,
 :data:`METHODS` by :func:`estimator`.
 """
 
-from __future__ import annotations
-
 import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 from orchestrator.errors import ConvergenceError, OrchestratorError
-
-if TYPE_CHECKING:  # the command line reads METHODS before anything large is loaded
-    from orchestrator.records.model_file import Model
-    from orchestrator.records.record import Record
 
 METHODS = {
     "maximum_likelihood": "joint fit of gap, parameters, initial state and noise; profile-likelihood interval",
@@ -65,26 +59,16 @@ class Estimate:
     curves: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
-class Estimator(Protocol):
-    """An estimator: a function of a record, a model, and the options that :mod:`orchestrator.estimation.apply` names.
-
-    Raises:
-        NotApplicableError: the record lacks what the method needs.
-    """
-
-    def __call__(self, record: Record, model: Model, **options: Any) -> Estimate:
-        """Return the estimate."""
-
-
-def estimator(name: str) -> Estimator:
+def estimator(name: str) -> Callable[..., Estimate]:
     """Return the estimator called ``name``, a key of ``METHODS``; only its module is imported.
 
     Args:
         name: one of `METHODS`.
 
     Returns:
-        Its function of a record and a model.
+        Its function of a record, a model, and the options that :mod:`orchestrator.estimation.apply` names. It raises a
+        `NotApplicableError` where the record lacks what the method needs.
     """
     module = importlib.import_module(f"orchestrator.estimation.methods.{name}")
-    function: Estimator = module.estimate
+    function: Callable[..., Estimate] = module.estimate
     return function

@@ -26,9 +26,6 @@ class MaximisationSettings(Settings, frozen=True):
     calm_torque_noise: Annotated[
         float, setting("largest relative torque noise at the load of a correct fit of one encoder", gt=0)
     ] = 0.011
-    clear_depth: Annotated[
-        float, setting("depth of contacts over its standard error above which the contact law differs from the model's")
-    ] = 3.0
     settled: Annotated[
         float,
         setting("difference of the objective that decides between two readings of a torque"),

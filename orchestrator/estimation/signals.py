@@ -27,11 +27,7 @@ class ShaftSignals:
 
 
 def shaft_signals(record: Record, model: Model) -> ShaftSignals:
-    """Return the derived signals of a record with both encoders.
-
-    Returns:
-        Twist [rad], its rate [rad/s], the shaft's torque and its noise [N.m].
-    """
+    """Return the derived signals of a record with both encoders."""
     from scipy.signal import savgol_filter
 
     if record.theta_l is None:

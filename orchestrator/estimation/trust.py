@@ -103,10 +103,7 @@ def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Re
 def _of_values(
     parameters: Mapping[str, Mapping[str, float]], model: Model, settings: TrustSettings, fit: Estimate | None = None
 ) -> Iterator[Reason]:
-    """Yield each fitted value that lies outside what the model file allows.
-
-    One that is far outside is red, unless the half-gap of ``fit`` stays in its interval with the value as stated.
-    """
+    """Yield each fitted value outside what the model file allows on which the half-gap of ``fit`` hangs."""
     for name, entry in parameters.items():
         stated = model.parameters.get(name)
         if stated is None or stated.uncertainty <= 0.0 or stated.assumed:
@@ -114,11 +111,12 @@ def _of_values(
         off = abs(entry["value"] - stated.value)
         if off <= stated.uncertainty + settings.beyond * entry["standard_error"]:
             continue
-        far = off > settings.far_beyond * stated.uncertainty
-        level = Level.RED if far and (fit is None or _moves_gap(fit, name, off - stated.uncertainty)) else Level.AMBER
+        if fit is not None and not _moves_gap(fit, name, off - stated.uncertainty):
+            continue
+        level = Level.RED if off > settings.far_beyond * stated.uncertainty else Level.AMBER
         text = f"`{name}` is fitted as {entry['value']:.4g}, but stated as {stated.value:.4g} to within"
-        moves = "the half-gap hangs on it" if level is Level.RED else "something may be missing that it stands for"
-        yield Reason(level, f"{text} {stated.uncertainty:.2g}: {moves}; check its value and its unit")
+        why = "the half-gap hangs on it, and something may be missing that it stands for; check its value and its unit"
+        yield Reason(level, f"{text} {stated.uncertainty:.2g}: {why}")
 
 
 def _moves_gap(fit: Estimate, name: str, move: float) -> bool:

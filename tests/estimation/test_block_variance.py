@@ -9,6 +9,7 @@ from orchestrator.estimation.description import block_variance
 from orchestrator.estimation.problem import GapProblem, Unknown
 
 ROWS, BLOCKS = 2000, 20
+SLOPE = np.array([1.0, 0.0])  # of the first unknown
 
 
 def fit_at(theta: list[float], information: np.ndarray, scores: np.ndarray) -> SimpleNamespace:
@@ -28,11 +29,11 @@ def white() -> np.ndarray:
 @pytest.mark.parametrize("level", [0.0, 1.0])
 def test_an_unknown_at_its_bound_adds_nothing(white: np.ndarray, level: float) -> None:
     information = ROWS * np.array([[1.0, 1.0 - 1e-9], [1.0 - 1e-9, 1.0]])
-    assert block_variance(fit_at([0.5, level], information, white), 0, BLOCKS) == 1.0
-    assert block_variance(fit_at([0.5, 0.5], information, white), 0, BLOCKS) > 1e6
+    assert block_variance(fit_at([0.5, level], information, white), SLOPE, BLOCKS) == 1.0
+    assert block_variance(fit_at([0.5, 0.5], information, white), SLOPE, BLOCKS) > 1e6
 
 
 def test_a_gap_of_nothing_keeps_the_scatter_of_its_blocks(white: np.ndarray) -> None:
     together = np.repeat(white[: ROWS // 100], 100, axis=0)
-    found = [block_variance(fit_at([alpha, 0.5], ROWS * np.eye(2), together), 0, BLOCKS) for alpha in (0.0, 0.5)]
+    found = [block_variance(fit_at([alpha, 0.5], ROWS * np.eye(2), together), SLOPE, BLOCKS) for alpha in (0.0, 0.5)]
     assert found[0] == found[1] > 10.0

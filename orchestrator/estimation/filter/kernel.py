@@ -27,6 +27,7 @@ from orchestrator.estimation.filter.motion import (
     Vector,
     flank_of,
     identity,
+    mode_at,
     multiply,
     propagate,
     transition,
@@ -149,14 +150,6 @@ def advance_blurred(
         multiply(one, before, total)
 
 
-def _mode_at(normals: Stages, halves: Halves, depths: Halves, x: Vector) -> int:
-    """Return the mode at a state."""
-    mode = 0
-    for stage in range(STAGES):
-        mode = 5 * mode + flank_of(normals, halves, depths, stage, x)
-    return min(max(mode, 0), MODES - 1)
-
-
 def _step(
     mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, depths: Halves,
     phi: ModeMatrices, gain: ModeInputs, gain_1: ModeVectors, h: float, u: float, dry: Dry, cov: Matrix, soft: bool,
@@ -165,8 +158,9 @@ def _step(
     """Advance ``x`` over a sample under the request ``u`` and dry friction, and leave its Jacobian in ``total``."""
     torques = scratch(3)
     slopes = scratch(2, STATES)
+    flanks = scratch(STAGES)
     torques[0] = u
-    mode = (MODES - 1) // 2 if soft else _mode_at(normals, halves, depths, x)
+    mode = (MODES - 1) // 2 if soft else mode_at(normals, halves, depths, x, flanks)
     for body in range(2):
         if dry[body, 0] > 0.0:
             at = 1 if body == 0 else STATES - 2
@@ -253,12 +247,9 @@ def _carry(total: Matrix, cov: Matrix, work: Matrix, intensity: Reals, h: float)
 
 
 def _carry_torque(total: Matrix, cov: Matrix, gain: Vector, variance: float) -> None:
-    """Add to a covariance that is carried what an uncertain torque of the drive does, and carry that too.
+    """Add to a carried covariance, its last row still that before the sample, what an uncertain torque does to it.
 
-    Args:
-        cov: its last row is still that before the sample.
-        gain: what the request does over the sample.
-        variance: of the request [N^2.m^2].
+    ``gain``: what the request does over the sample; ``variance``: of the request [N^2.m^2].
     """
     last = STATES - 1
     own = cov[last, last]

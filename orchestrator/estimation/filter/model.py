@@ -47,9 +47,7 @@ NO_FRICTION = np.zeros((2, 2))
 def affine_model(p: Mapping[str, float], row: BodyNames = DRIVETRAIN, dry: Array = NO_FRICTION) -> AffineModel:
     """Return the smooth modes of bodies in a row, of which each gear drives the next through a shaft with a gap.
 
-    Args:
-        p: parameters of the plant by name, of which effects are not seen, but for a constant ``LOAD_TORQUE`` [N.m]; and
-            the ``DEPTH`` [rad] of a contact at which its damping sets in.
+    ``p``: parameters by name; of effects a constant ``LOAD_TORQUE`` [N.m], and the ``DEPTH`` [rad] of a contact.
     """
     inertias, drags = (np.array([p[f"{name}_{body}"] for body in row.bodies]) for name in "Jb")
     ratios, stiffnesses, dampings, halves = (

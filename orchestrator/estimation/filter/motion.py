@@ -232,6 +232,13 @@ def _mode_of(flanks: FlankList) -> int:
     return min(max(mode, 0), MODES - 1)
 
 
+def mode_at(normals: Stages, halves: Halves, depths: Halves, x: Vector, flanks: FlankList) -> int:
+    """Return the mode at a state, and fill the flanks."""
+    for stage in range(STAGES):
+        flanks[stage] = float(flank_of(normals, halves, depths, stage, x))
+    return _mode_of(flanks)
+
+
 def propagate(
     mats: ModeMatrices, b: Inputs, b_1: ModeVectors, normals: Stages, halves: Halves, depths: Halves,
     phi: ModeMatrices, gain: ModeInputs, gain_1: ModeVectors, h: float, torques: Three, x: Vector, total: Matrix,
@@ -239,9 +246,7 @@ def propagate(
 ) -> None:  # fmt: skip
     """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch."""
     flanks = scratch(STAGES)
-    for stage in range(STAGES):
-        flanks[stage] = float(flank_of(normals, halves, depths, stage, x))
-    mode = _mode_of(flanks)
+    mode = mode_at(normals, halves, depths, x, flanks)
     _advance(phi[mode], gain[mode], gain_1[mode], torques, x, end)
     hit, _, _ = _next_event(normals, halves, depths, flanks, x, end, h)
     if hit < 0.0:

@@ -16,13 +16,9 @@ ROOT_HALF = math.sqrt(0.5)
 
 
 def densities(left: Reals, variance: Reals, alpha: float, mask: Wholes, out: States) -> None:
-    """Fill ``out`` (n, 3) with the density of each point's twist in each state.
+    """Fill ``out`` (n, 3) with the density of each point's twist in each state, for a half-gap [rad].
 
-    Args:
-        left: (n,) twist about mid-gap [rad].
-        variance: (n,) of its noise [rad^2].
-        alpha: half-gap [rad].
-        mask: (n,) whether a point counts: 1, else 0.
+    ``left``: (n,) twist about mid-gap [rad]; ``variance``: of its noise [rad^2]; ``mask``: (n,) 1 where a point counts.
     """
     for k in range(len(left)):
         if mask[k] == 0:
@@ -43,13 +39,8 @@ def densities(left: Reals, variance: Reals, alpha: float, mask: Wholes, out: Sta
 def smooth(density: States, change: Change, scale: Reals, ahead: States, share: States, steps: Change) -> float:
     """Return the log likelihood; fill each state's share at each point and the expected steps between states.
 
-    Args:
-        density: (n, 3) of each point in each state.
-        change: (3, 3) probabilities of the next state.
-        scale: (n,) scratch.
-        ahead: (n, 3) scratch.
-        share: (n, 3) filled: probability of each state, given all points.
-        steps: (3, 3) filled: expected number of steps from state to state.
+    ``change``: (3, 3) probabilities of the next state; ``scale`` (n,) and ``ahead`` (n, 3) are scratch; ``share``
+    (n, 3) is each state's probability given all points, ``steps`` (3, 3) the expected number of steps between them.
     """
     n = len(density)
     total = 0.0

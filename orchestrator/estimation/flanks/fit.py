@@ -136,12 +136,9 @@ class FlankProblem:
         return replace(fit, values=values, variance=variance, covariance=variance * inverse)
 
     def refine(self, fit: FlankFit, mask: NDArray[np.bool_] | None = None, rounds: int | None = None) -> FlankFit:
-        """Return the maximum of the likelihood that expectation and maximisation reach from a fit.
+        """Return the maximum of the likelihood that expectation and maximisation reach from a fit in some ``rounds``.
 
-        Args:
-            fit: to start from; its half-gap must be positive.
-            mask: (n,) which points count (default: all).
-            rounds: at most (default: as the settings have it).
+        ``mask``: (n,) which points count (default: all). The half-gap of ``fit`` must be positive.
         """
         n = self.points.time.size
         mask = np.ones(n, dtype=np.bool_) if mask is None else mask

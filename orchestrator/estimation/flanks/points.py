@@ -50,12 +50,7 @@ class Points:
 
 
 def points_of(record: Record, latest: float, most: int) -> Points:
-    """Return the points of a record with two encoders.
-
-    Args:
-        latest: how late one channel may be [s]: so far from its ends the motor's angle must be known.
-        most: points that are returned at most.
-    """
+    """Return at most so many points of a record with two encoders, of which one is at most so late [s]."""
     assert record.theta_l is not None
     motor, load = _edges(record.time, record.theta_m), _edges(record.time, record.theta_l)
     rest_time, rest_angle = _rests(record, motor.count, load.count)

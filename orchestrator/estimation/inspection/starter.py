@@ -14,7 +14,13 @@ from orchestrator.records.model_text import entry_texts
 from orchestrator.records.preview import preview_log
 from orchestrator.records.units import parse_unit
 
-ASSUMED_COUNTS = 4096.0
+# What the unit of a column needs where nothing is stated, by its kind; and the sentence that says so.
+ASSUMED = {
+    "counts": ({"counts_per_rev": 4096.0}, "4096 counts per revolution of {}"),
+    "share": ({"rated_value": 100.0}, "100 N.m at 100 % of {}"),
+    "current": ({"torque_constant": 1.0}, "1 N.m per ampere of {}"),
+    "voltage": ({"resistance": 1.0, "torque_constant": 1.0}, "1 ohm and 1 N.m per ampere of {}, in volts"),
+}
 OF_DEFAULT = "of the thesis's drivetrain, whose gear ratio and inertia the record shows"
 # What says of an assumption that the scale of a signal hangs on it.
 SCALES = ("counts per revolution", "N.m at 100 %", "N.m per ampere", "samples per second")
@@ -58,22 +64,10 @@ def assume_columns(
         column = filled.get(name, Column())
         head = source.heads[choice.place]
         unit = parse_unit(column.unit or head.unit, KINDS[name])
-        kind = unit.kind if unit is not None else ""
-        changed = column
-        if kind == "counts" and column.counts_per_rev is None:
-            changed = replace(column, counts_per_rev=ASSUMED_COUNTS)
-            said.append(f"{ASSUMED_COUNTS:g} counts per revolution of {name}")
-        elif kind == "share" and column.rated_value is None:
-            changed = replace(column, rated_value=100.0)
-            said.append(f"100 N.m at 100 % of {name}")
-        elif kind == "current" and column.torque_constant is None:
-            changed = replace(column, torque_constant=1.0)
-            said.append(f"1 N.m per ampere of {name}")
-        elif kind == "voltage" and (column.resistance is None or column.torque_constant is None):
-            changed = replace(
-                column, resistance=column.resistance or 1.0, torque_constant=column.torque_constant or 1.0
-            )
-            said.append(f"1 ohm and 1 N.m per ampere of {name}, in volts")
+        numbers, sentence = ASSUMED.get(unit.kind if unit is not None else "", ({}, ""))
+        assumed = {key: value for key, value in numbers.items() if getattr(column, key) is None}
+        changed = replace(column, **assumed)
+        said += [sentence.format(name)] if assumed else []
         if choice.numbered and column.rate is None and source.rate is None:
             changed = replace(changed, rate=1000.0)
             said.append("1000 samples per second")

@@ -60,11 +60,7 @@ class Sufficiency:
 
 
 def sufficiency(record: Record, model: Model) -> Sufficiency:
-    """Return what a record shows of gaps if the machine is as the model says.
-
-    Returns:
-        Bounds by size, the smallest size that is seen [rad], and the torque that would do better.
-    """
+    """Return what a record shows of gaps if the machine is as the model says."""
     why = _why_none(record, model)
     if why:
         return Sufficiency((), math.inf, record.size, (), math.inf, math.nan, why)

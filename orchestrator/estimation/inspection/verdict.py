@@ -15,9 +15,7 @@ def verdict_of(
 ) -> list[str]:
     """Return whether a record suffices to see a gap, what it lacks, and what would do better.
 
-    Args:
-        two_angles: the half-gap from the two angles alone, where that was looked for.
-        assumed: what was assumed, a sentence each.
+    ``two_angles``: the half-gap from the two angles alone, if it was looked for; ``assumed``: a sentence each.
     """
     unscaled = any("counts per revolution" in text for text in assumed)
     said = [_of_angles(two_angles, unscaled)] if two_angles is not None else [_of_sizes(results)]

@@ -29,11 +29,7 @@ class OnlineTrace:
 
 
 def trace(record: Record, model: Model, settings: NoiseSettings | None = None) -> OnlineTrace:
-    """Return the online estimate over a record; ``settings`` default to what the record and the model say.
-
-    Returns:
-        Half-gap [rad], its standard deviation and contact at each sample.
-    """
+    """Return the online estimate over a record; ``settings`` default to what the record and the model say."""
     p = {name: entry.value for name, entry in model.parameters.items()}
     plant = (p["J_m"], p["J_l"], p["k"], p["c"], p["b_m"], p["b_l"], p["i"], p["tau"])
     load = record.theta_m / p["i"] if record.theta_l is None else record.theta_l
@@ -60,11 +56,7 @@ def default_settings(record: Record, model: Model) -> NoiseSettings:
 
 
 def estimate(record: Record, model: Model) -> Estimate:
-    """Return the online estimate at the end of the record.
-
-    Returns:
-        The estimate [rad] with its deviation, and its course in ``curves``.
-    """
+    """Return the online estimate at the end of the record, with its course in ``curves``."""
     if model.fmu != "Drivetrain":
         raise NotApplicableError("the online estimator needs the model `Drivetrain`")
     run = trace(record, model)

@@ -10,22 +10,21 @@ a sharp flank, so there the first fits blur it.
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import describe, describe_unfinished
-from orchestrator.estimation.effort import Effort, Stop, StoppedError, never
+from orchestrator.estimation.effort import Effort, Report, Stop, StoppedError, never
 from orchestrator.estimation.filter.innovations import count_traversals
-from orchestrator.estimation.filter.model import DEPTH
 from orchestrator.estimation.joint import JointLikelihood, by_record
 from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
 from orchestrator.estimation.problem import (
     DRY,
     LATE,
-    LEAST_WHERE_INEXACT,
+    LEAST_WITH_ONE_ENCODER,
     LOAD_TORQUE,
     SCALE,
     TORQUE_OFFSET,
@@ -45,13 +44,11 @@ BOTH_ENCODERS = tuple((w, w) for w in (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e
 BLURRED = ((0.1, 1.0), (0.08, 0.7), (0.06, 0.5), (0.045, 0.3), (0.03, 0.2), (0.02, 0.1), (0.01, 0.05))
 MOTOR_ENCODER = (
     (0.1, 1.0), (0.03, 0.2), (0.01, 0.05), (0.01, 0.03), (3e-3, 1e-2), (1e-3, 3e-3), (3e-4, 2e-3),
-    LEAST_WHERE_INEXACT,
+    LEAST_WITH_ONE_ENCODER,
 )  # fmt: skip
 SHARP_STARTS = (2, 1, 0)  # places in MOTOR_ENCODER, tried in turn until the noise at the load gets down
 # Shares of the work that usually lie before a stage.
 BEFORE_FIT, BEFORE_FREE, BEFORE_WHOLE, BEFORE_INTERVAL = 0.1, 0.5, 0.2, 0.7
-
-Report = Callable[[str, float], None]  # of what is done, and which share of the work that is
 
 
 def _quiet(what: str, share: float) -> None:
@@ -70,9 +67,7 @@ def estimate(
 ) -> Estimate:
     """Return the maximum-likelihood half-gap with its profile-likelihood interval.
 
-    Args:
-        time_limit: [s], after which the fit is given up.
-        stop: returns why the fit is to end with what it has; it is asked before each run of the filter.
+    ``time_limit`` [s] gives a fit up; ``stop``, asked before each run of the filter, says why to end with what it has.
     """
     records = (record, *more)
     effort = Effort(time.monotonic() + time_limit, stop)
@@ -129,10 +124,8 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> Fit | 
         return None
     report("fitting the whole record", BEFORE_WHOLE)
     likelihood = likelihood.with_options(soft=short.soft, information=short.information)
-    if _has_least_noise(short):
-        likelihood = _with_least_noise(likelihood)
-    best = _fit_long(likelihood, first.point.theta)
-    return _with_contact(best) if likelihood.problem.outputs.shape[1] == 2 else best
+    steps = 2 * likelihood.settings.fit.steps_per_level
+    return _free_fit(maximise(likelihood, first.point.theta, likelihood.others, steps))
 
 
 def fit_record(likelihood: Likelihood, report: Report = _quiet) -> Fit:
@@ -147,49 +140,12 @@ def fit_record(likelihood: Likelihood, report: Report = _quiet) -> Fit:
             report("fitting all values", BEFORE_FIT + (BEFORE_FREE - BEFORE_FIT) * n / len(firsts))
             fits.append(_continue(first, levels[1:]))
         report("fitting the noise", BEFORE_FREE)
-        return _with_contact(_free_fit(min(fits, key=_objective)))
+        return _free_fit(min(fits, key=_objective))
     return _free_fit(_fit_one_encoder(likelihood))
 
 
 def _objective(fit: Fit) -> float:
     return fit.point.objective
-
-
-def _with_contact(best: Fit) -> Fit:
-    """Return the fit, with a least torque noise where the machine's contact law is not the model's."""
-    likelihood, depth = best.likelihood, best.parameters()[DEPTH]
-    is_clear = abs(depth["value"]) > likelihood.settings.fit.clear_depth * depth["standard_error"]
-    if not is_clear or _has_least_noise(likelihood):
-        return best
-    likelihood = _with_least_noise(likelihood)
-    return _fit_long(
-        likelihood, np.maximum(best.point.theta, likelihood.problem.bounds(range(best.point.theta.size))[0])
-    )
-
-
-def _fit_long(likelihood: Likelihood, start: Array) -> Fit:
-    """Return the fit with the torque noise free that starts from a vector near it."""
-    best = maximise(likelihood, start, likelihood.others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
-    return _free_fit(best)
-
-
-def _has_least_noise(likelihood: Likelihood) -> bool:
-    """Return whether the torque noise is kept above what an inexact model needs."""
-    problem = likelihood.problem
-    return problem.unknowns[problem.index("log_torque_load")].lower >= math.log(_least_noise(likelihood)[-1])
-
-
-def _with_least_noise(likelihood: Likelihood) -> Likelihood:
-    """Return the likelihood with the torque noise kept above what an inexact model needs."""
-    problem = likelihood.problem
-    for side, least in zip(("motor", "load"), _least_noise(likelihood), strict=True):
-        problem = problem.with_unknown(problem.index(f"log_torque_{side}"), lower=math.log(least))
-    return likelihood.with_options(problem=problem)
-
-
-def _least_noise(likelihood: Likelihood) -> tuple[float, float]:
-    """Return the least torque noise at motor and load [N.m.s^0.5] that keeps an inexact model honest."""
-    return scale_noise(LEAST_WHERE_INEXACT, likelihood.problem.units)
 
 
 def _continue(best: Fit, levels: Sequence[tuple[float, float]]) -> Fit:

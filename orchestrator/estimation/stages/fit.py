@@ -8,13 +8,14 @@ best of all, so that no model that it holds is better than it.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import block_variance
+from orchestrator.estimation.effort import Report
 from orchestrator.estimation.information import inverse
 from orchestrator.estimation.likelihood import Fit, Likelihood, Point, maximise
 from orchestrator.estimation.settings import StageSettings
@@ -30,8 +31,6 @@ PLACES = (-1.0, 0.0, 1.0)  # of the intermediate shaft within the first gap at t
 SHARES_BETWEEN = 13  # that a rough fit of both tries
 SHARES_NEARBY, NEARBY = 24, 6.0  # that a fit tries about its own, to so many standard deviations of it
 NOISE_STEPS = (-3.0, -1.0, 1.0)  # of a logarithm
-
-Report = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,8 @@ def fit_stages(likelihood: Likelihood, settings: StageSettings, report: Report) 
     report("trying sizes", 0.0)
     coarse = _fit_size(likelihood)
     report("fitting a gap in both stages", 0.15)
-    floating = _bound_share(likelihood, settings.shared)
+    place, shared = likelihood.problem.index(SHARE), settings.shared
+    floating = likelihood.with_options(problem=likelihood.problem.with_unknown(place, lower=shared, upper=1.0 - shared))
     first, second, *_ = sorted(_try_shares(coarse.likelihood, coarse.point.theta, SHARES), key=_objective)
     both = _fit_both(floating, first.theta, (*MIDDLE, FINE))
     found = [both]
@@ -114,20 +114,13 @@ def _free(likelihood: Likelihood, *fits: Fit) -> Fit:
 
 def _scatter(fit: Fit) -> float:
     """Return by what blocks of the record differ on the share, over what noise does; much, and a fit is no optimum."""
-    column = list(fit.free).index(fit.likelihood.problem.index(SHARE))
-    return block_variance(fit, column, fit.likelihood.settings.verdict.blocks)
+    return block_variance(fit, fit.slope(SHARE), fit.likelihood.settings.verdict.blocks)
 
 
 def _renew(fit: Fit) -> Array:
     """Return the best vector at another share, with some torque noise: where a fit begins anew."""
     theta = with_noise(fit.likelihood, fit.point.theta, FINE)
     return min(_try_shares(fit.likelihood, theta, SHARES), key=_objective).theta
-
-
-def _bound_share(likelihood: Likelihood, shared: float) -> Likelihood:
-    """Return the likelihood in which each stage has at least a share of the gap."""
-    problem = likelihood.problem
-    return likelihood.with_options(problem=problem.with_unknown(problem.index(SHARE), lower=shared, upper=1.0 - shared))
 
 
 def with_noise(likelihood: Likelihood, theta: Array, level: float) -> Array:

@@ -7,7 +7,7 @@ stage has a notable share of the gap. What is left is the answer, a set where th
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.estimation.description import autocorrelation, block_variance, block_variance_along, stillness_note
-from orchestrator.estimation.effort import Effort, Stop, never
+from orchestrator.estimation.description import autocorrelation, block_variance, stillness_note
+from orchestrator.estimation.effort import Effort, Report, Stop, never
 from orchestrator.estimation.filter.innovations import count_traversals
 from orchestrator.estimation.likelihood import Fit, Likelihood
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings, StageSettings
-from orchestrator.estimation.stages.fit import GRID, Report, StageFits, fit_stages
+from orchestrator.estimation.stages.fit import GRID, StageFits, fit_stages
 from orchestrator.estimation.stages.problem import BODIES, ENCODERS, GAPS, OFFSET, SHARE, TOTAL, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -72,14 +72,9 @@ def locate_gap(
     report: Report = lambda what, share: None,
     stop: Stop = never,
 ) -> Location:
-    """Return where the gap of a train of two stages is.
+    """Return where the gap of a ``TwoStageTrain`` is, by a record with torque and both angles.
 
-    Args:
-        record: with torque and the angles of motor and load.
-        model: of a ``TwoStageTrain``.
-        time_limit: [s], after which the fit is given up.
-        report: called with what is done, and the share of the work that lies behind.
-        stop: returns why the work is to end; it is asked before each run of the filter.
+    ``time_limit``: [s], after which the fit is given up; ``report`` and ``stop`` as of ``maximum_likelihood``.
 
     Raises:
         RecordError: motor or load hardly moves.
@@ -106,11 +101,11 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
     answers = _possible_answers(behind, share, settings)
     if not explained:  # how far such fits are apart says nothing
         answers = [FIRST, SECOND, BOTH]
-    scatter = min(_scatter(fits.free), settings.most_scatter)
+    scatter = _scatter(fits.free, [fits.free.slope()], settings.most_scatter)
     factors = {FIRST: settings.misfit_widening, SECOND: settings.misfit_widening, BOTH: settings.widening_of_both}
     wider = {name: max(factor**2, scatter) for name, factor in factors.items()}
     if BOTH in answers:
-        wider[BOTH] = max(wider[BOTH], min(_scatter_of_stages(fits.both), settings.most_scatter))
+        wider[BOTH] = max(wider[BOTH], _scatter(fits.both, _gradients(fits.both)[1], settings.most_scatter))
     ways = {FIRST: fits.first, SECOND: fits.second, BOTH: fits.both}
     within = settings.shared <= share <= 1.0 - settings.shared
     if BOTH in answers and (within or behind[BOTH] > settings.decisive):
@@ -167,15 +162,10 @@ def _torque_noise(fit: Fit) -> float:
     )
 
 
-def _scatter(fit: Fit) -> float:
-    """Return by what the variance of the size among blocks of the record exceeds that of white errors."""
-    return block_variance(fit, fit.column, fit.likelihood.settings.verdict.blocks)
-
-
-def _scatter_of_stages(fit: Fit) -> float:
-    """Return the same of the stages' own half-gaps, whichever is more."""
+def _scatter(fit: Fit, slopes: Iterable[Array], most: float) -> float:
+    """Return by what the variance of values among blocks of the record exceeds that of white errors, at most."""
     blocks = fit.likelihood.settings.verdict.blocks
-    return max(block_variance_along(fit, slope, blocks) for slope in _gradients(fit)[1])
+    return min(max(block_variance(fit, slope, blocks) for slope in slopes), most)
 
 
 def _gradients(fit: Fit) -> tuple[Array, Array]:
