@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from orchestrator.estimation.information import inverse
-from orchestrator.estimation.joint import JointLikelihood
-from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.joint import make_likelihood
 from orchestrator.estimation.problem import ALPHA, OFFSET, STATE_NAMES, GapProblem, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -28,7 +27,7 @@ def error_bound(
 
     ``noise``: true standard deviation [rad] of each encoder, rounding included.
     """
-    likelihood = Likelihood(problem, threads) if isinstance(problem, GapProblem) else JointLikelihood(problem, threads)
+    likelihood = make_likelihood([problem] if isinstance(problem, GapProblem) else problem, threads)
     problem = likelihood.problem
     theta = problem.start
     for name, value in values.items():

@@ -75,6 +75,18 @@ class JointLikelihood(Likelihood):
         )
 
 
+def make_likelihood(
+    problems: Sequence[GapProblem],
+    threads: int = 1,
+    settings: EstimationSettings = DEFAULT_SETTINGS,
+    effort: Effort | None = None,
+) -> Likelihood:
+    """Return the likelihood of one record, or the joint one of several."""
+    if len(problems) > 1:
+        return JointLikelihood(problems, threads, settings, effort)
+    return Likelihood(problems[0], threads, settings, effort)
+
+
 def by_record(estimate: Estimate, records: Sequence[Record]) -> Estimate:
     """Return a joint estimate with what each record says, and with the curves of the first one."""
     edges = np.cumsum([0, *(record.size for record in records)])

@@ -28,7 +28,7 @@ from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSetting
 from orchestrator.shared.arrays import Array
 
 JUMP = 100.0
-START_DAMPING = 1e-6
+START_DAMPING, BLURRED_DAMPING = 1e-6, 1e-3
 NEAR = 2.0  # steps from a bound, within which a difference quotient looks inward
 LEAST_LOG_NOISE, LARGEST_LOG_NOISE = -40.0, 20.0  # beyond all bounds, where a difference quotient may look
 
@@ -98,10 +98,6 @@ class Likelihood:
         """Return parameters of the plant, and all other values of a vector, by name."""
         return self.problem.parameters(dict(zip(self._place, theta.tolist(), strict=True)))
 
-    def value(self, theta: Array, name: str) -> float:
-        """Return a value of a vector by its name."""
-        return float(theta[self._place[name]])
-
     def _torque(self, p: Mapping[str, float]) -> Array:
         """Return the torque (n,) that the drive is asked for [N.m]: late, with its gain and offset."""
         record = self.problem.record
@@ -130,11 +126,6 @@ class Likelihood:
     def difference(self) -> float:
         """Return the step of a difference quotient in standard deviations: long while the flanks are blurred."""
         return 1.0 if self.soft else self.problem.difference
-
-    @property
-    def first_damping(self) -> float:
-        """Return the damping with which a fit starts."""
-        return 1e-3 if self.soft else START_DAMPING
 
     def at(self, theta: Array) -> Point:
         """Return the likelihood at ``theta``; infinite where the filter diverges."""
@@ -280,7 +271,8 @@ def maximise(
     places = np.array(list(free), dtype=np.int64)
     lower, upper = likelihood.problem.bounds(places)
     point = likelihood.at(start)
-    damping, converged, done = likelihood.first_damping, False, 0
+    first = BLURRED_DAMPING if likelihood.soft else START_DAMPING
+    damping, converged, done = first, False, 0
     information = np.eye(places.size)
     for _ in range(iterations):
         done += 1
@@ -295,7 +287,7 @@ def maximise(
         if before - point.objective < tolerance:
             # The first differences may have been taken too coarsely: look again with better ones.
             if before == point.objective and done == 1:
-                damping = likelihood.first_damping
+                damping = first
                 continue
             converged = True
             break

@@ -21,7 +21,6 @@ SAME_RATIO = 0.1  # of two gear ratios, as a share
 SAME_INERTIA = 2.0  # factor between two inertias, of which one is from a record
 # How far the rough values may be off, as a share.
 ROUGH = {"J_m": 0.5, "J_l": 0.5, "k": 0.6, "c": 0.9, "b_m": 0.9, "b_l": 0.9, "tau": 0.5, "i": 0.0}
-EFFECTS = ("friction at the motor", "quadratic drag", "gravity or imbalance of the load", "torque ripple (6 a turn)")
 
 
 @dataclass(frozen=True)
@@ -138,10 +137,10 @@ def visible_effects(record: Record, model: Model) -> list[EffectShown]:
     h = record.step
     load = angle / p.get("i", 1.0)
     shapes = {
-        EFFECTS[0]: (np.sign(speed), "N.m"),
-        EFFECTS[1]: (speed * np.abs(speed), "N.m.s2/rad2"),
-        EFFECTS[2]: (np.sin(load), "N.m"),
-        EFFECTS[3]: (np.sin(6.0 * angle), "N.m"),
+        "friction at the motor": (np.sign(speed), "N.m"),
+        "quadratic drag": (speed * np.abs(speed), "N.m.s2/rad2"),
+        "gravity or imbalance of the load": (np.sin(load), "N.m"),
+        "torque ripple (6 a turn)": (np.sin(6.0 * angle), "N.m"),
     }
     hop = max(smooth_rows(record), round(0.1 / h))
     ends = np.arange(0, speed.size, hop)

@@ -12,7 +12,7 @@ from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.arrays import Array
-from orchestrator.shared.inference.normal import NORMAL_95
+from orchestrator.shared.inference.normal import interval_95
 from pyfmu_sources.estimators.backlash_estimator import NoiseSettings
 
 ONLINE = Kernels("orchestrator.estimation.online", checked=True)
@@ -63,7 +63,6 @@ def estimate(record: Record, model: Model) -> Estimate:
     alpha, error = float(run.alpha[-1]), float(run.deviation[-1])
     if not math.isfinite(alpha):
         raise NotApplicableError("the online estimator diverged on this record")
-    half = NORMAL_95 * error
     settled = error < 0.2 * alpha
     message = "" if settled else "the online estimate has not settled: its standard deviation is above a fifth of it"
     diagnostics = {
@@ -72,4 +71,4 @@ def estimate(record: Record, model: Model) -> Estimate:
         "settings": default_settings(record, model)._asdict(),
     }
     curves = {"alpha": run.alpha, "deviation": run.deviation}
-    return Estimate("ekf", alpha, error, (max(alpha - half, 0.0), alpha + half), settled, message, diagnostics, curves)
+    return Estimate("ekf", alpha, error, interval_95(alpha, error, 0.0), settled, message, diagnostics, curves)

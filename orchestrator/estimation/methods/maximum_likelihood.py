@@ -19,7 +19,7 @@ from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import describe, describe_unfinished
 from orchestrator.estimation.effort import Effort, Report, Stop, StoppedError, never
 from orchestrator.estimation.filter.innovations import count_traversals
-from orchestrator.estimation.joint import JointLikelihood, by_record
+from orchestrator.estimation.joint import by_record, make_likelihood
 from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
 from orchestrator.estimation.problem import (
     DRY,
@@ -71,7 +71,7 @@ def estimate(
     """
     records = (record, *more)
     effort = Effort(time.monotonic() + time_limit, stop)
-    likelihood = _likelihood(records, model, threads, effort, settings)
+    likelihood = make_likelihood([make_problem(one, model) for one in records], threads, settings, effort)
     try:
         found = describe(_fit(records, model, threads, likelihood, report))
     except StoppedError as error:
@@ -88,9 +88,10 @@ def _fit(records: Sequence[Record], model: Model, threads: int, likelihood: Like
     settings, fit = likelihood.settings, None
     if sum(one.size for one in records) > settings.fit.long_record:
         # What a long record says first of all, its beginning says too, in a fraction of the time.
-        shorts = [one.part(0, min(one.size, settings.fit.short_record // len(records))) for one in records]
+        rows = settings.fit.short_record // len(records)
+        shorts = [make_problem(one.part(0, min(one.size, rows)), model) for one in records]
         report("fitting the beginning", 0.0)
-        fit = _refine(likelihood, _likelihood(shorts, model, threads, likelihood.effort, settings), report)
+        fit = _refine(likelihood, make_likelihood(shorts, threads, settings, likelihood.effort), report)
     if fit is None:
         fit = fit_record(likelihood, report)
     fit = settle_torque(fit)
@@ -102,15 +103,6 @@ def _on_all_rows(fit: Fit, likelihood: Likelihood) -> Fit:
     """Return a fit, perhaps of the beginning, as one of all rows; nothing ends what is still to be run."""
     whole = likelihood.with_options(soft=fit.likelihood.soft, effort=Effort())
     return replace(fit, likelihood=whole, point=whole.at(fit.point.theta))
-
-
-def _likelihood(
-    records: Sequence[Record], model: Model, threads: int, effort: Effort, settings: EstimationSettings
-) -> Likelihood:
-    first, *more = (make_problem(one, model) for one in records)
-    if more:
-        return JointLikelihood([first, *more], threads, settings, effort)
-    return Likelihood(first, threads, settings, effort)
 
 
 def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> Fit | None:

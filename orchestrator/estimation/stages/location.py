@@ -22,11 +22,11 @@ from orchestrator.estimation.likelihood import Fit, Likelihood
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings, StageSettings
 from orchestrator.estimation.stages.fit import GRID, StageFits, fit_stages
-from orchestrator.estimation.stages.problem import BODIES, ENCODERS, GAPS, OFFSET, SHARE, TOTAL, make_problem
+from orchestrator.estimation.stages.problem import ENCODERS, GAPS, OFFSET, SHARE, TOTAL, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.arrays import Array
-from orchestrator.shared.inference.normal import NORMAL_95
+from orchestrator.shared.inference.normal import NORMAL_95, interval_95
 
 FIRST, SECOND, BOTH = "1", "2", "both"
 Interval = tuple[float, float]
@@ -96,7 +96,7 @@ def locate(fits: StageFits, settings: StageSettings) -> Location:
         name: 0.5 * (fit.point.objective - fits.free.point.objective)
         for name, fit in ((FIRST, fits.first), (SECOND, fits.second), (BOTH, fits.both))
     }
-    share = fits.free.likelihood.value(fits.free.point.theta, SHARE)
+    share = fits.free.likelihood.parameters(fits.free.point.theta)[SHARE]
     explained = _torque_noise(fits.free) <= settings.unexplained and fits.free.size <= GRID[-1]
     answers = _possible_answers(behind, share, settings)
     if not explained:  # how far such fits are apart says nothing
@@ -154,12 +154,8 @@ def _possible_answers(behind: dict[str, float], share: float, settings: StageSet
 
 def _torque_noise(fit: Fit) -> float:
     """Return the torque noise of motor or load, whichever is more, over the drive's torque there [s^0.5]."""
-    problem = fit.likelihood.problem
-    return max(
-        math.exp(fit.likelihood.value(fit.point.theta, f"log_torque_{body}")) / unit
-        for body, unit in zip(BODIES, problem.units, strict=True)
-        if body != "middle"
-    )
+    motor, _, load = np.divide(fit.likelihood.noise(fit.point.theta).torque, fit.likelihood.problem.units)
+    return float(max(motor, load))
 
 
 def _scatter(fit: Fit, slopes: Iterable[Array], most: float) -> float:
@@ -209,8 +205,7 @@ def _sizes_of_all(best: Fit, optima: Sequence[Fit], wider: float) -> tuple[Stage
 
 
 def _total(fit: Fit, wider: float) -> StageGap:
-    half = NORMAL_95 * math.sqrt(wider) * fit.size_deviation
-    return StageGap(fit.size, (max(fit.size - half, 0.0), fit.size + half))
+    return StageGap(fit.size, interval_95(fit.size, math.sqrt(wider) * fit.size_deviation, 0.0))
 
 
 def _join(gaps: list[StageGap]) -> StageGap:
