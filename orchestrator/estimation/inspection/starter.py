@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from orchestrator.plain_text import plain_text
 from orchestrator.records.columns import COLUMNS, KINDS, Column, lacking_numbers
@@ -15,7 +16,7 @@ from orchestrator.records.preview import preview_log
 from orchestrator.records.units import parse_unit
 
 # What the unit of a column needs where nothing is stated, by its kind; and the sentence that says so.
-ASSUMED = {
+ASSUMED: Mapping[str, tuple[Mapping[str, Any], str]] = {
     "counts": ({"counts_per_rev": 4096.0}, "4096 counts per revolution of {}"),
     "share": ({"rated_value": 100.0}, "100 N.m at 100 % of {}"),
     "current": ({"torque_constant": 1.0}, "1 N.m per ampere of {}"),
@@ -65,9 +66,9 @@ def assume_columns(
         head = source.heads[choice.place]
         unit = parse_unit(column.unit or head.unit, KINDS[name])
         numbers, sentence = ASSUMED.get(unit.kind if unit is not None else "", ({}, ""))
-        assumed = {key: value for key, value in numbers.items() if getattr(column, key) is None}
-        changed = replace(column, **assumed)
-        said += [sentence.format(name)] if assumed else []
+        filling = {key: value for key, value in numbers.items() if getattr(column, key) is None}
+        changed = replace(column, **filling)
+        said += [sentence.format(name)] if filling else []
         if choice.numbered and column.rate is None and source.rate is None:
             changed = replace(changed, rate=1000.0)
             said.append("1000 samples per second")
