@@ -51,12 +51,6 @@ class ClockConnectionTable(Strict, frozen=True, kw_only=True):
     target: str = msgspec.field(name="to")
 
 
-class TerminalsTable(Strict, frozen=True, kw_only=True):
-    """Two terminals that are joined."""
-
-    join: tuple[str, str]
-
-
 class SourceTable(Strict, tag_field="kind", frozen=True, kw_only=True):
     """What all sources have: the input that is fed."""
 
@@ -145,5 +139,4 @@ class ScenarioTable(Strict, frozen=True, kw_only=True):
     name: str = "scenario"
     connections: list[Any] = []
     clock_connections: list[Any] = []
-    terminals: list[Any] = []
     sources: list[Any] = []

@@ -43,10 +43,8 @@ from orchestrator.scenarios.file_format import (
     SineTable,
     SquareTable,
     StepTable,
-    TerminalsTable,
 )
 from orchestrator.scenarios.isolated import Safety, run_safely
-from orchestrator.scenarios.joining import terminal_connections
 from orchestrator.scenarios.tables import read_table, table_remarks
 from orchestrator.shared.toml_files import read_toml
 
@@ -70,10 +68,7 @@ def load_scenario(path: Path) -> Scenario:
     reader = _Reader(path, problems)
     algorithm, order = reader.master(top)
     instances = reader.instances(top.instances)
-    connections = (
-        *reader.connections(top.connections),
-        *terminal_connections(_joints(top, problems), instances, problems),
-    )
+    connections = reader.connections(top.connections)
     clock_connections = reader.clock_connections(top.clock_connections)
     sources = reader.sources(top.sources, instances, algorithm.step if algorithm else math.nan, top.start)
     if algorithm is not None and "stop" in content:
@@ -94,11 +89,6 @@ def load_scenario(path: Path) -> Scenario:
     return Scenario(
         system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path), remarks=remarks
     )  # fmt: skip
-
-
-def _joints(top: ScenarioTable, problems: list[Problem]) -> list[tuple[str, str, str]]:
-    """Return where each pair of terminals is asked for, and the two."""
-    return [(f"{path}.join", *pair.join) for path, pair in _each(top.terminals, TerminalsTable, "terminals", problems)]
 
 
 def _each(tables: Sequence[Any], kind: Any, name: str, problems: list[Problem]) -> Iterator[tuple[str, Any]]:
