@@ -4,15 +4,18 @@ Nothing is judged here: the FMU shares this process, so what it could forge are 
 own to choose anyway.
 """
 
+import contextlib
 import ctypes
+import importlib.util
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from orchestrator.checking.probing.surroundings import Surroundings
-from orchestrator.checking.probing.varargs import LOGGER, fill_in
 
 TYPES: dict[str, Any] = {
     "double": c_double, "float": ctypes.c_float, "int": c_int, "bool": c_bool, "size": c_size_t, "text": c_char_p,
@@ -29,6 +32,7 @@ _MOST_UPDATES = 10_000
 _LONGEST_TEXT = 1 << 20
 _GUARD = b"\xa5" * 4096
 """Behind what an FMU may write to: it stays as it is."""
+_LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 _LOG = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 _UPDATE = ctypes.CFUNCTYPE(
     None, c_void_p, c_double, c_bool, c_bool, c_bool, c_bool, POINTER(c_bool), POINTER(c_double)
@@ -71,7 +75,7 @@ class Update(NamedTuple):
 
 class _Callbacks(ctypes.Structure):
     _fields_ = (
-        ("logger", LOGGER),
+        ("logger", _LOGGER),
         ("allocateMemory", c_void_p),
         ("freeMemory", c_void_p),
         ("stepFinished", c_void_p),
@@ -116,6 +120,18 @@ def open_host(_: Any) -> Callable[[Any], Any]:
     return lambda request: getattr(host, request[0])(*request[1:])
 
 
+@cache
+def _formatter() -> Any:
+    """FMPy's function in C that fills in the arguments of messages, as ``printf`` does; None where it is not."""
+    found = importlib.util.find_spec("fmpy")
+    system = {"win32": "win64", "darwin": "darwin64"}.get(sys.platform, "linux64")
+    for folder in [] if found is None else found.submodule_search_locations or ():
+        for path in Path(folder, "logging", system).glob("logging.*"):
+            with contextlib.suppress(OSError):
+                return ctypes.CDLL(str(path))
+    return None
+
+
 def _describe_left(error: SystemError) -> str:
     """The exception that a function of the library left in this thread."""
     left: BaseException = error.__cause__ or error
@@ -143,14 +159,13 @@ class Host:
         self._locks = 0
         self._around = Surroundings()
         # Kept here, for the library keeps pointers to them.
-        self._logger, self._log3 = LOGGER(self._log), _LOG(self._log_3)
+        self._logger, self._log3 = _LOGGER(self._log), _LOG(self._log_3)
         self._update = _UPDATE(self._intermediate)
         self._clock_update = _CLOCK_UPDATE(lambda _: None)
         self._lock, self._unlock = _LOCK(lambda: self._count(1)), _LOCK(lambda: self._count(-1))
 
-    def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, message: int, *values: Any) -> None:
-        self._errors += status in _ERRORS
-        self._take(fill_in(message, values), status)
+    def _log(self, environment: int, _name: bytes, status: int, category: bytes, message: bytes) -> None:
+        self._log_3(environment, status, category, message)
 
     def _log_3(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
         self._errors += status in _ERRORS
@@ -200,6 +215,8 @@ class Host:
         memory = ctypes.CDLL("msvcrt" if sys.platform == "win32" else None)
         allocate, free = ctypes.cast(memory.calloc, c_void_p), ctypes.cast(memory.free, c_void_p)
         callbacks = _Callbacks(self._logger, allocate, free, None, None)
+        if (proxy := _formatter()) is not None:
+            proxy.addLoggerProxy(ctypes.byref(callbacks))
         self._messages = []
         head = (name.encode(), kind, guid.encode(), resources.encode())
         component = self._foreign("fmi2Instantiate", *head, ctypes.byref(callbacks), 0, int(logging))

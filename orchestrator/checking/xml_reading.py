@@ -24,24 +24,6 @@ xml.encoding | E | 2.2 | 2.4 | XML is encoded in UTF-8 | save the file as UTF-8
 MAXIMUM_BYTES = 64 << 20
 _GUARDED = {"resolve_entities": False, "no_network": True, "load_dtd": False, "huge_tree": False}
 _GUARDED |= {"remove_comments": True, "remove_pis": True}
-_FAULTS = {
-    expat.errors.codes[message]: text
-    for message, text in (
-        (expat.errors.XML_ERROR_TAG_MISMATCH, "an end tag is not that of the element that is open"),
-        (expat.errors.XML_ERROR_NO_ELEMENTS, "it ends before its root element does"),
-        (expat.errors.XML_ERROR_UNCLOSED_TOKEN, "it ends within a tag"),
-        (expat.errors.XML_ERROR_PARTIAL_CHAR, "it ends within a character"),
-        (expat.errors.XML_ERROR_INVALID_TOKEN, "a character stands where it must not"),
-        (expat.errors.XML_ERROR_SYNTAX, "a character stands where it must not"),
-        (expat.errors.XML_ERROR_DUPLICATE_ATTRIBUTE, "an attribute is given twice"),
-        (expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT, "something follows its root element"),
-        (expat.errors.XML_ERROR_UNDEFINED_ENTITY, "an entity is used that XML does not define"),
-        (expat.errors.XML_ERROR_BAD_CHAR_REF, "a reference names no character of XML"),
-        (expat.errors.XML_ERROR_MISPLACED_XML_PI, "its XML declaration does not stand at its beginning"),
-        (expat.errors.XML_ERROR_UNKNOWN_ENCODING, "its encoding is not known"),
-        (expat.errors.XML_ERROR_INCORRECT_ENCODING, "its encoding is not the one that it declares"),
-    )
-}
 
 
 class _DoctypeError(Exception):
@@ -76,9 +58,9 @@ def parse(data: bytes, name: str) -> tuple[etree._Element | None, list[Finding]]
             Finding("xml.doctype", name, "the file must have no DOCTYPE, but has one (entities are not expanded)")
         ]
     except expat.ExpatError as error:
-        fault = _FAULTS.get(error.code, "it is none")
         place = (error.lineno, error.offset + 1)
-        text = f"the file must be well-formed XML, but {fault} (line {place[0]}, column {place[1]})"
+        text = "the file must be well-formed XML, but is not"
+        text += f": {expat.ErrorString(error.code)} (line {place[0]}, column {place[1]})"
         return None, [Finding("xml.malformed", name, text, *place)]
     except (etree.XMLSyntaxError, ValueError, LookupError):
         return None, [Finding("xml.malformed", name, "the file must be well-formed XML, but strict readers refuse it")]

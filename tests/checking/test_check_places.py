@@ -98,14 +98,14 @@ def test_the_terminal_names_the_section_of_the_fmus_version_alone(tmp_path: Path
     assert advice.endswith("(FMI 2.0.4, section 2.2.7)")
 
 
-def test_xml_that_is_none_is_told_in_words_of_the_project(tmp_path: Path) -> None:
+def test_xml_that_is_none_is_told_with_its_place(tmp_path: Path) -> None:
     for text, words, place in (
-        (described("N").replace("</ModelVariables>", ""), "an end tag is not that of the element", (10, 3)),
-        (f"{HEAD}<a b='1' b='2'/>", "an attribute is given twice", (4, 10)),
-        (f"{HEAD}<a>&x;</a>", "an entity is used that XML does not define", (4, 4)),
-        (f"{HEAD}<a/><b/>", "something follows its root element", (4, 5)),
-        (f"{HEAD}<a", "it ends within a tag", (4, 1)),
-        (f"{HEAD}<a>", "it ends before its root element does", (4, 4)),
+        (described("N").replace("</ModelVariables>", ""), "mismatched tag", (10, 3)),
+        (f"{HEAD}<a b='1' b='2'/>", "duplicate attribute", (4, 10)),
+        (f"{HEAD}<a>&x;</a>", "undefined entity", (4, 4)),
+        (f"{HEAD}<a/><b/>", "junk after document element", (4, 5)),
+        (f"{HEAD}<a", "unclosed token", (4, 1)),
+        (f"{HEAD}<a>", "no element found", (4, 4)),
         (f"{HEAD}<p:a/>", "strict readers refuse it", (0, 0)),
     ):
         (tmp_path / "m.fmu").unlink(missing_ok=True)

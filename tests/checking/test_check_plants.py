@@ -45,7 +45,7 @@ SOUND = [
         "ME",
         {
             "flags": 'providesDirectionalDerivatives="true" providesAdjointDerivatives="true" '
-            'providesPerElementDependencies="true" providesEvaluateDiscreteStates="true"'
+            'providesEvaluateDiscreteStates="true"'
         },
         marks=pytest.mark.night,
     ),

@@ -159,7 +159,6 @@ _TABLE = """
 2 3 | ME | rates_order       | states.rates
 2 3 | ME | rate_named        | states.rates
 2 3 | ME | rate_wrong        | states.rates
-2 3 | CS | rate_named        | states.slope
 2 3 | ME | nominals_order    | states.nominal-differs
 2 3 | ME | nominals_others   | states.nominal-differs
 2 3 | ME | event_silent      | event.states-changed
@@ -184,11 +183,6 @@ _TABLE = """
 2 3 | CS | logging_off_refused   | log.refused
 2 3 | CS | second_order_refused  | promise.refused | step flags=maxOutputDerivativeOrder="2"
 2 3 | CS | slopes_refused        | derivative.status | step flags=maxOutputDerivativeOrder="1"
-3   | ME | elements_refused      | promise.refused | elements
-3   | CS | elements_list_refused | promise.refused | elements
-3   | CS | elements_output       | promise.refused | elements
-3   | CS | elements_fewer        | promise.dependencies | elements
-3   | CS | elements_other        | promise.dependencies | elements
 3   | CS | evaluate_refused      | promise.refused | clock=decimal;evaluate
 3   | ME | evaluate_refused      | promise.refused | evaluate
 3   | CS | fraction_refused      | promise.refused | clock=fraction
@@ -262,7 +256,6 @@ _SHORT = {
     },
     "adjoint": {"3": {"flags": 'providesAdjointDerivatives="true"'}},
     "both": {"3": {"flags": 'providesDirectionalDerivatives="true" providesAdjointDerivatives="true"'}},
-    "elements": {"3": {"flags": 'providesPerElementDependencies="true"'}},
     "evaluate": {"3": {"flags": 'providesEvaluateDiscreteStates="true"'}},
     "fixed steps": {"2": {"fixed steps": ""}, "3": {"fixed steps": ""}},
 }

@@ -259,32 +259,8 @@ API fmi3Status fmi3DeserializeFMUState(fmi3Instance i, const fmi3Byte in[], size
     return fmi3OK;
 }
 
-/* Dependencies of each element, as the description has them. */
-static size_t knowns_of(unsigned r, Reference out[]) {
-    static const Reference of[][7] = {{X, X}, {Q, Q}, {Y, X, U}, {Z, V, X}, {YS, X}, {O, J}, {G, X}, {DX, V}, {DV, U, W, X, V, J, ON}, {DQ, U}};
-    size_t n = 0;
-    for (size_t a = 0; a < sizeof of / sizeof *of; a++)
-        if (of[a][0] == r)
-            while (n < 6 && of[a][n + 1]) { out[n] = of[a][n + 1]; n++; }
-    return n;
-}
-API fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance self, Reference r, size_t *n) {
-    Reference known[6];
-    if (IS(elements_refused) || (IS(elements_output) && r == Z)) REFUSE("not supported");
-    *n = knowns_of(r, known) - (IS(elements_fewer) && r == Y);
-    return fmi3OK;
-}
-API fmi3Status fmi3GetVariableDependencies(fmi3Instance self, Reference r, size_t element[], Reference known[], size_t of[], fmi3DependencyKind kind[], size_t n) {
-    if (IS(elements_refused) || IS(elements_list_refused)) REFUSE("not supported");
-    Reference found[6];
-    size_t count = knowns_of(r, found);
-    for (size_t a = 0; a < n && a < count; a++) {
-        element[a] = of[a] = 0;
-        known[a] = IS(elements_other) && r == Z ? U : found[a];
-        kind[a] = fmi3Dependent;
-    }
-    return fmi3OK;
-}
+API fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance self, Reference r, size_t *n) { REFUSE("not supported"); }
+API fmi3Status fmi3GetVariableDependencies(fmi3Instance self, Reference r, size_t element[], Reference known[], size_t of[], fmi3DependencyKind kind[], size_t n) { REFUSE("not supported"); }
 API fmi3Status fmi3GetDirectionalDerivative(fmi3Instance i, const Reference a[], size_t na, const Reference b[], size_t nb, const fmi3Float64 seed[], size_t ns, fmi3Float64 out[], size_t no) {
     sensitivity(i, a, na, b, nb, seed, out, false);
     return fmi3OK;

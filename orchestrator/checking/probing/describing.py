@@ -19,7 +19,7 @@ _FLAGS = (
     "canGetAndSetFMUstate", "canSerializeFMUstate", "canGetAndSetFMUState", "canSerializeFMUState",
     "canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess", "canRunAsynchronuously",
     "providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives",
-    "completedIntegratorStepNotNeeded", "canInterpolateInputs", "providesPerElementDependencies",
+    "completedIntegratorStepNotNeeded", "canInterpolateInputs",
     "providesEvaluateDiscreteStates", "hasEventMode", "mightReturnEarlyFromDoStep",
     "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate",
 )  # fmt: skip

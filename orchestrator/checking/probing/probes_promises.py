@@ -3,14 +3,13 @@
 What is promised is a table: of each line the flag, the versions, where it is called, the function, and what it means.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.events import EventDriver
-from orchestrator.checking.probing.job import ProbedUnknown, ProbeJob, references
+from orchestrator.checking.probing.job import ProbeJob, references
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import StatusError
 from orchestrator.checking.probing.variables import ProbedVariable
@@ -21,7 +20,6 @@ declare("""
 promise.refused | E | 2.1.5 | 2.4.2 | functions declared by a flag or a list can be called | implement the function, or clear the flag
 log.refused | W | 2.1.5 | 2.3.1 | SetDebugLogging takes the categories that are declared | accept them, and return OK
 promise.ignored | W | 4.2.1 | - | derivatives of inputs have an effect with canInterpolateInputs | use them, or clear the flag
-promise.dependencies | W | - | 2.2.9 | per-element dependencies are those of ModelStructure | generate both from one source
 """)  # noqa: E501
 
 _MOST = 20
@@ -107,8 +105,6 @@ def promises(context: Context) -> None:
     interpolates = "canInterpolateInputs" in job.flags - refused and job.version == "2.0"
     if interpolates and job.interface == "CoSimulation":
         _interpolation(context)
-    if "providesPerElementDependencies" in job.flags:
-        _elements(context)
 
 
 def _go(context: Context, driver: Driver, moment: str) -> str:
@@ -182,34 +178,3 @@ def _change(v: ProbedVariable, step: float) -> float:
     low, high = v.limits
     fits = next((x for x in (size, -size) if low <= start + x <= high), 0.0)
     return fits / step
-
-
-def _elements(context: Context) -> None:
-    """Dependencies of each element are those of ModelStructure, where both are told."""
-    job = context.bench.job
-    with context.bench.instance() as driver:
-        for u in _unknowns(job):
-            try:
-                ((count,),) = driver.call("GetNumberOfVariableDependencies", u.variable.reference)
-                if count > 1 << 16:
-                    text = f"`{u.variable.name}` must have a number of dependencies, but has {count}"
-                    context.report("promise.dependencies", text, u.variable.name)
-                    return
-                found = driver.call("GetVariableDependencies", u.variable.reference, count, count, count, count)
-            except StatusError as error:
-                context.report("promise.refused", f"{error}, for providesPerElementDependencies promises it")
-                return
-            told, listed = set(found[1]), {k.reference for k in u.knowns or ()}
-            if told != listed:
-                names = {v.reference: v.name for v in job.variables}
-                text = ", ".join(f"`{names.get(r, r)}`" for r in sorted(told ^ listed)[:5])
-                message = (
-                    f"the dependencies of `{u.variable.name}` must be those of ModelStructure, but differ by {text}"
-                )
-                context.report("promise.dependencies", message, u.variable.name)
-
-
-def _unknowns(job: ProbeJob) -> Iterator[ProbedUnknown]:
-    """The first unknowns of continuous time and of outputs that list what they depend on."""
-    found = (u for u in job.unknowns if u.section != "initial" and u.knowns is not None)
-    return islice(found, _MOST)

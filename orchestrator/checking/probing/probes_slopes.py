@@ -13,8 +13,7 @@ from orchestrator.checking.probing.variables import ProbedVariable
 _MOST = 20
 _PART = 1.0 / 16.0  # of a step
 _ORDERS = ("the first", "the second")
-TOLERANCE = 0.1
-"""Of the largest slope."""
+_TOLERANCE = 0.1  # of the largest slope
 Rows = list[list[float]]
 
 
@@ -77,9 +76,9 @@ def _judge(context: Context, names: tuple[str, str], order: int, values: tuple[l
         far, points = sum(_is_off(y, d, _PART * step) for y, d in ends), len(ends)
     else:
         slopes = [(b - a) / step for a, b in pairwise(below)]
-        far, points = count_far(derivative, slopes), len(slopes) - 1
+        far, points = _count_far(derivative, slopes), len(slopes) - 1
     if far > points / 2:
-        text = f"is off by more than {TOLERANCE:.0%} of the largest slope at {far} of {points} points"
+        text = f"is off by more than {_TOLERANCE:.0%} of the largest slope at {far} of {points} points"
         of = "the output" if order == 1 else "the first derivative"
         context.report("derivative.value", f"{what} must be the slope of {of}, but {text}", names[0])
         return False
@@ -96,19 +95,14 @@ def _is_off(below: Sequence[float], derivatives: Sequence[float], size: float) -
     first, second = ((b - a) / size for a, b in pairwise(below))
     mean, largest = 0.5 * (first + second), max(abs(first), abs(second), *map(abs, derivatives))
     noise = 1e-12 * max(map(abs, below)) / size
-    return abs(first - second) < TOLERANCE * largest and abs(derivatives[1] - mean) > TOLERANCE * largest + noise
+    return abs(first - second) < _TOLERANCE * largest and abs(derivatives[1] - mean) > _TOLERANCE * largest + noise
 
 
-def is_far(rates: Sequence[float], slopes: Sequence[float]) -> bool:
-    """Whether derivatives after each step are far from the slopes of the steps before and behind, at most of them."""
-    return count_far(rates, slopes) > (len(slopes) - 1) / 2
-
-
-def count_far(rates: Sequence[float], slopes: Sequence[float]) -> int:
-    """Number of points at which a derivative is off by more than ``TOLERANCE`` of the largest slope."""
+def _count_far(rates: Sequence[float], slopes: Sequence[float]) -> int:
+    """Number of points at which a derivative is off by more than ``_TOLERANCE`` of the largest slope."""
     largest = max(map(abs, slopes), default=0.0)
     off = [_off(x, a, b) for x, a, b in zip(rates[1:], slopes, slopes[1:], strict=False)]
-    return sum(not x <= TOLERANCE * largest for x in off)
+    return sum(not x <= _TOLERANCE * largest for x in off)
 
 
 def _off(x: float, before: float, after: float) -> float:

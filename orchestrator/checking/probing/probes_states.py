@@ -3,16 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.points import RestPoint, points
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.probes_exchange import judge_completed_step, judge_following
-from orchestrator.checking.probing.probes_slopes import is_far
 from orchestrator.checking.probing.statuses import SkippedError
 from orchestrator.checking.probing.variables import ProbedVariable
-from orchestrator.checking.probing.watched import slopes
 from orchestrator.checking.rules import declare
 
 declare("""
@@ -20,7 +17,6 @@ declare("""
 states.order | E | 3.2.1 | 3.2.1 | states are in the order of ModelStructure, by the attribute derivative | correct the order, or the attribute derivative
 states.rates | E | 3.2.2 | 3.2.1 | derivatives of states equal their variables, in the order of ModelStructure | compute both from one place
 states.nominal-differs | W | 3.2.2 | 3.2.1 | nominal values of states are those of the description | generate both from one source
-states.slope | I | 2.2.7 | 2.4.7.5 | a variable with the attribute derivative is the derivative of that state | correct the variable, or the attribute derivative
 """)  # noqa: E501
 
 _EQUAL = 1e-9
@@ -33,17 +29,9 @@ def states(context: Context) -> None:
     job = context.bench.job
     if not job.state_variables:
         raise SkippedError("the description names no continuous states")
-    if job.interface == "ModelExchange":
-        _exchange(context)
-    elif job.interface == "CoSimulation":
-        _slopes(context)
-    else:
-        raise SkippedError("the interface has no continuous states")
-
-
-def _exchange(context: Context) -> None:
-    bench, job = context.bench, context.bench.job
-    variables = job.state_variables or ()
+    if job.interface != "ModelExchange":
+        raise SkippedError("the interface has no vector of states")
+    bench, variables = context.bench, job.state_variables
     with bench.instance() as driver:
         assert isinstance(driver, ModelExchange)
         if driver.memory["states"] != sum(v.size for v in variables):
@@ -110,15 +98,3 @@ def _nominals(context: Context, driver: ModelExchange, variables: tuple[ProbedVa
         if v.nominal is not None and v.nominal > 0.0 and abs(value - v.nominal) > _NEAR * v.nominal:
             text = f"the nominal value of `{v.name}` must be {v.nominal:g} as the description says, but is {value:g}"
             context.report("states.nominal-differs", text, v.name)
-
-
-def _slopes(context: Context) -> None:
-    """In co-simulation the derivative of a state lies near the slopes of the steps around it."""
-    if context.trace is None:
-        return
-    for x, r in slopes(context.bench.job):
-        path, rates = context.observation.values_of(x), context.observation.values_of(r)
-        steps = [(b - a) / context.bench.job.step for a, b in pairwise(path)]
-        if all(map(math.isfinite, (*path, *rates))) and is_far(rates, steps):
-            text = f"`{r.name}` must be the derivative of `{x.name}`, but is far from its slopes at most points"
-            context.report("states.slope", text, r.name)

@@ -12,7 +12,6 @@ from orchestrator.checking.probing.trajectory import Bench
 from orchestrator.checking.probing.variables import ProbedVariable
 
 _MOST = 500
-_MOST_STATES = 20
 _MOST_DISCRETE = 200
 
 
@@ -20,7 +19,7 @@ _MOST_DISCRETE = 200
 class WatchedRun:
     """What was seen."""
 
-    # outputs, the time, values of narrow types, states with their derivatives; aliases once
+    # outputs, the time, values of narrow types; aliases once
     variables: tuple[ProbedVariable, ...]
     initial: list[Any]  # their values in initialisation mode; empty where they are not read there
     rows: list[list[Any]]  # their values after each step, [step][value]
@@ -47,7 +46,7 @@ class WatchedRun:
 def watch(bench: Bench) -> WatchedRun:
     """Do the run; what an FMU refuses to be read between steps is left out, outputs aside."""
     job = bench.job
-    chosen = distinct([*job.outputs(), *_times(job), *narrow(job), *(v for pair in slopes(job) for v in pair)])
+    chosen = distinct([*job.outputs(), *_times(job), *narrow(job)])
     try:
         return _run(bench, tuple(chosen))
     except StatusError:
@@ -96,14 +95,3 @@ def narrow(job: ProbeJob) -> list[ProbedVariable]:
         return []
     found = [v for v in distinct(job.variables) if v.items or v.base in ("Boolean", "String", "Binary")]
     return [v for v in found if not v.clocks and v.causality != "structuralParameter"][:_MOST]
-
-
-def slopes(job: ProbeJob) -> list[tuple[ProbedVariable, ProbedVariable]]:
-    """States of co-simulation with their derivatives, scalar ones."""
-    if job.interface != "CoSimulation":
-        return []
-    return [
-        (x, r)
-        for x, r in zip(job.state_variables or (), job.rate_variables, strict=False)
-        if x.size == r.size == 1 and not x.clocks and x.variability == r.variability == "continuous"
-    ][:_MOST_STATES]

@@ -59,10 +59,9 @@ GetNominalsOfContinuousStates | >double[n]
 GetVersion InstantiateModelExchange InstantiateCoSimulation InstantiateScheduledExecution FreeInstance Terminate Reset
 ExitInitializationMode EnterEventMode EnterConfigurationMode ExitConfigurationMode EnterContinuousTimeMode EnterStepMode
 EvaluateDiscreteStates GetShiftFraction SetIntervalFraction SetShiftDecimal SetShiftFraction
+GetNumberOfVariableDependencies GetVariableDependencies
 SetDebugLogging | bool texts
 EnterInitializationMode | bool double double bool double
-GetNumberOfVariableDependencies | uint32 >size
-GetVariableDependencies | uint32 >size[] >uint32[] >size[] >int[n]
 GetFMUState | new
 SetFMUState | state
 FreeFMUState | free
