@@ -128,9 +128,9 @@ _SPELLED = (
     ("liter", "l L liter liters litre litres"),
     ("milliliter", "ml mL"),
 )  # fmt: skip
-_ATOMS = {spelling: name for name, spellings in _SPELLED for spelling in spellings.split()}
+ATOMS = {spelling: name for name, spellings in _SPELLED for spelling in spellings.split()}
 _FOLDED: dict[str, tuple[tuple[str, str], ...]] = {}
-for _spelling, _name in _ATOMS.items():
+for _spelling, _name in ATOMS.items():
     _FOLDED[_spelling.lower()] = (*_FOLDED.get(_spelling.lower(), ()), (_spelling, _name))
 _PHRASES = {
     "a rms": "ampere", "a(rms)": "ampere", "per unit": "dimensionless", "per mille": "0.1*percent",
@@ -216,8 +216,8 @@ def _readings(text: str) -> tuple[str, ...]:
 
 def _atoms(word: str) -> tuple[str, ...]:
     """Return what one word may stand for: as it is written, else with other capitals where that leaves no doubt."""
-    if word in _ATOMS and word != "nm":
-        return (_ATOMS[word],)
+    if word in ATOMS and word != "nm":
+        return (ATOMS[word],)
     if word.lower() in _ALONE or (len(word) == 1 and word.isupper()) or word.lower() == "grad":
         return ()
     alike = _FOLDED.get(word.lower(), ())
