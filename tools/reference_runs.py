@@ -16,7 +16,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.building.reference_files import DATA, PARAMETERS, STEPS
+from orchestrator.building.reference_files import DATA, PARAMETERS
 from orchestrator.building.starts import SAMPLE_TIME, STATE_WEIGHTS, STORED, TORQUE_WEIGHT, default_starts
 from orchestrator.plants.design import (
     DrivetrainValues,
@@ -30,8 +30,8 @@ from tools import refuse_arguments
 
 Array = NDArray[np.float64]
 HALF_GAP = PARAMETERS["Drivetrain"]["alpha"]
-PLANT_STEP = STEPS["Drivetrain"]
-SAMPLE = STEPS["LqrController"]
+PLANT_STEP = 1e-2
+SAMPLE = 1e-3
 TORQUE_LIMIT = 300.0
 PROCESS_NOISE = (0.0, 0.0, 0.0, 1e-2, 10.0, 400.0)
 ENCODER_NOISE = 1e-4

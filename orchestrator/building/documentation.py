@@ -1,19 +1,16 @@
 """The documentation, icon and licence that an FMU carries."""
 
-import csv
 import html
-import io
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
-from orchestrator.building.reference_files import DATA, PARAMETERS
+from orchestrator.building.reference_files import DATA
 from orchestrator.building.sources import Recipe
 
 STYLE = """body { font: 15px/1.5 sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em; color: #222; }
 table { border-collapse: collapse; margin: 1em 0; }
 td, th { border: 1px solid #bbb; padding: .2em .6em; text-align: left; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; } .equation { margin-left: 2em; }
-svg { max-width: 100%; } svg text { font: 12px sans-serif; }"""
+td.number { text-align: right; font-variant-numeric: tabular-nums; } .equation { margin-left: 2em; }"""
 PAGE = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{name}</title><style>
@@ -23,7 +20,6 @@ PAGE = """<!DOCTYPE html>
 <h1>{name}</h1>
 <p>{title}. FMI {fmi}.0 for {interfaces}.</p>
 {equations}
-{plot}
 {tables}
 <h2>Running it</h2>
 <p>{running}</p>
@@ -41,12 +37,6 @@ RUNNING_NATIVE = """The FMU needs nothing but the C library. Its sources are in 
 the Python of the project; binaries: {platforms}."""
 PYTHONFMU_LICENSE = """ PythonFMU, which connects Python and C, has its own in
 <a href="licenses/PythonFMU.txt">licenses/PythonFMU.txt</a>."""
-PLOTTED = {
-    "Drivetrain": ("theta_m", "theta_l", "T_shaft"),
-    "LqrController": ("reference", "theta_l_hat", "u"),
-    "KalmanEstimator": ("theta_l", "theta_l_hat", "omega_m_hat"),
-}
-COLOURS = ("#1b6ca8", "#c8553d", "#4b8b3b")
 
 
 def documentation(
@@ -67,7 +57,6 @@ def documentation(
         fmi=fmi,
         interfaces="co-simulation" if description.find("ModelExchange") is None else "co-simulation and model exchange",
         equations="\n".join(path.read_text(encoding="utf-8").strip() for path in paths if path.exists()),
-        plot=_plot(recipe.class_name),
         running=RUNNING_NATIVE.format(platforms=", ".join(platforms)) if platforms else RUNNING_PYTHON,
         license="" if platforms else PYTHONFMU_LICENSE,
         tables="\n".join(_table(description, *section) for section in _SECTIONS),
@@ -94,37 +83,3 @@ def _row(variable: Element) -> str:
     numbers = "".join(f'<td class="number">{text}</td>' for text in texts)
     name, text = html.escape(variable.attrib["name"]), html.escape(variable.attrib["description"])
     return f"<tr><td><code>{name}</code></td><td>{kind.get('unit', '')}</td>{numbers}<td>{text}</td></tr>"
-
-
-def _plot(class_name: str) -> str:
-    """Return the reference experiment as a drawing; nothing where there is none."""
-    path = DATA / f"{class_name}_reference.csv"
-    if class_name not in PLOTTED or not path.exists():
-        return ""
-    rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="ascii"))))
-    with_values = ", ".join(f"{name} = {value:g}" for name, value in PARAMETERS[class_name].items())
-    caption = (
-        f"The reference experiment inside the FMU{f' ({with_values})' if with_values else ''}, each signal scaled."
-    )
-    times = [float(row["time"]) for row in rows]
-    lines = [_line(times, [float(row[n]) for row in rows], k, n) for k, n in enumerate(PLOTTED[class_name])]
-    return f'<svg viewBox="0 0 640 270" role="img">{_axis(times[-1])}{"".join(lines)}</svg>\n<p>{caption}</p>'
-
-
-def _axis(end: float) -> str:
-    marks = "".join(
-        f'<text x="{10 + 115 * n}" y="262" fill="#666">{end * n / 4:g}{" s" if n == 4 else ""}</text>' for n in range(5)
-    )
-    return f'<path stroke="#bbb" d="M10 130H470M10 245H470"/>{marks}'
-
-
-def _line(times: list[float], values: list[float], k: int, name: str) -> str:
-    width, height, left, top = 460.0, 220.0, 10.0, 20.0
-    reach = max(map(abs, values)) or 1.0
-    span = times[-1] - times[0]
-    points = " ".join(
-        f"{left + width * (t - times[0]) / span:.1f},{top + height * (0.5 - 0.5 * v / reach):.1f}"
-        for t, v in zip(times, values, strict=True)
-    )
-    label = f'<text x="480" y="{40 + 20 * k}" fill="{COLOURS[k]}">{name} (largest {reach:.3g})</text>'
-    return f'<polyline fill="none" stroke="{COLOURS[k]}" stroke-width="1.5" points="{points}"/>{label}'

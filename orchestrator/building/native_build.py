@@ -106,7 +106,7 @@ def _build(recipe: Recipe, compiler: Compiler, fmi: int, real_outputs: bool, pat
     folders = {target: target.folders(fmi) for target in compiler.targets}
     description = native_description(recipe, cls, indicator_total(cls))
     members = documentation(recipe, description, [name for names in folders.values() for name in names], fmi)
-    members |= reference_files(recipe, description)
+    members |= reference_files(recipe)
     if fmi == 3:
         description = fmi3_description(cls, recipe.name)
         sources["buildDescription.xml"] = build_description(recipe.name)

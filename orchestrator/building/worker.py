@@ -100,7 +100,7 @@ def _complete(
         kept[library] = compile_launcher(toolchain, wrapper)
     description = ElementTree.fromstring(kept.pop("modelDescription.xml"))
     kept |= documentation(recipe, description)
-    kept |= reference_files(recipe, description)
+    kept |= reference_files(recipe)
     kept["documentation/licenses/PythonFMU.txt"] = pythonfmu_license()
     stamp(description, fingerprint)
     guid = content_guid(description, kept)
