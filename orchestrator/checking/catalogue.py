@@ -7,7 +7,6 @@ from orchestrator.checking.static import STAGES as STATIC_STAGES
 
 STAGES: tuple[str, ...] = (
     *STATIC_STAGES,
-    "sources",
     "run",
     "load",
     "process",

@@ -9,7 +9,6 @@ from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.dynamic import check_dynamic, obstacle
 from orchestrator.checking.findings import Execution, Finding, FmuFindings, order_findings
 from orchestrator.checking.places import locate_findings
-from orchestrator.checking.sources import check_sources
 from orchestrator.checking.static import StaticResult, check_static
 from orchestrator.checking.xml_reading import MAXIMUM_BYTES
 from orchestrator.shared.isolation.limits import Limits
@@ -46,10 +45,6 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     executions: tuple[Execution, ...] = ()
     reason = "nothing is executed, as was asked" if options.static else _obstacle(result)
     try:
-        if not options.static and result.description is not None and result.files is not None:
-            options.tell("sources", 0.0)
-            found, result.stages["sources"] = check_sources(result.description, result.files, not options.trust)
-            findings += found
         if not reason:
             assert result.description is not None
             assert result.files is not None

@@ -160,7 +160,6 @@ def test_the_corpus_is_large_and_covers_the_rules() -> None:
 
 # Rules that no single mutation of the C FMU shows; test_check_rules.py and test_check_relations.py have them.
 NOT_IN_THE_CORPUS = {
-    "build.compiles",
     "clock.inactive-change",
     "event.again",
     "log.effect",

@@ -61,7 +61,6 @@ _AARCH64 = {
     "finit_module": 273, "sched_setattr": 274, "bpf": 280, "execveat": 281, "userfaultfd": 282, "kexec_file_load": 294,
 }  # fmt: skip
 _MACHINES = {"x86_64": (0xC000003E, _X86_64), "aarch64": (0xC00000B7, _AARCH64)}
-_PROGRAMS = ("clone", "execve", "fork", "vfork")
 _Instruction = tuple[int, int, int, int]
 
 
@@ -90,15 +89,11 @@ def forbid_privileges() -> None:
         raise OSError(ctypes.get_errno(), "no_new_privs")
 
 
-def restrict(programs: bool = False) -> bool:
-    """Refuse this process, for good, the calls above; return whether the kernel does.
-
-    Args:
-        programs: whether further processes and programs are let through.
-    """
+def restrict() -> bool:
+    """Refuse this process, for good, the calls above; return whether the kernel does."""
     if not available():
         return False
-    program = _filter_program(platform.machine(), os.getpid(), programs)
+    program = _filter_program(platform.machine(), os.getpid())
     code = (_Code * len(program))(*(_Code(*line) for line in program))
     whole = _Program(len(program), code)
     library = ctypes.CDLL(None, use_errno=True)
@@ -116,7 +111,7 @@ class _Program(ctypes.Structure):
     _fields_ = (("length", ctypes.c_uint16), ("code", ctypes.POINTER(_Code)))
 
 
-def _filter_program(machine: str, pid: int, programs: bool = False) -> list[_Instruction]:
+def _filter_program(machine: str, pid: int) -> list[_Instruction]:
     """Return the filter as instructions ``(code, jump if true, jump if false, constant)``."""
     architecture, old = _MACHINES[machine]
     conditions = {
@@ -133,8 +128,6 @@ def _filter_program(machine: str, pid: int, programs: bool = False) -> list[_Ins
     if machine == "x86_64":
         program += [(_AT_LEAST, 0, 1, _X32_BIT), (_RETURN, 0, 0, _ERRNO | errno.ENOSYS)]
     for name, number in sorted({**old, **_NEW}.items()):
-        if programs and name in _PROGRAMS:
-            continue
         # Without clone3 the C library falls back to clone, whose flags can be looked at.
         refused = _ERRNO | (errno.ENOSYS if name == "clone3" else errno.EPERM)
         condition = conditions.get(name)

@@ -68,9 +68,9 @@ def limit_process(limits: Limits) -> None:
     )
 
 
-def enclose(read: tuple[str, ...], write: tuple[str, ...], programs: bool = False) -> Walls:
-    """Put up every wall that this kernel has, for good; ``programs``: but that against further processes."""
+def enclose(read: tuple[str, ...], write: tuple[str, ...]) -> Walls:
+    """Put up every wall that this kernel has, for good."""
     if not sys.platform.startswith("linux"):
         return Walls(0, seccomp=False)
     seccomp.forbid_privileges()
-    return Walls(landlock.restrict((*read, *_OWN), write), seccomp.restrict(programs))
+    return Walls(landlock.restrict((*read, *_OWN), write), seccomp.restrict())
