@@ -136,25 +136,20 @@ def _is_unfit(findings: list[Finding]) -> bool:
 def _no_description(name: str, names: list[str]) -> Finding:
     inner = [n for n in names if n.endswith("/modelDescription.xml")]
     where = f"it is at {inner[0]}" if inner else "there is none"
-    return Finding(
-        "archive.no-model-description", name, f"modelDescription.xml must be at the top of the archive, but {where}"
-    )
+    text = f"modelDescription.xml must be at the top of the archive, but {where}"
+    return Finding("archive.no-model-description", name, text)
 
 
 def _entry_findings(archive: zipfile.ZipFile, limits: ArchiveLimits) -> Iterator[Finding]:
     """Findings from the directory of the archive alone."""
     entries = archive.infolist()
     if len(entries) > limits.files:
-        yield Finding(
-            "archive.too-many-files",
-            "",
-            f"the archive must have at most {limits.files} entries, but has {len(entries)}",
-        )
+        text = f"the archive must have at most {limits.files} entries, but has {len(entries)}"
+        yield Finding("archive.too-many-files", "", text)
     total = sum(i.file_size for i in entries)
     if total > limits.total:
-        yield Finding(
-            "archive.too-large", "", f"the files must have at most {limits.total} bytes unpacked, but have {total}"
-        )
+        text = f"the files must have at most {limits.total} bytes unpacked, but have {total}"
+        yield Finding("archive.too-large", "", text)
     for entry in entries:
         yield from _name_findings(entry)
         yield from _kind_findings(entry, limits)
@@ -179,14 +174,11 @@ def _name_findings(entry: zipfile.ZipInfo) -> Iterator[Finding]:
         text = "folders of a path must have names, but one here is empty or a dot"
         yield Finding("archive.odd-name", name, text)
     elif any(ord(c) < 32 for c in name):
-        yield Finding(
-            "archive.odd-name", name.encode("unicode_escape").decode(), "a file name must not have control characters"
-        )
+        text = "a file name must not have control characters"
+        yield Finding("archive.odd-name", name.encode("unicode_escape").decode(), text)
     elif len(name) > _LONGEST_PATH or any(len(p.encode("utf-8", "replace")) > _LONGEST_NAME for p in parts):
-        message = (
-            f"a path must have at most {_LONGEST_PATH} characters, a name {_LONGEST_NAME} bytes, but this has more"
-        )
-        yield Finding("archive.long-name", f"{name[:80]}…", message)
+        text = f"a path must have at most {_LONGEST_PATH} characters, a name {_LONGEST_NAME} bytes, but this has more"
+        yield Finding("archive.long-name", f"{name[:80]}…", text)
     elif any(_RESERVED.match(p) or p.endswith((".", " ")) or set(p) & set('<>:"|?*') for p in parts):
         yield Finding("archive.odd-name", name, "a file name must be possible on Windows too, but this one is not")
 
@@ -201,16 +193,12 @@ def _kind_findings(entry: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[Fi
         yield Finding("archive.encrypted", entry.filename, "an entry must not be encrypted, but is")
     elif entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         method = zipfile.compressor_names.get(entry.compress_type, str(entry.compress_type))  # type: ignore[attr-defined]
-        yield Finding(
-            "archive.compression", entry.filename, f"an entry must be stored or deflated, but is packed with {method}"
-        )
+        text = f"an entry must be stored or deflated, but is packed with {method}"
+        yield Finding("archive.compression", entry.filename, text)
     ratio = entry.file_size / max(entry.compress_size, 1)
     if entry.file_size > MEBIBYTE and ratio > limits.ratio:
-        yield Finding(
-            "archive.bomb-ratio",
-            entry.filename,
-            f"a file must unpack to at most {limits.ratio:g} times its packed size, but unpacks to {ratio:.0f} times",
-        )
+        text = f"a file must unpack to at most {limits.ratio:g} times its packed size, but unpacks to {ratio:.0f} times"
+        yield Finding("archive.bomb-ratio", entry.filename, text)
 
 
 def _clash_findings(archive: zipfile.ZipFile) -> Iterator[Finding]:
@@ -245,11 +233,8 @@ def _overlap_findings(entries: list[zipfile.ZipInfo]) -> Iterator[Finding]:
     end = 0
     for entry in sorted(entries, key=lambda i: i.header_offset):
         if entry.header_offset < end:
-            yield Finding(
-                "archive.overlap",
-                entry.filename,
-                "entries must not share bytes of the archive, but this one starts inside another",
-            )
+            text = "entries must not share bytes of the archive, but this one starts inside another"
+            yield Finding("archive.overlap", entry.filename, text)
         end = max(end, entry.header_offset + 30 + entry.compress_size)
 
 

@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 from orchestrator.errors import FmuError
-from orchestrator.shared.isolation.archives import CHUNK, unpack
+from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.scratch import Scratch
 
 _lock = threading.Lock()
@@ -17,14 +17,11 @@ _root: tuple[int, Scratch] | None = None
 
 def content_hash(path: Path) -> str:
     """Return the SHA-256 of a file's content: 64 hexadecimal digits."""
-    digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:
-            while chunk := stream.read(CHUNK):
-                digest.update(chunk)
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise FmuError(f"`fmu` must be a readable file, but {path} is not: {error.strerror}") from None
-    return digest.hexdigest()
 
 
 def extract_fmu(path: Path) -> Path:

@@ -1,8 +1,11 @@
 """Where a finding stands: line and column of modelDescription.xml, in every report, and one entry for equal faults."""
 
 import json
+import sys
 import zipfile
 from pathlib import Path
+
+import pytest
 
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.checking.findings import FmuFindings
@@ -113,3 +116,12 @@ def test_xml_that_is_none_is_told_with_its_place(tmp_path: Path) -> None:
         assert found.rule == "xml.malformed"
         assert words in found.message
         assert (found.line, found.column) == place
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the file is one of Linux")
+def test_a_file_that_cannot_be_read_has_a_finding_and_no_hash(tmp_path: Path) -> None:
+    """Memory of this process: a file that can be opened, but not read at its beginning."""
+    report = check_fmu(Path("/proc/self/mem"), CheckOptions(static=True))
+    assert [f.rule for f in report.findings] == ["archive.not-a-zip"]
+    assert "sha256" not in report.facts
+    assert "sha256" in check(tmp_path, described("N")).facts

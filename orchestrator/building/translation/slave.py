@@ -123,7 +123,7 @@ def _continuous(program: Program, cls: Any, hooks: dict[str, str]) -> str:
         lines.append("#define FOLLOWS_INPUTS")
     if "output_rates" in hooks:
         lines += _output_rates(program, cls, made["output_rates"])
-    functions = (_state_hook(program, name, hooks[name], function) for name, function in made.items())
+    functions = (_caller(program, name, hooks[name], function) for name, function in made.items())
     return "\n\n".join(["\n".join(lines), *functions])
 
 
@@ -139,43 +139,36 @@ def _output_rates(program: Program, cls: Any, function: Function) -> list[str]:
     ]
 
 
-def _state_hook(program: Program, name: str, parameters: str, function: Function) -> str:
-    arguments = [a for a in ("self", _ARGUMENTS.get(name), "fault" if function.faults else None) if a]
-    call = f"{function.c}({', '.join(arguments)})"
-    unused = "" if function.faults else "    (void)fault;\n"
-    if function.returns == NOTHING:
-        head = f"static void slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
-        return f"{head}\n{{\n{unused}    {call};\n}}"
-    if function.returns == REAL:
-        head = f"static double slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
-        return f"{head}\n{{\n{unused}    return {call};\n}}"
-    c = program.names.c(function.returns)
-    head = f"static void slave_{name}({program.owner_name} *self, double values[], Fault *fault)"
-    return f"{head}\n{{\n{unused}    const {c} found = {call};\n    memcpy(values, found.v, sizeof found.v);\n}}"
-
-
 def _hook(program: Program, name: str, parameters: str, needed: bool) -> str:
     """Return the function by which the runtime calls a hook, whether it can raise or not."""
-    head = f"static void slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
     if not needed and not _is_defined(program, name):
+        head = f"static void slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
         return f"{head}\n{{\n    (void)self;\n    (void)fault;\n}}"
     function = program.method(None, None, name)
-    _check(program, function, parameters)
+    if function.returns != NOTHING or len(function.parameters) != parameters.count(","):
+        raise FmuError(f"`{program.owner_name}.{name}` must have the parameters of `SlaveBase` and return None")
+    return _caller(program, name, parameters, function)
+
+
+def _caller(program: Program, name: str, parameters: str, function: Function) -> str:
+    """Return the function by which the runtime calls a method; what it returns goes into an array."""
     arguments = [a for a in ("self", _ARGUMENTS.get(name), "fault" if function.faults else None) if a]
-    unused = "" if function.faults else "    (void)fault;\n"
-    return f"{head}\n{{\n{unused}    {function.c}({', '.join(arguments)});\n}}"
+    call = f"{function.c}({', '.join(arguments)})"
+    lines = [] if function.faults else ["(void)fault;"]
+    returned = "double" if function.returns == REAL else "void"
+    if function.returns in (NOTHING, REAL):
+        lines.append(f"return {call};" if function.returns == REAL else f"{call};")
+    else:
+        parameters = ", double values[]"
+        lines += [f"const {program.names.c(function.returns)} found = {call};"]
+        lines += ["memcpy(values, found.v, sizeof found.v);"]
+    head = f"static {returned} slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
+    return f"{head}\n{{\n" + "".join(f"    {line}\n" for line in lines) + "}"
 
 
 def _is_defined(program: Program, name: str) -> bool:
     assert program.owner is not None
     return any(name in vars(base) for base in program.owner.cls.__mro__ if base.__module__ not in BASE_MODULES)
-
-
-def _check(program: Program, function: Function, parameters: str) -> None:
-    if function.returns != NOTHING or len(function.parameters) != parameters.count(","):
-        raise FmuError(
-            f"`{program.owner_name}.{function.name}` must have the parameters of `SlaveBase` and return None"
-        )
 
 
 def _struct(program: Program, owner: Owner) -> str:
