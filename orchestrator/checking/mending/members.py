@@ -1,10 +1,11 @@
 """The files of an FMU in memory, with the faults of its archive mended."""
 
 import zipfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from orchestrator.checking.archive import FmuFiles, open_fmu
+from orchestrator.checking.findings import list_names
 from orchestrator.errors import FmuError
 from orchestrator.shared.isolation.archives import ArchiveLimits, is_folder, plain_path
 
@@ -40,10 +41,10 @@ def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], l
         if members.setdefault(plain, data) != data:
             raise UnmendableError(f"{path.name} must be mended, but has two different files {plain}")
     if repeated:
-        repairs.append(f"removed repeated entries: {_list_names(repeated)}")
+        repairs.append(f"removed repeated entries: {list_names([*dict.fromkeys(repeated)], 5)}")
     packed = [finding.path for finding in findings if finding.rule == "archive.compression"]
     if packed:
-        repairs.append(f"packed with deflate: {_list_names(packed)}")
+        repairs.append(f"packed with deflate: {list_names([*dict.fromkeys(packed)], 5)}")
     return _lift(path, members, repairs), repairs
 
 
@@ -77,9 +78,3 @@ def _lift(path: Path, members: dict[str, bytes], repairs: list[str]) -> dict[str
         raise UnmendableError(f"{path.name} must be mended, but has no {DESCRIPTION} at its top or in its only folder")
     repairs.append(f"moved all files out of the folder {folder}")
     return {name.partition("/")[2]: data for name, data in members.items()}
-
-
-def _list_names(names: Iterable[str]) -> str:
-    distinct = list(dict.fromkeys(names))
-    more = f" and {len(distinct) - 5} more" if len(distinct) > 5 else ""
-    return ", ".join(distinct[:5]) + more
