@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -51,17 +52,9 @@ def _dimensions(table: Sequence[FmuVariable], place: int) -> tuple[int, ...]:
             break
         indices.append(tuple(int(number) for number in element[2].split(",")))
     dimensions = indices[-1]
-    return dimensions if indices == list(_row_major(dimensions)) else ()
+    in_rows = itertools.product(*(range(1, size + 1) for size in dimensions))
+    return dimensions if indices == list(in_rows) else ()
 
 
 def _is_same_kind(a: FmuVariable, b: FmuVariable) -> bool:
     return (a.causality, a.variability, a.type, a.bounds) == (b.causality, b.variability, b.type, b.bounds)
-
-
-def _row_major(dimensions: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    if not dimensions:
-        yield ()
-        return
-    for first in range(1, dimensions[0] + 1):
-        for rest in _row_major(dimensions[1:]):
-            yield (first, *rest)

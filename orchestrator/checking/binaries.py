@@ -145,9 +145,8 @@ def _check_library(
         yield Finding("binary.exports", path, message)
     python = sorted(u for u in library.undefined or () if u.startswith(("Py", "_Py")))
     if python and not any("python" in n for n in library.needed or ()):
-        message = (
-            f"the library uses {python[0]} and {len(python) - 1} more of Python without naming libpython as needed"
-        )
+        message = f"the library uses {python[0]} and {len(python) - 1} more of Python"
+        message += " without naming libpython as needed"
         yield Finding("binary.python-symbols", path, message)
 
 

@@ -115,10 +115,8 @@ def _members(terminal: etree._Element) -> Iterator[Finding]:
         name = member.get("memberName")
         if not name or name in seen:
             found = f"`{name}` is there twice" if name else f"`{member.get('variableName')}` has none"
-            message = (
-                f"members of a terminal that is matched by `{rule}` must have a memberName of their own, but {found}"
-            )
-            yield Finding("terminals.member", xpath(member, name=TERMINALS), message)
+            message = f"members of a terminal that is matched by `{rule}` must have a memberName of their own"
+            yield Finding("terminals.member", xpath(member, name=TERMINALS), f"{message}, but {found}")
         seen.add(name or "")
     flows = [m for m in members if m.get("variableKind") in ("inflow", "outflow")]
     if terminal.find("TerminalStreamMemberVariable") is not None and len(flows) != 1:

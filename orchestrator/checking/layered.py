@@ -56,9 +56,8 @@ def check_files(d: Description, files: FmuFiles) -> Iterator[Finding]:
     documents = any(re.fullmatch(r"documentation/(?!licenses/|diagrams?/).+", n) for n in names)
     entries = ("documentation/index.html", "documentation/_main.html")[: 2 if d.dialect.version == "2.0" else 1]
     if documents and not names & set(entries):
-        yield Finding(
-            "file.documentation", "documentation", f"documentation/ must have the entry {entries[0]}, but has not"
-        )
+        message = f"documentation/ must have the entry {entries[0]}, but has not"
+        yield Finding("file.documentation", "documentation", message)
     if "model.png" in names:
         yield from check_icon(files, "model.png")
 

@@ -38,9 +38,8 @@ def check_arrays(d: Description) -> Iterator[Finding]:
         for dimension in v.dimensions:
             yield from _dimension(d, v, dimension.size, dimension.reference)
         if v.causality == "structuralParameter" and v.dimensions:
-            yield Finding(
-                "variable.structural", v.path(), f"a structural parameter must be no array, but `{v.name}` is"
-            )
+            message = f"a structural parameter must be no array, but `{v.name}` is"
+            yield Finding("variable.structural", v.path(), message)
         size, given = d.size(v), len(v.starts or ())
         if (size and given > 1 and given != size) or (given == 0 and v.starts is not None):
             wanted = f"must have one start value, or {size}" if size != 1 else "must have one start value"

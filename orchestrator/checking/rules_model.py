@@ -176,9 +176,8 @@ def _base_unit(d: Description, name: str, base: etree._Element) -> Iterator[Find
     # An angle may or may not be counted as a dimension, so rad is left out.
     if any(found[k] != expected.get(k, 0) for k in found if k != "rad"):
         wanted = " ".join(f"{k}={e}" for k, e in expected.items() if e) or "none"
-        yield Finding(
-            "unit.exponents", xpath(base), f"the exponents of the unit `{name}` must be {wanted}, but are not"
-        )
+        message = f"the exponents of the unit `{name}` must be {wanted}, but are not"
+        yield Finding("unit.exponents", xpath(base), message)
     elif lacks_angle(name, found["rad"]):
         message = f"the exponents of the unit `{name}`, which has an angle, must have rad=1, but have rad=0"
         yield Finding("unit.exponents", xpath(base), message)

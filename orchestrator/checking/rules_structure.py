@@ -123,9 +123,8 @@ def _unknowns(d: Description, section: tuple[StructureEntry, ...]) -> Iterator[F
         if v is None:
             yield Finding("structure.index", path, f"{_index_rule(d)}, but is {u.variable}")
         elif u.variable in seen:
-            yield Finding(
-                "structure.duplicate", path, f"a variable must be listed once, but `{v.name}` is listed again"
-            )
+            message = f"a variable must be listed once, but `{v.name}` is listed again"
+            yield Finding("structure.duplicate", path, message)
         elif initial and u.variable < last and d.dialect.version == "2.0":
             yield Finding("structure.order", path, "InitialUnknowns must be sorted by index, but are not")
         seen.add(u.variable)

@@ -204,10 +204,8 @@ def _check_declared_type(types: Mapping[str, SimpleType], v: DescribedVariable) 
         outer = number(declared.attributes.get(attribute), "Real")
         inner = number(v.own.get(attribute), "Real")
         if outer is not None and inner is not None and sign * inner < sign * outer:
-            message = (
-                f"{attribute} of `{v.name}` must not widen that of `{name}` ({exact_text(outer)}), but is {inner:g}"
-            )
-            yield Finding("variable.bounds-exceed-type", v.path(attribute), message)
+            message = f"{attribute} of `{v.name}` must not widen that of `{name}` ({exact_text(outer)})"
+            yield Finding("variable.bounds-exceed-type", v.path(attribute), f"{message}, but is {inner:g}")
 
 
 def _real_only(d: Description, v: DescribedVariable, states: Collection[int | None]) -> Iterator[Finding]:

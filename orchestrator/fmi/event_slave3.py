@@ -34,11 +34,7 @@ class EventFmuSlave(ClockedSlave, Fmu3Slave):
     # A run ---------------------------------------------------------------------------------------------------
 
     def step(self, time: float, step: float) -> StepOutcome:
-        if self._worst >= ERROR:
-            self._alive("fmi3DoStep")
-        end = self._last.value = time + step
-        status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
-        self._reached, self._size = time, step
+        status, end = self._call_step(time, step), time + step
         failure = self._updates.take_failure()
         if failure is not None:
             self._worst = ERROR

@@ -134,12 +134,16 @@ class Fmu3Slave(Fmu3Instance):
         """Return the variables that intermediate updates set, and the function that does it, if any."""
         return (ctypes.c_uint * 0)(), None
 
-    def do_step(self, time: float, step: float) -> None:
+    def _call_step(self, time: float, step: float) -> int:
         if self._worst >= ERROR:
             self._alive("fmi3DoStep")
-        end = self._last.value = time + step
-        status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
+        self._last.value = time + step
+        status: int = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
         self._reached, self._size = time, step
+        return status
+
+    def do_step(self, time: float, step: float) -> None:
+        status, end = self._call_step(time, step), time + step
         if status:
             self._check(status, "fmi3DoStep")
         reached = self._last.value

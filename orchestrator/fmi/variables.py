@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from lxml import etree
 
@@ -144,17 +144,8 @@ def _add(
 
 
 def _alias(scalar: Variable, name: str, description: str | None) -> Variable:
-    return Variable(
-        name,
-        "local",
-        scalar.type,
-        scalar.unit,
-        scalar.variability,
-        items=scalar.items,
-        description=description or scalar.description,
-        reference=scalar.reference,
-        relative=scalar.relative,
-    )
+    own = replace(scalar, name=name, causality="local", description=description or scalar.description)
+    return replace(own, start=None, minimum=None, maximum=None)
 
 
 def _maker(

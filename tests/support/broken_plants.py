@@ -176,7 +176,6 @@ _TABLE = """
 [promised, never called]
 2   | CS | interpolation_refused | promise.refused | step flags=canInterpolateInputs="true"
 2   | CS | interpolation_second  | promise.refused | step flags=canInterpolateInputs="true"
-2   | CS | interpolation_ignored | promise.ignored | step flags=canInterpolateInputs="true"
 2 3 | CS | category_refused      | log.refused
 2 3 | ME | second_category       | log.refused
 2 3 | CS | logging_refused       | log.refused
@@ -187,7 +186,6 @@ _TABLE = """
 3   | ME | evaluate_refused      | promise.refused | evaluate
 3   | CS | fraction_refused      | promise.refused | clock=fraction
 3   | CS | fraction_wrong        | clock.interval-value | clock=fraction
-2   | CS | interpolation_sign | promise.ignored | step flags=canInterpolateInputs="true"
 
 [values]
 2 3 | CS | item_zero         | value.item

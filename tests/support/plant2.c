@@ -137,7 +137,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
     Plant *self = c;
     if (IS(interpolation_refused)) REFUSE("not supported");
     if (IS(interpolation_second) && n && r[0] == W) REFUSE("only the first input");
-    for (size_t a = 0; a < n; a++) if (r[a] == U && !IS(interpolation_ignored)) self->s.slope = IS(interpolation_sign) ? -in[a] : in[a];
+    for (size_t a = 0; a < n; a++) if (r[a] == U) self->s.slope = in[a];
     return fmi2OK;
 }
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer order[], fmi2Real out[]) {

@@ -53,9 +53,9 @@ def array_length(base: Code, axis: int) -> Code:
     return Code(f"{member(base)}n[{axis}]" if fixed is None else str(fixed), WHOLE)
 
 
-def quotient(scope: Scope, left: Code, right: Code) -> Code:
-    """Return a quotient of plain numbers, of which the divisor may be zero."""
-    if scope.program.checked:
+def quotient(scope: Scope, left: Code, right: Code, never_zero: bool = False) -> Code:
+    """Return a quotient of plain numbers, of which the divisor may be zero unless it is ``never_zero``."""
+    if scope.program.checked and not never_zero:
         return Code(f"divided({left.text}, {right.text}, {scope.fault()})", REAL)
     cast = "(double)" if left.kind == WHOLE and right.kind == WHOLE else ""
     return Code(f"{cast}{left.within(UNARY if cast else PRODUCT)} / {right.within(PRODUCT + 1)}", REAL, PRODUCT)

@@ -21,7 +21,7 @@ from orchestrator.building.translation.kinds import (
     describe,
     size_of,
 )
-from orchestrator.building.translation.scope import PRIMARY, UNARY, Code, Scope, address_of, convert, part_of
+from orchestrator.building.translation.scope import UNARY, Code, Scope, address_of, convert, part_of
 
 # Larger tuples that are parts of fixed parameters are not copied.
 LARGEST_COPIED = 12
@@ -145,9 +145,8 @@ def _alias(scope: Scope, node: ast.AST, name: str, code: Code, value: ast.expr) 
     scope.pointers.add(name)
     if isinstance(root, ast.Name) and root.id != "self":
         scope.aliases[name] = root.id
-    address = code.text[1:] if code.text.startswith("*") else f"&{code.within(PRIMARY)}"
     constant = "" if name in scope.mutated or (isinstance(root, ast.Name) and root.id in scope.mutated) else "const "
-    return [f"{constant}{scope.program.names.c(code.kind)} *const {scope.local(name)} = {address};"]
+    return [f"{constant}{scope.program.names.c(code.kind)} *const {scope.local(name)} = {address_of(code)};"]
 
 
 def _scratch(scope: Scope, node: ast.stmt, name: str, value: ast.Call) -> list[str]:

@@ -160,10 +160,7 @@ def _translate_division(scope: Scope, node: ast.BinOp, left: Code, right: Code) 
         function = "pair_parted" if right.plain else "pair_divided"
         return Code(f"{function}({left.text}, {right.plain or right.text}, {scope.fault()})", REAL)
     divisor = node.right.value if isinstance(node.right, ast.Constant) else constant_value(scope, node.right)
-    if isinstance(divisor, int | float) and divisor:
-        cast = "(double)" if left.kind == WHOLE and right.kind == WHOLE else ""
-        return Code(f"{cast}{left.within(UNARY if cast else PRODUCT)} / {right.within(PRODUCT + 1)}", REAL, PRODUCT)
-    return quotient(scope, left, right)
+    return quotient(scope, left, right, isinstance(divisor, int | float) and bool(divisor))
 
 
 def _power(scope: Scope, node: ast.BinOp) -> Code:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from orchestrator.building.translation.assignments import translate_annotated, translate_assignment, translate_augmented
-from orchestrator.building.translation.building_tuples import with_loop
+from orchestrator.building.translation.building_tuples import with_loop, without_loop
 from orchestrator.building.translation.calls import message
 from orchestrator.building.translation.constants import constant_value, interval
 from orchestrator.building.translation.kinds import NOTHING, WHOLE, Items, Tuple, describe
@@ -154,7 +154,7 @@ def _translate_range(scope: Scope, node: ast.For, call: ast.Call) -> list[str]:
     stopped = " && !fault->kind" if scope.faults > before and scope.owner is None else ""
     sign = "<" if step[0] > 0 else ">"
     change = {1: f"{variable}++", -1: f"{variable}--"}.get(step[0], f"{variable} += {step[0]}")
-    _leave(scope, node.target.id)
+    without_loop(scope, node.target.id)
     return [f"for (int64_t {variable} = {start}; {variable} {sign} {stop}{stopped}; {change}) {{", *body, "}"]
 
 
@@ -164,11 +164,6 @@ def _narrow(scope: Scope, name: str, ends: tuple[Any, Any], step: int) -> None:
     first, last = ends
     if first is not None and last is not None:
         scope.ranges[name] = (first[0], last[1] - 1) if step > 0 else (last[0] + 1, first[1])
-
-
-def _leave(scope: Scope, name: str) -> None:
-    scope.ranges.pop(name, None)
-    scope.kinds.pop(name, None)
 
 
 def _stop(scope: Scope, node: ast.For, end: ast.expr) -> str:
@@ -215,7 +210,7 @@ def _over_items(scope: Scope, node: ast.For) -> list[str]:
     body = [*head, *block(scope, node.body)]
     stopped = " && !fault->kind" if scope.faults > before and scope.owner is None else ""
     for name in names:
-        _leave(scope, name)
+        without_loop(scope, name)
     return [f"for (int64_t {index} = 0; {index} < {length}{stopped}; {index}++) {{", *_indent(body), "}"]
 
 

@@ -122,9 +122,8 @@ class CoSimulation3(EventDriver):
         same_next = announced == self.memory["next"]
         if watched and idle and same_next and before == self.read(watched, when):
             if t - self.memory.get("visible", -math.inf) <= (1.0 + _SMALL) * self.job.step:
-                text = (
-                    "an event must have a cause, but one that follows another changes no output and no local variable"
-                )
+                text = "an event must have a cause, but one that follows another"
+                text += " changes no output and no local variable"
                 self.report("event.without-cause", text, when=f"at t = {t:g}")
         elif wanted:
             self.memory["visible"] = t

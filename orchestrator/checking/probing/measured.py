@@ -1,7 +1,7 @@
 """What was seen of how unknowns react to knowns, and what the description makes of it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -50,10 +50,7 @@ class Measured:
         self, unknowns: Sequence[ProbedUnknown], v: ProbedVariable, rows: list[list[Any]], change: float | None, at: str
     ) -> None:
         """Take the values of unknowns before and while a known has another value, by ``change`` if it is a number."""
-        position = 0
-        for u in unknowns:
-            before, during = (row[position : position + u.variable.size] for row in rows)
-            position += u.variable.size
+        for u, before, during in _by_unknown(unknowns, rows):
             if u.variable.key == v.key:
                 continue
             name = (u.section, u.variable.name, v.name)
@@ -89,10 +86,7 @@ class Measured:
 
     def look_first(self, unknowns: Sequence[ProbedUnknown], v: ProbedVariable, rows: list[list[Any]]) -> None:
         """Take the same at the first communication point, with the values of initialisation mode."""
-        position = 0
-        for u in unknowns:
-            before, during = (row[position : position + u.variable.size] for row in rows)
-            position += u.variable.size
+        for u, before, during in _by_unknown(unknowns, rows):
             if any(_reacts(u.variable, a, b) for a, b in zip(before, during, strict=True)):
                 self.first.setdefault(u.variable.name, v.name)
 
@@ -192,6 +186,15 @@ class Measured:
         """The unknowns that name what they depend on, without those that name everything."""
         unknowns = self.context.bench.job.unknowns
         return [u for u in unknowns if u.knowns is not None and len(u.knowns) <= _FEW_LISTED]
+
+
+def _by_unknown(unknowns: Sequence[ProbedUnknown], rows: list[list[Any]]) -> Iterator[tuple[ProbedUnknown, Any, Any]]:
+    """Each unknown with its values in both rows."""
+    position = 0
+    for u in unknowns:
+        before, during = (row[position : position + u.variable.size] for row in rows)
+        position += u.variable.size
+        yield u, before, during
 
 
 def _reacts(v: ProbedVariable, a: Any, b: Any) -> bool:

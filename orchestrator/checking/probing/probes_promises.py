@@ -9,21 +9,18 @@ from typing import Any
 
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.events import EventDriver
-from orchestrator.checking.probing.job import ProbeJob, references
+from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.statuses import StatusError
-from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.rules import declare
 
 declare("""
 [promises]
 promise.refused | E | 2.1.5 | 2.4.2 | functions declared by a flag or a list can be called | implement the function, or clear the flag
 log.refused | W | 2.1.5 | 2.3.1 | SetDebugLogging takes the categories that are declared | accept them, and return OK
-promise.ignored | W | 4.2.1 | - | derivatives of inputs have an effect with canInterpolateInputs | use them, or clear the flag
 """)  # noqa: E501
 
 _MOST = 20
-_FEW_STEPS = 5
 Call = tuple[str, list[Any]]
 
 
@@ -83,7 +80,6 @@ PROMISES = (
 def promises(context: Context) -> None:
     """Call what the flags and lists of the description promise."""
     bench, job = context.bench, context.bench.job
-    refused: set[str] = set()
     for promise in PROMISES:
         calls = promise.calls(job)
         if not calls or (promise.moment == "event" and not job.has_events):
@@ -96,15 +92,11 @@ def promises(context: Context) -> None:
                 except StatusError as error:
                     rule = "log.refused" if promise.word == "LogCategories" else "promise.refused"
                     context.report(rule, f"{error}, for {promise.word} promises it")
-                    refused.add(promise.word)
                     break
                 _judge_fraction(context, function, arguments, found)
             else:
                 if leave:
                     driver.call(leave)
-    interpolates = "canInterpolateInputs" in job.flags - refused and job.version == "2.0"
-    if interpolates and job.interface == "CoSimulation":
-        _interpolation(context)
 
 
 def _go(context: Context, driver: Driver, moment: str) -> str:
@@ -135,46 +127,3 @@ def _judge_fraction(context: Context, function: str, arguments: Sequence[Any], a
     if clock.interval and (not resolution or abs(counter / resolution - clock.interval) > 1e-6 * clock.interval):
         text = f"the interval of `{clock.name}` must be {clock.interval:g}, but is {counter}/{resolution} as a fraction"
         context.report("clock.interval-value", text)
-
-
-def _interpolation(context: Context) -> None:
-    """Derivatives of inputs change what comes out, where the inputs themselves do."""
-    bench, job = context.bench, context.bench.job
-    inputs = [v for v in job.inputs() if v.base == "Real" and v.variability == "continuous"][:_MOST]
-    outputs = [v for v in job.outputs() if v.real]
-    if not inputs or not outputs or not bench.excited or context.plain is None:
-        return
-    sizes = [0.5 * _change(v, bench.job.step) for v in inputs]
-    rows = []
-    for kind in ("held", "moved", "sloped"):
-        with bench.instance(moved=False) as driver:
-            for n in range(min(_FEW_STEPS, job.steps)):
-                t = job.start + n * job.step
-                starts = [float((v.start or (0.0,))[0]) for v in inputs]
-                if kind == "moved":
-                    starts = [x + s * job.step for x, s in zip(starts, sizes, strict=True)]
-                driver.set(inputs, starts)
-                if kind == "sloped":
-                    driver.call("SetRealInputDerivatives", references(inputs), [1] * len(inputs), sizes)
-                driver.advance(t, job.step, f"at t = {t:g}")
-            driver.set(inputs, [float((v.start or (0.0,))[0]) for v in inputs])
-            rows.append(driver.read(outputs))
-    held, other, sloped = rows
-    if held == sloped and held != other:
-        text = "derivatives of inputs must change what comes out, as canInterpolateInputs says, but they change nothing"
-        context.report("promise.ignored", text)
-        return
-    effects = [(c - a, b - a, 1e-6 * max(abs(a), abs(b))) for a, b, c in zip(held, other, sloped, strict=True)]
-    seen = [slope * whole for slope, whole, noise in effects if abs(whole) > noise and abs(slope) > noise]
-    if seen and max(seen) < 0.0:
-        text = "an input with a positive derivative must act like one that grows, but all outputs go the other way"
-        context.report("promise.ignored", text)
-
-
-def _change(v: ProbedVariable, step: float) -> float:
-    """A slope of an input that stays within its bounds over a step, or 0."""
-    start = float((v.start or (0.0,))[0])
-    size = 0.1 * (v.nominal or max(abs(start), 1.0))
-    low, high = v.limits
-    fits = next((x for x in (size, -size) if low <= start + x <= high), 0.0)
-    return fits / step

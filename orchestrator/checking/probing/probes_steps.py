@@ -109,10 +109,8 @@ def inner_steps(context: Context) -> None:
         return  # a model may have stairs over time
     fewest, most = job.step / (period + error) - _MULTIPLE, job.step / (period - error) + _MULTIPLE
     if math.floor(most) < max(math.ceil(fewest), 1):
-        text = (
-            f"communication steps must be multiples of the steps inside, but {job.step:g} s is none of {period:.3g} s"
-        )
-        context.report("steps.internal", f"{text}, at which all continuous outputs change")
+        what = f"{job.step:g} s is none of {period:.3g} s, at which all continuous outputs change"
+        context.report("steps.internal", f"communication steps must be multiples of the steps inside, but {what}")
 
 
 def _report_count(
@@ -124,10 +122,9 @@ def _report_count(
         if len(set(a[:_FEWEST_EQUAL])) < _FEWEST_EQUAL or len(b) < parts or _keep_time(a, b, parts):
             continue
         if context.bench.job.varies and len(set(b)) == 1:
-            text = (
-                f"`{v.name}` must follow the size of communication steps, but stands in steps of {size / parts:.3g} s"
-            )
-            context.report("steps.internal", f"{text}, and moves in those of {size:.3g} s", v.name)
+            how = f"stands in steps of {size / parts:.3g} s, and moves in those of {size:.3g} s"
+            text = f"`{v.name}` must follow the size of communication steps, but {how}"
+            context.report("steps.internal", text, v.name)
             return True
         for p, q in _RATIOS:
             pairs = [(a[q * n - 1], b[p * n - 1]) for n in range(1, min(len(a) // q, len(b) // p) + 1)]
