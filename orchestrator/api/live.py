@@ -14,8 +14,7 @@ STARTS = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T
 def live_fitted_model(record: Record, fit: Estimate) -> LiveFound:
     """Return the fitted model, which starts anew from the fitted states every two seconds.
 
-    Args:
-        record: with every sample of its grid, missing ones filled.
+    ``record``: with every sample of its grid, missing ones filled.
     """
     rows = list(range(0, record.size - 1, max(round(SPAN / record.step), LEAST_ROWS)))
     states, p = fit.curves["states"], fit.curves["model"]

@@ -13,11 +13,7 @@ FAR = 4.0  # standard deviations of a value that is given beside the one that th
 def read_fitted_model(path: Path) -> Model:
     """Return the model that a record was fitted to.
 
-    Args:
-        path: a model file, or ``estimate.json`` or ``diagnose.json`` with the corrected model beside it.
-
-    Raises:
-        ScenarioError: there is no corrected model beside the JSON file, or the model file is wrong.
+    ``path``: a model file, or ``estimate.json`` or ``diagnose.json`` with the corrected model beside it.
     """
     if path.suffix != ".json":
         return read_model(path)
@@ -33,12 +29,7 @@ def read_fitted_model(path: Path) -> Model:
 def require_machine(
     model: Model, alpha: float | None, torque_limit: float | None, force: bool
 ) -> tuple[Machine, tuple[str, ...]]:
-    """Return the machine, and what was to be said of the model before it was forced.
-
-    Raises:
-        ScenarioError: the diagnosis is red or does not know what is missing, or a value is not the record's; ``force``
-            makes a doubt of that.
-    """
+    """Return the machine, and what was to be said of the model before it was forced."""
     machine = machine_of(model, alpha=alpha, torque_limit=torque_limit)
     record = model.record
     assert record is not None

@@ -24,8 +24,7 @@ class Budget:
     def begin(self, expected: float, at_once: bool = False) -> None:
         """Start a piece of work that was told to take so much processor time [s].
 
-        Args:
-            at_once: Ctrl-C does not wait for the work to ask.
+        ``at_once``: Ctrl-C does not wait for the work to ask.
         """
         self._expected, self._begun, self.at_once = expected, time.process_time(), at_once
 

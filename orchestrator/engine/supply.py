@@ -17,8 +17,7 @@ from orchestrator.shared.scratch import Scratch
 class Supply:
     """Files by name in a scratch folder; to be closed.
 
-    Args:
-        unpacked: the files are archives, and workers get the folders into which they are unpacked.
+    ``unpacked``: the files are archives, and workers get the folders into which they are unpacked.
 
     Attributes:
         folder: the folder that holds them all.

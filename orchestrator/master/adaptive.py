@@ -102,9 +102,8 @@ def run_adaptive(
 ) -> Statistics:
     """Run from ``start`` to ``stop`` [s]; ``rows`` has shape (grid points, recorded) with row 0 already there.
 
-    Args:
-        signals: signals in place of those of ``System.sources``, by index.
-        record: (recorded,) slots of the recorded signals.
+    ``signals``: signals in place of those of ``System.sources``, by index; ``record``: (recorded,) slots of the
+    recorded signals.
     """
     check_adaptive(wiring.layout)
     return _Run(wiring, signals, start, stop, settings, rows, record).run()

@@ -59,8 +59,7 @@ def _trigger_problems(system: System) -> list[Problem]:
 class ClockSchedule:
     """The ticks of all periodic clocks of a run, in order of time.
 
-    Args:
-        start: of the run [s]; the decimal number that it is printed as counts.
+    ``start``: of the run [s]; the decimal number that it is printed as counts.
     """
 
     def __init__(self, system: System, start: float) -> None:

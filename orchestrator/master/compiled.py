@@ -84,8 +84,7 @@ def _call_name(native: NativeCalls, call: int) -> str:
 class CompiledWiring:
     """The slaves of a wiring, ready for machine code.
 
-    Args:
-        natives: what each of its stages offers, in the same order.
+    ``natives``: what each of its stages offers, in the same order.
     """
 
     def __init__(self, wiring: Wiring, natives: Sequence[NativeCalls], run_steps: Any) -> None:
@@ -112,8 +111,7 @@ class CompiledWiring:
     def run(self, table: Array, start: float, step: float, simultaneous: bool, out: Array, record: Slots) -> None:
         """Run on the grid ``start + n step`` [s]; ``out`` has shape (steps + 1, recorded), with row 0 there.
 
-        Args:
-            record: (recorded,) slots of the recorded signals.
+        ``record``: (recorded,) slots of the recorded signals.
         """
         table, record = np.ascontiguousarray(table), np.ascontiguousarray(record)
         assert out.flags.c_contiguous

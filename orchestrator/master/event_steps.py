@@ -124,12 +124,7 @@ class FixedSteps:
     def run(self, steps: int, rows: Array, record: Slots) -> None:
         """Run ``steps`` communication steps; a row holds the values after the events at its time.
 
-        Args:
-            rows: results, shape (steps + 1, recorded); row 0 is already there.
-
-        Raises:
-            ChatteringError: there is no end of events.
-            RunEndedError: a slave wants the run to end.
+        ``rows``: results, shape (steps + 1, recorded); row 0 is already there.
         """
         time = self.start
         for n in range(steps):

@@ -47,9 +47,8 @@ class Swept:
 class Sweeper:
     """Sweeps the slaves of a wiring.
 
-    Args:
-        sources: what sources add to inputs at three nodes, shape (rows, 3), from their times [s].
-        difference: of two sets of outputs, as a multiple of the tolerance.
+    ``sources``: what sources add to inputs at three nodes, shape (rows, 3), from their times [s]; ``difference``: of
+    two sets of outputs, as a multiple of the tolerance.
 
     Attributes:
         sweeps: passes over all slaves.

@@ -82,8 +82,7 @@ class EventWindows:
     def run(self, rows: Array, record: Slots) -> Statistics:
         """Run; a row holds the values after the events at its time.
 
-        Args:
-            rows: results, shape (grid points, recorded); row 0 is already there.
+        ``rows``: results, shape (grid points, recorded); row 0 is already there.
         """
         time, length, row = self.start, min(self.settings.first, self.settings.largest), 1
         guess: Track | None = None

@@ -60,9 +60,6 @@ def run_fixed_step(
         simultaneous: side by side (Jacobi), else in turn (Gauss-Seidel).
         rows: results, shape (steps + 1, recorded); row 0 is already there.
         record: recorded slots, shape (recorded,).
-
-    Raises:
-        RunEndedError: a slave wants the run to end; the row of its time is there.
     """
     advance = step_side_by_side if simultaneous else step_in_turn
     for n in range(len(rows) - 1):

@@ -64,8 +64,7 @@ class Layout:
     def signal_table(self, times: Signals, replaced: Mapping[int, Signal]) -> NDArray[np.float64]:
         """Return what the sources add to inputs: column 0 for initialisation, column ``n + 1`` for step ``n``.
 
-        Args:
-            times: communication points [s], shape (steps + 1,).
+        ``times``: communication points [s], shape (steps + 1,).
 
         Returns:
             Shape (rows of ``signals``, steps + 1), in the units of the inputs.

@@ -42,8 +42,7 @@ def call_step(address: int, component: int, time: float, length: float) -> int:
 def call_reporting_step(address: int, component: int, time: float, length: float, report: Reals) -> int:
     """Return the status of a step of FMI 3.0 from ``time`` over ``length`` [s].
 
-    Args:
-        report: (4,) filled: event, end and early return (1: yes), time reached [s], which is set before.
+    ``report``: (4,) filled: event, end and early return (1: yes), time reached [s], which is set before.
     """
     flags = [_Truth() for _ in range(3)]
     reached = _Real(report[3])

@@ -42,11 +42,8 @@ class Session:
     """Runs one system again and again.
 
     Use as a context manager, or call ``close``. Between runs slaves are reset; where an instance does not say that it
-    ``resets``, all are made anew. A slave that failed is dropped, and made anew by the next run.
-
-    Args:
-        stop: end of a run [s].
-        start: beginning of a run [s].
+    ``resets``, all are made anew. A slave that failed is dropped, and made anew by the next run. ``stop``: end of a run
+    [s]; ``start``: beginning of a run [s].
     """
 
     def __init__(

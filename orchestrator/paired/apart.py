@@ -22,8 +22,7 @@ def run_pair_within(
 ) -> PairRun:
     """Do what ``run_pair`` does, within ``time_limit`` seconds of wall time.
 
-    Args:
-        time_limit: [s], the start of the child process included.
+    ``time_limit``: [s], the start of the child process included.
     """
     limits = Limits.of_time(time_limit)
     argument = (experiment, {name: path.absolute() for name, path in fmus.items()}, alpha, seed, dict(start or {}))

@@ -177,8 +177,7 @@ class LoopSession:
     ) -> LoopRun:
         """Return the run of a loop whose half-gap is ``alpha`` [rad].
 
-        Args:
-            errors: errors [rad] of both encoders at the communication points; default none.
+        ``errors``: errors [rad] of both encoders at the communication points; default none.
         """
         values = plant_values(self._experiment, alpha) | dict(start or {})
         signals = None

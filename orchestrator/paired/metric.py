@@ -12,9 +12,8 @@ from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 def difference_sum(with_gap: Array, without_gap: Array) -> float:
     """Return S, the sum over samples of ``|theta_l_hat(with) - theta_l_hat(without)|`` [rad].
 
-    Args:
-        with_gap: (n,) estimated load angle of the loop with a gap [rad].
-        without_gap: (n,) that of the loop without one [rad].
+    ``with_gap``: (n,) estimated load angle of the loop with a gap [rad]; ``without_gap``: (n,) that of the loop without
+    one [rad].
     """
     return float(np.abs(with_gap - without_gap).sum())
 

@@ -158,8 +158,7 @@ def solve_riccati(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]
 def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float) -> Regulator:
     """Return the sampled LQR of ``model`` for the continuous weights ``Q`` and ``R`` times the sample time.
 
-    Args:
-        Q: (states, states) weights of the states.
+    ``Q``: (states, states) weights of the states.
     """
     report = rank_report(model)
     if not report.stabilisable:
@@ -184,9 +183,8 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
 def design_estimator(model: LinearModel, process: Array, measurement: Array, sample_time: float) -> KalmanFilter:
     """Return the stationary Kalman filter of ``model``.
 
-    Args:
-        process: intensities of the white noise on each state, 6 values, unit^2/s.
-        measurement: variances of both encoders [rad2].
+    ``process``: intensities of the white noise on each state, 6 values, unit^2/s; ``measurement``: variances of both
+    encoders [rad2].
     """
     if not rank_report(model).detectable:
         raise DesignError("`model` must be detectable, but a mode that does not decay reaches no output")

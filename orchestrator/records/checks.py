@@ -81,8 +81,7 @@ def motion_span(theta: Array, time: Array) -> tuple[float, float] | None:
 def check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str) -> None:
     """Refuse an encoder that is stuck, or saturated at an end of its range, while the machine moves.
 
-    Args:
-        arrays: columns by name, (n,) each.
+    ``arrays``: columns by name, (n,) each.
     """
     values = arrays[name]
     other = arrays.get("theta_l" if name == "theta_m" else "theta_m")

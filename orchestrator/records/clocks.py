@@ -48,10 +48,8 @@ def read_clock(
 ) -> Clock:
     """Return the time of the motor's rows.
 
-    Args:
-        values: of the channels, by place.
-        rows: how many there are, where there is no channel with the time.
-        whole: whether nothing of it will be left out.
+    ``values``: of the channels, by place; ``rows``: how many there are, where there is no channel with the time;
+    ``whole``: whether nothing of it will be left out.
     """
     rate = column.rate if column.rate is not None else source.rate
     if "time" not in chosen:

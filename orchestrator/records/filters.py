@@ -27,10 +27,8 @@ PANE = 4096  # rows of a spectrum's pane at most
 def follow_motion(records: Sequence[Record], least: float) -> list[Record]:
     """Return long records at the rate that the motion in them asks for, one for all; short ones as they are.
 
-    Repeats of one experiment keep rows that can be compared.
-
-    Args:
-        least: samples per second that the result has at least [1/s].
+    Repeats of one experiment keep rows that can be compared. ``least``: samples per second that the result has at least
+    [1/s].
     """
     long = [record for record in records if record.size >= 2 * ENOUGH_ROWS]
     if not long:

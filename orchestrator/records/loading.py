@@ -162,11 +162,7 @@ def _in_part(
 def choose_channels(
     source: RecordSource, columns: Mapping[str, Column], where: str, torque_needed: bool = True
 ) -> dict[str, Choice]:
-    """Return the channel of each column; the time is one of the motor's raster, or made from a rate.
-
-    Raises:
-        RecordError: a column that must be there is not, or several channels may be it.
-    """
+    """Return the channel of each column; the time is one of the motor's raster, or made from a rate."""
     found, unclear = find_all_channels(source, columns, where, torque_needed)
     for message in unclear.values():
         raise RecordError(message)
@@ -176,11 +172,7 @@ def choose_channels(
 def find_all_channels(
     source: RecordSource, columns: Mapping[str, Column], where: str, torque_needed: bool = True
 ) -> tuple[dict[str, Choice], dict[str, str]]:
-    """Return the channels that were found, and for each other column that must be there what is missing.
-
-    Raises:
-        RecordError: there are no columns of numbers.
-    """
+    """Return the channels that were found, and for each other column that must be there what is missing."""
     heads = list(source.heads)
     if not heads:
         raise RecordError(f"{where}: a record must hold columns of numbers, but there are none")

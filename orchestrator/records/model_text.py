@@ -50,10 +50,8 @@ def describe_fit(
 ) -> FittedRecord:  # fmt: skip
     """Return what a record showed that ``model`` was fitted to.
 
-    Args:
-        noise: of each encoder, standard deviation [rad].
-        values: that were fitted, by name.
-        covariance: (values, values) of these.
+    ``noise``: of each encoder, standard deviation [rad]; ``values``: that were fitted, by name; ``covariance``:
+    (values, values) of these.
     """
     angles = zip(("theta_m", "theta_l"), (record.theta_m, record.theta_l), strict=True)
     counts = [

@@ -166,13 +166,8 @@ def momentum_balance(impulse: Array, speed: Array, angle: Array, first: Array) -
     """Return what a torque's impulse moves, apart from a constant torque, dry friction and the drive's first torque.
 
     Without dry friction a position loop with much of it, whose torque follows the angle, seems to move an inertia of
-    any size and sign.
-
-    Args:
-        impulse: (n,) of the torque [N.m.s].
-        speed: (n,) of the motor [rad/s].
-        angle: (n,) of the motor [rad].
-        first: (n,) impulse of a unit torque that the drive began with [s].
+    any size and sign. ``impulse``: (n,) of the torque [N.m.s]; ``speed``: (n,) of the motor [rad/s]; ``angle``: (n,) of
+    the motor [rad]; ``first``: (n,) impulse of a unit torque that the drive began with [s].
 
     Returns:
         Inertia [kg.m2] and viscous friction [N.m.s/rad] at the motor, and the share of the impulse they explain.

@@ -87,9 +87,6 @@ def preview_log(path: Path, columns: Mapping[str, Column], header: int | None = 
     Args:
         columns: what is stated of the columns, as ``Model.columns`` has it.
         header: line of the names of a text, from 1; 0: there are none; None: found.
-
-    Raises:
-        RecordError: the file is no log at all, and no text whose lines could be looked at.
     """
     with ExitStack() as files:
         return preview_opened(

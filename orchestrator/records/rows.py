@@ -101,10 +101,8 @@ def describe_failed(rows: NDArray[np.int64], label: str) -> str:
 def check_clock(time: Array, angles: Mapping[str, Array], where: str, cure: str) -> None:
     """Refuse stamps of a clock that was set while samples were taken.
 
-    Args:
-        angles: what moves, by name.
-        where: source and column, for the message.
-        cure: what to do, with ``{rate}`` and ``{step}`` in it.
+    ``angles``: what moves, by name; ``where``: source and column, for the message; ``cure``: what to do, with
+    ``{rate}`` and ``{step}`` in it.
     """
     rows = clock_settings(time, angles)
     if not rows.size:
@@ -150,8 +148,7 @@ def usual_step(time: Array) -> float:
 def _goes_on(values: Array, row: int, jump: float, noise: float) -> bool | None:
     """Return whether an angle goes on by one ordinary step behind a row; None where it hardly moves.
 
-    Args:
-        jump: by how many rows the stamps go on more than that.
+    ``jump``: by how many rows the stamps go on more than that.
     """
     if row < NEAR or row + 1 + NEAR >= values.size:
         return None

@@ -26,11 +26,8 @@ def has_topics(values: Mapping[int, NDArray[Any]], places: Sequence[int]) -> boo
 def split_topics(source: RecordSource, time: int, places: Sequence[int], main: int) -> RecordSource | None:
     """Return a file with a raster for each topic; None: its channels are one.
 
-    Args:
-        source: whose channels are all of one raster.
-        time: place of the time.
-        places: of the channels that are wanted.
-        main: place of the channel whose topic the time belongs to.
+    ``source``: whose channels are all of one raster; ``time``: place of the time; ``places``: of the channels that are
+    wanted; ``main``: place of the channel whose topic the time belongs to.
     """
     filled = {place: is_filled(values) for place, values in zip(places, source.load(places), strict=True)}
     topics: list[list[int]] = []

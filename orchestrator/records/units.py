@@ -55,8 +55,7 @@ _KINDS = {dimension: kind for kind, dimension in _DIMENSIONS.items()}
 def parse_unit(text: str, kinds: Sequence[str] = ()) -> RecordUnit | None:
     """Return what ``text`` means, or None where it is no known unit.
 
-    Args:
-        kinds: keys of ``SI`` that are sought, for texts with two meanings (``nm``, ``1/min``).
+    ``kinds``: keys of ``SI`` that are sought, for texts with two meanings (``nm``, ``1/min``).
     """
     unit = units.parse_unit(text, frozenset(_DIMENSIONS[kind] for kind in kinds))
     if unit is None:

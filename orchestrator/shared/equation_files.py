@@ -22,11 +22,7 @@ def module_name(path: Path) -> str:
 
 @cache
 def closure(name: str) -> tuple[Path, ...]:
-    """Return the file of a module and those of all that it imports, directly or not, sorted by name.
-
-    Raises:
-        FmuError: an import that an FMU could not follow.
-    """
+    """Return the file of a module and those of all that it imports, directly or not, sorted by name."""
     found: dict[str, Path] = {}
     place = SOURCES.joinpath(*name.split("."))
     waiting = [place / "__init__.py" if place.is_dir() else place.with_suffix(".py")]
@@ -45,11 +41,7 @@ def members(name: str) -> dict[str, bytes]:
 
 @cache
 def read_imports(path: Path) -> tuple[Path, ...]:
-    """Return the files that a source imports from beside it, with those of the packages that they lie in.
-
-    Raises:
-        FmuError: an import that is not relative, or of what is no module.
-    """
+    """Return the files that a source imports from beside it, with those of the packages that they lie in."""
     return tuple(_imports(path))
 
 

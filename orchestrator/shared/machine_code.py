@@ -105,11 +105,8 @@ def compile_text(
 ) -> Path | None:
     """Return the shared library of a C text, or ``None`` where it cannot be made.
 
-    Args:
-        stem: its name, which changes with the text.
-        text: returns the text, where the library is not there yet.
-        headers: files that it includes.
-        shipped: folder in which it may lie since the installation.
+    ``stem``: its name, which changes with the text; ``text``: returns the text, where the library is not there yet;
+    ``headers``: files that it includes; ``shipped``: folder in which it may lie since the installation.
     """
     name, folder = library_file(stem), machine_code_folder()
     for place in (*([shipped] if shipped is not None else []), folder):

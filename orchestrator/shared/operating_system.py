@@ -205,11 +205,7 @@ def hold_folder(folder: Path) -> Iterator[None]:
 
 
 def exchange(first: Path, second: Path) -> None:
-    """Exchange two folders in one step.
-
-    Raises:
-        OSError: the system, or the file system, cannot.
-    """
+    """Exchange two folders in one step."""
     name, start, end = ("renameat2", (-100,), (-100,)) if sys.platform == "linux" else ("renamex_np", (), ())
     try:
         call = getattr(ctypes.CDLL(None, use_errno=True), name)

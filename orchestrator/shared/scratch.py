@@ -20,9 +20,7 @@ _swept: set[str] = set()
 class Scratch:
     """A private folder of this process; use as a context manager, or call ``close``.
 
-    Args:
-        purpose: a word of its name.
-        where: in which folder (default: the temporary directory).
+    ``purpose``: a word of its name; ``where``: in which folder (default: the temporary directory).
     """
 
     def __init__(self, purpose: str = "run", where: Path | None = None) -> None:

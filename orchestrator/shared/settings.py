@@ -20,8 +20,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 def setting(why: str, ge: float | None = 0, le: float | None = None, gt: float | None = None) -> msgspec.Meta:
     """Return what a setting means and its bounds, for ``Annotated``.
 
-    Args:
-        gt: value that must be exceeded, in place of ``ge``.
+    ``gt``: value that must be exceeded, in place of ``ge``.
     """
     if gt is not None:
         return msgspec.Meta(description=why, gt=gt, le=le)
@@ -48,8 +47,7 @@ def choose_settings(given: S | Path | str | None, kind: type[S]) -> S:
 def settings_of(content: dict[str, Any], kind: type[S], where: str = "settings") -> S:
     """Return settings with the values of nested tables; what they do not name keeps its default.
 
-    Args:
-        content: group -> name -> value.
+    ``content``: group -> name -> value.
     """
     try:
         found = msgspec.convert(content, kind)

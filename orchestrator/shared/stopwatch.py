@@ -9,8 +9,7 @@ _BUSIEST = 10.0  # a process that waits, or gets less than a tenth of a core, is
 class Stopwatch:
     """Counts time from its making: the wall's, or the processor's where other processes take that away.
 
-    Args:
-        limit: [s] from which on it is over.
+    ``limit``: [s] from which on it is over.
     """
 
     def __init__(self, limit: float = math.inf) -> None:

@@ -20,14 +20,8 @@ def run_tool(
     """Run a program and return its exit code and what it said.
 
     If anything ends the wait, as Ctrl-C and SIGTERM do, the program and all that it has started is ended too.
-
-    Args:
-        folder: in which it runs.
-        environment: of the program (default: of this process).
-        given: text that the program reads, after which its input ends.
-
-    Raises:
-        OSError: it cannot be started.
+    ``folder``: in which it runs; ``environment``: of the program (default: of this process); ``given``: text that the
+    program reads, after which its input ends.
     """
     process = subprocess.Popen(
         command, cwd=folder, env=environment, text=True, errors="replace", start_new_session=sys.platform != "win32",

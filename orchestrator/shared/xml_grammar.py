@@ -111,8 +111,7 @@ def attributes_of(grammar: str, kind: str) -> frozenset[str]:
 def grammar_faults(root: etree._Element, grammar: str, name_of: Callable[[str], str] = str) -> list[Fault]:
     """Return what is wrong with elements and attributes; equal faults of one kind of element are one.
 
-    Args:
-        name_of: what the grammar calls a tag.
+    ``name_of``: what the grammar calls a tag.
     """
     types = _grammar(grammar)
     faults: dict[tuple[str, str], Fault] = {}

@@ -115,8 +115,7 @@ def inertia(x: State, p: Parameters) -> float:
 def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
     """Return the time derivative of ``x``, the bristle apart.
 
-    Args:
-        sign: direction of dry friction, -1 to 1; a smooth approximation passes ``tanh(speed/width)``.
+    ``sign``: direction of dry friction, -1 to 1; a smooth approximation passes ``tanh(speed/width)``.
     """
     asked = u
     follows = 0.0

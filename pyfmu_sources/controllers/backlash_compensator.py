@@ -186,10 +186,8 @@ def act(
 ) -> tuple[CrossingState, float]:
     """Return the state and the request [N.m] of this sample.
 
-    Args:
-        reference: wanted load angle [rad].
-        reference_speed: [rad/s].
-        x: estimate ``(theta_m, omega_m, theta_l, omega_l, T_l, T_m)``, whose twist is zero in mid-gap.
+    ``reference``: wanted load angle [rad]; ``reference_speed``: [rad/s]; ``x``: estimate ``(theta_m, omega_m, theta_l,
+    omega_l, T_l, T_m)``, whose twist is zero in mid-gap.
     """
     phase, flank, samples, lead, once, twice, traversal, barred = state
     lowest = gap.alpha - DEVIATIONS * max(gap.deviation, 0.0)

@@ -47,9 +47,8 @@ def oldest_share(delay: float) -> float:
 def foresee(x: Estimate, u: float, duration: float, alpha: float, d: Train) -> Estimate:
     """Return the state after ``duration`` [s] with the request ``u`` [N.m] acting.
 
-    Args:
-        x: state ``(theta_m, omega_m, theta_l, omega_l, T_l, T_m)``, whose twist is zero in mid-gap.
-        alpha: half-gap [rad].
+    ``x``: state ``(theta_m, omega_m, theta_l, omega_l, T_l, T_m)``, whose twist is zero in mid-gap; ``alpha``: half-gap
+    [rad].
     """
     theta_m, omega_m, theta_l, omega_l, T_l, T_m = x
     parts = min(1 + int(duration / LONGEST_PART), MOST_PARTS)

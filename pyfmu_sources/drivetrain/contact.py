@@ -35,8 +35,7 @@ NOT_JOINED = 1e-9
 def parted_twist(x: State, contact: int, p: Parameters) -> float:
     """Return the twist [rad] that a shaft keeps at the moment at which its teeth part at flank ``contact``.
 
-    Args:
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+    ``contact``: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
     """
     damping = shaft_damping(p)
     if damping == 0.0 or shaft_stiffness(p) > 1e7 * damping:

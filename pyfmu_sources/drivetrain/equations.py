@@ -296,8 +296,7 @@ def gear_acceleration(x: State, p: Parameters) -> float:
 def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u: float, T_l: float) -> State:
     """Return the time derivative of ``x`` in one smooth mode (eq. 3.5 with the effects).
 
-    Args:
-        sign_m: direction of the motor's dry friction, -1 to 1; a smooth approximation passes ``tanh(w/v)``.
+    ``sign_m``: direction of the motor's dry friction, -1 to 1; a smooth approximation passes ``tanh(w/v)``.
     """
     wound_rate = 0.0
     if contact == 0 and x[7] != 0.0:

@@ -72,8 +72,7 @@ def linear_rates(x: State6, constant: float, law: Law, p: Parameters, u: float, 
 def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float, kappa: float) -> Coefficients:
     """Return the Taylor coefficients of the state, scaled so that time runs from 0 to 1 over ``step`` [s].
 
-    Args:
-        kappa: rate at which a parted shaft unwinds [1/s].
+    ``kappa``: rate at which a parted shaft unwinds [1/s].
     """
     coefficients: Coefficients = [x]
     term = x

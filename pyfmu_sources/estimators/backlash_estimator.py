@@ -66,10 +66,7 @@ def start(
 ) -> None:
     """Set a filter at the first measured angles [rad].
 
-    Args:
-        size: half-gap [rad].
-        spread: its relative standard deviation.
-        weight: logarithm of the filter's weight.
+    ``size``: half-gap [rad]; ``spread``: its relative standard deviation; ``weight``: logarithm of the filter's weight.
     """
     for n in range(SIZE):
         f[n] = 0.0

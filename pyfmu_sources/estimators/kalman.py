@@ -34,11 +34,8 @@ def predict(x: Vector6, u: float, A: Matrix6, B: Vector6) -> Vector6:
 def correct(x: Vector6, theta_m: float, theta_l: float, L: Gain, weight: Weight) -> Update:
     """Return the corrected state, both innovations [rad] and the normalised innovation squared.
 
-    Args:
-        theta_m: measured motor angle [rad].
-        theta_l: measured load angle [rad].
-        L: gain, 6 x 2.
-        weight: ``(S11, S12, S22)`` of the inverse innovation covariance [1/rad2].
+    ``theta_m``: measured motor angle [rad]; ``theta_l``: measured load angle [rad]; ``L``: gain, 6 x 2; ``weight``:
+    ``(S11, S12, S22)`` of the inverse innovation covariance [1/rad2].
     """
     e_m = theta_m - x[0]
     e_l = theta_l - x[2]
@@ -59,9 +56,7 @@ def update(
 ) -> Update:
     """Return :func:`correct` after :func:`predict`: one sample of the filter.
 
-    Args:
-        u: torque request [N.m] that was held since then.
-        theta_m: measured motor angle [rad] now.
-        theta_l: measured load angle [rad] now.
+    ``u``: torque request [N.m] that was held since then; ``theta_m``: measured motor angle [rad] now; ``theta_l``:
+    measured load angle [rad] now.
     """
     return correct(predict(x, u, A, B), theta_m, theta_l, L, weight)

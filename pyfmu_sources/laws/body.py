@@ -118,8 +118,7 @@ def cuts(kind: int) -> bool:
 def across(kind: int, near: float, other: float, sign: float, q0: float) -> float:
     """Return the position that arrives beyond a cut.
 
-    Args:
-        q0: width of the gap, or how far an effort of 1 winds the spring.
+    ``q0``: width of the gap, or how far an effort of 1 winds the spring.
     """
     if kind == COMPLIANCE:
         return near - q0 * sign * other

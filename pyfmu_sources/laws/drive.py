@@ -71,8 +71,7 @@ def ramp(request: float, u: float, time_constant: float, limit: float, h: float)
 def followed_request(request: float, u: float, time_constant: float, limit: float, h: float) -> tuple[float, float]:
     """Return a request that follows a held ``u`` [N.m] with a lag and a limited rate, after ``h`` [s], and its mean.
 
-    Args:
-        limit: largest rate [N.m/s].
+    ``limit``: largest rate [N.m/s].
     """
     ramp = min(h, ramp_time(request, u, time_constant, limit))
     slope = limit if u > request else -limit

@@ -35,13 +35,9 @@ def end_stop_torque(
 ) -> float:
     """Return the torque [N.m] against a part of two end stops (Hunt and Crossley, J. Applied Mechanics 42(2), 1975).
 
-    Inside the stop by ``d`` and moving further in with ``v`` the stop pushes back by
-    ``stiffness d (1 + dissipation v)``; it never pulls.
-
-    Args:
-        lower: angle of the lower stop [rad].
-        upper: angle of the upper stop [rad].
-        dissipation: [s/rad].
+    Inside the stop by ``d`` and moving further in with ``v`` the stop pushes back by ``stiffness d (1 + dissipation
+    v)``; it never pulls. ``lower``: angle of the lower stop [rad]; ``upper``: angle of the upper stop [rad];
+    ``dissipation``: [s/rad].
     """
     if angle > upper:
         return max(0.0, stiffness * (angle - upper) * (1.0 + dissipation * speed))

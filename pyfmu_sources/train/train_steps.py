@@ -156,9 +156,8 @@ def series_to_event(
 ) -> tuple[State, float, int, int]:
     """Return the solution at its next event, or at the end of a step.
 
-    Args:
-        elapsed: time since the beginning of the step at which ``x`` is [s].
-        pieces: of the step that power series have taken so far.
+    ``elapsed``: time since the beginning of the step at which ``x`` is [s]; ``pieces``: of the step that power series
+    have taken so far.
 
     Returns:
         State, time since the beginning of the step [s], pieces, and the guard (``NO_EVENT``: none).

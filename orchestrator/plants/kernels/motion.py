@@ -175,12 +175,8 @@ def rate_at(x: Reals, p: Reals, u: float, out: Reals) -> None:
 def slide_bristle(steps: Reals, width: float, out: Reals) -> None:
     """Fill the deflection of a bristle, in shares of its ``width`` [rad]: it follows the motion up to 1, then slides.
 
-    The noise of an encoder below the width does not turn it round (Prandtl's element).
-
-    Args:
-        steps: (n,) motion from sample to sample [rad].
-        width: over which friction builds up [rad].
-        out: (n,) filled.
+    The noise of an encoder below the width does not turn it round (Prandtl's element). ``steps``: (n,) motion from
+    sample to sample [rad]; ``width``: over which friction builds up [rad]; ``out``: (n,) filled.
     """
     deflection = 0.0
     for n in range(len(steps)):

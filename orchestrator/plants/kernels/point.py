@@ -10,10 +10,7 @@ Point = tuple[float, float, float, float, float, float, float, float]
 def travel_bound(speed: float, acceleration: float, h: float) -> float:
     """Return how far [rad] a part may come within ``h``, half again of what its acceleration adds if it stays.
 
-    Args:
-        speed: of the part [rad/s].
-        acceleration: [rad/s^2].
-        h: [s].
+    ``speed``: of the part [rad/s]; ``acceleration``: [rad/s^2]; ``h``: [s].
     """
     return abs(speed) * h + 0.75 * h * h * abs(acceleration)
 

@@ -60,8 +60,7 @@ def _further(line: str, separator: str) -> str:
 def detect(file: TextFile, header: int | None = None) -> Dialect:
     """Return the dialect of a text: the names are the last line before the longest run of rows of numbers.
 
-    Args:
-        header: line of the names, from 1; 0: there are none; None: found.
+    ``header``: line of the names, from 1; 0: there are none; None: found.
     """
     skipped, path = header or 0, file.path
     if skipped >= file.lines > 0 and skipped > 0:
@@ -151,8 +150,7 @@ def _first_row(lines: list[str], first: int, separator: str, decimal: str, width
 def _only_commas(lines: list[str], later: bool, separator: str) -> bool:
     """Return whether numbers have decimal commas although the first rows are whole.
 
-    Args:
-        later: whether there is a comma anywhere below the first line.
+    ``later``: whether there is a comma anywhere below the first line.
     """
     cells = [cell for line in lines for cell in cells_of(line, separator) if not is_stamp(cell)]
     if any("." in cell for cell in cells):

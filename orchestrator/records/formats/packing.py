@@ -29,9 +29,6 @@ def unpack(values: Array, attributes: Mapping[str, Any], fill: Any = None) -> tu
         values: of any shape.
         attributes: by name, as the file has them.
         fill: what the file holds where nothing was written; None: that is not known.
-
-    Raises:
-        ValueError: an attribute is no number, where it must be one.
     """
     if values.dtype.kind not in "fiu":
         return values, ""

@@ -19,13 +19,7 @@ def is_frame(group: Any) -> bool:
 def frame_columns(group: Any, read: Callable[[Any], Array], text: Callable[[Any], str]) -> dict[str, Array]:
     """Return the columns of a table by name, its index among them.
 
-    Args:
-        group: of HDF5.
-        read: a dataset's values.
-        text: an attribute as text.
-
-    Raises:
-        ValueError: the names of the columns are pickled.
+    ``group``: of HDF5; ``read``: a dataset's values; ``text``: an attribute as text.
     """
     if "table" in group:
         return _table(group["table"], read, text)

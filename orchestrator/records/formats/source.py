@@ -47,8 +47,7 @@ class RecordSource(Protocol):
     def pieces(self, places: Sequence[int], most: int | None = None) -> Iterator[tuple[int, int, list[NDArray[Any]]]]:
         """Yield the numbers of channels of one raster piece by piece, NaN where a text has none.
 
-        Args:
-            most: rows of each piece; the others are passed over.
+        ``most``: rows of each piece; the others are passed over.
 
         Yields:
             Number of the first row, how many rows the channels have at most, and the values.

@@ -177,8 +177,7 @@ class _StampColumn:
 def open_file(path: Path, header: int | None = None) -> TextSource:
     """Return the opened file, its dialect detected.
 
-    Args:
-        header: line of the names, from 1; 0: there are none; None: found.
+    ``header``: line of the names, from 1; 0: there are none; None: found.
     """
     file = open_text(path)
     dialect = detect(file, header)

@@ -13,8 +13,7 @@ from orchestrator.scenarios.ssp.flow import Node, Structure
 def expand_arrays(structure: Structure, descriptions: Mapping[str, FmuDescription], size: SystemSize) -> None:
     """Replace what is said of arrays by what it says of their elements, which FMUs have as variables.
 
-    Args:
-        size: in which these have been counted.
+    ``size``: in which these have been counted.
     """
     places = _places(structure, descriptions, size)
     for node, sizes in structure.sizes.items():

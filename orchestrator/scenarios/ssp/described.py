@@ -24,8 +24,7 @@ class SspVariable:
 def described(instance: Instance, names: Iterable[str], version: str) -> Iterator[SspVariable]:
     """Yield some variables of an instance as a version of SSP has them, each array once.
 
-    Args:
-        version: of SSP, "1.0" or "2.0".
+    ``version``: of SSP, "1.0" or "2.0".
     """
     seen = set()
     for variable in names:

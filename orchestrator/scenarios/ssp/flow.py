@@ -69,8 +69,7 @@ def instance_names(components: Mapping[str, Path]) -> dict[str, str]:
 class Flow:
     """Follows values through a package.
 
-    Args:
-        names: of the instances that components become.
+    ``names``: of the instances that components become.
     """
 
     def __init__(self, structure: Structure, models: Mapping[str, ModelInterface], names: Mapping[str, str]) -> None:

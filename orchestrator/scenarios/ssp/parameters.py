@@ -225,8 +225,7 @@ def own_value(
 ) -> Value | None:
     """Return a value as the model's variable takes it, or ``None`` after adding what is wrong to ``problems``.
 
-    Args:
-        connector: unit that the package states for the variable; None: that of the model.
+    ``connector``: unit that the package states for the variable; None: that of the model.
     """
     variable = model.variables.get(name)
     path = f"{place}.{name}"

@@ -22,12 +22,7 @@ class SystemPreview(msgspec.Struct, frozen=True):
 
 
 def preview_ssp(path: Path) -> SystemPreview:
-    """Return what an SSP file holds.
-
-    Raises:
-        ScenarioError: the file cannot be read as a system.
-        FmuError: an FMU in it cannot be read.
-    """
+    """Return what an SSP file holds."""
     with open_ssp(path) as scenario:
         system = scenario.system
         starts = {

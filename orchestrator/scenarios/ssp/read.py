@@ -320,8 +320,7 @@ def _configured(
 ) -> dict[str, FmuDescription]:
     """Return the descriptions with the values of structural parameters, which are taken out of the bindings.
 
-    Args:
-        size: in which their variables are counted.
+    ``size``: in which their variables are counted.
     """
     flow = Flow(structure, {name: d.model for name, d in descriptions.items()}, names)
     handed, found = flow.starts(inputs), {}

@@ -10,10 +10,8 @@ SHOWS = 4.0  # power over that of the noise from which motion shows
 def content_band(values: Array, step: float, noise: float, most_above: float, pane: int) -> float:
     """Return the frequency [Hz] below which nearly all of a squared speed lies that shows above measurement noise.
 
-    Args:
-        values: (n,) samples of a position, or of another quantity with a speed.
-        step: sample time [s].
-        pane: samples of a spectrum's pane at most.
+    ``values``: (n,) samples of a position, or of another quantity with a speed; ``step``: sample time [s]; ``pane``:
+    samples of a spectrum's pane at most.
     """
     from scipy.signal import welch
 

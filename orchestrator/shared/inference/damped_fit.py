@@ -42,8 +42,7 @@ def fit_damped(
 ) -> tuple[T, Array | None]:
     """Return the point at which damped steps end, and the last Hessian (k, k); None where no step was tried.
 
-    Args:
-        converged: (gain of the step, cost after it) -> True when the fit may end; a failed step gains nothing.
+    ``converged``: (gain of the step, cost after it) -> True when the fit may end; a failed step gains nothing.
     """
     point, strength = start, damping.first
     hessian: Array | None = None

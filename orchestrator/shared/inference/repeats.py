@@ -19,11 +19,8 @@ def repeat_variance(first: Array, second: Array, width: int) -> Array:
     """Return half the variance of the difference of two repeats, over segments with a straight line removed from each.
 
     The line stands for the start of a segment, which no two runs have in common and which a model's run may choose.
-
-    Args:
-        first: (n, channels) measured in one run.
-        second: (n, channels) measured in the other.
-        width: rows of a segment, at least 3.
+    ``first``: (n, channels) measured in one run; ``second``: (n, channels) measured in the other; ``width``: rows of a
+    segment, at least 3.
 
     Returns:
         (channels,) variance of one run about what both have in common.

@@ -20,8 +20,7 @@ _PATIENCE = 1.0
 class Strays:
     """Descendants of one child.
 
-    Args:
-        wanted: whether to look for them; this process then becomes the parent of its orphaned descendants.
+    ``wanted``: whether to look for them; this process then becomes the parent of its orphaned descendants.
 
     Attributes:
         mark: environment variables that the child must have.

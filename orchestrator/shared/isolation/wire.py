@@ -109,8 +109,7 @@ def send(link: socket.socket, data: bytes, is_over: Over | None = None, tick: Ti
 def receive(link: socket.socket, most: int, is_over: Over | None = None, tick: Tick = lambda: None) -> bytes:
     """Return one frame of at most ``most`` bytes; arguments and errors as those of ``send``.
 
-    Args:
-        is_over: whether the time that there was is over; None: it never is.
+    ``is_over``: whether the time that there was is over; None: it never is.
     """
     (length,) = _LENGTH.unpack(_exactly(link, _LENGTH.size, is_over, tick))
     if length > most:
