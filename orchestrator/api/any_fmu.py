@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
 from orchestrator.api.shown import Block
@@ -53,15 +53,9 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
     diagnosis: FmuDiagnosis
     validation: TestMisfit | None
     seconds: float
-    arguments: Mapping[str, Any] = field(default_factory=dict)
     delivered: list[DeliveredFound] = field(default_factory=list)
 
     def summary(self) -> Iterator[str]:
-        """Yield what was found, one sentence a line.
-
-        Yields:
-            Verdict, effects, what is left, notes and trust.
-        """
         yield from summarise(self.diagnosis)
         yield from self._closing_lines()
 
@@ -110,11 +104,7 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
             self.delivered[:] = [write_corrected(folder / "corrected.ssp", workings.problem, workings.final)]
 
     def signals(self) -> Mapping[str, Array]:
-        """Return the test part: time [s], inputs, and each output, measured and simulated.
-
-        Returns:
-            Arrays of shape (n,) by name; ``NAME_STAGE`` is of the model of that stage.
-        """
+        """Return the test part: inputs and outputs, measured and simulated: ``NAME_STAGE`` by that stage's model."""
         problem, stages, _ = self._stage_runs
         columns = {"time": problem.data.time} | dict(zip(problem.inputs, problem.data.inputs.T, strict=True))
         for k, name in enumerate(problem.outputs):
@@ -192,7 +182,7 @@ def diagnose_fmu(
         raise
     files = {"record": paths[0], "fmu": fmu, "map": map, "validate": validate, "test": test}
     arguments = {name: str(path) for name, path in files.items() if path is not None}
-    result = FmuDiagnosisResult(found, second, time.monotonic() - begun, arguments)
+    result = FmuDiagnosisResult(found, second, time.monotonic() - begun, arguments=arguments)
     weakref.finalize(result, found.workings.close)  # child processes end with the result, or at exit
     return result
 

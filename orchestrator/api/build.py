@@ -1,9 +1,9 @@
 """The FMUs of this project, built."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from orchestrator.api.shown import Block, Result
 from orchestrator.building.build import ROOT, default_directory, ensure_built
@@ -29,7 +29,6 @@ class BuildResult(Result):
     command: ClassVar[str] = "build"
     paths: Mapping[str, Path]
     remark: str | None = None
-    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Path:
         return self.paths[name]
@@ -105,12 +104,11 @@ def build(
     chosen = list(names) if names else None
     if not native:
         paths = ensure_built(chosen, folder, force=force)
-        return BuildResult(
-            paths, find_toolchain().remark, {"names": list(paths), "directory": str(folder), "force": force}
-        )
+        given = {"names": list(paths), "directory": str(folder), "force": force}
+        return BuildResult(paths, find_toolchain().remark, arguments=given)
     here = platforms == "here"
     paths = ensure_native(chosen, folder, force=force, here=here, fmi=fmi, real_outputs=real_outputs, progress=progress)
     given = {"names": list(paths), "directory": str(folder), "force": force, "native": True, "platforms": platforms}
     given |= {"fmi": fmi} if fmi != 2 else {}
     given |= {"real_outputs": True} if real_outputs else {}
-    return BuildResult(paths, None if here else native_remark(), given)
+    return BuildResult(paths, None if here else native_remark(), arguments=given)

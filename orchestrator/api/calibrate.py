@@ -1,10 +1,10 @@
 """The parameters of any FMU, from a measured record."""
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from orchestrator.api.any_fmu import Progress, parameter_results, read_records
 from orchestrator.api.shown import Block, Result
@@ -34,7 +34,6 @@ class CalibrationResult(Result):
     command: ClassVar[str] = "calibrate"
     calibration: FmuCalibration
     seconds: float
-    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def trust(self) -> Trust:
@@ -116,4 +115,4 @@ def calibrate(
     found = calibrate_fmu(system, given, read, used, progress)
     found.diagnosis.workings.close()
     arguments = {"record": str(paths[0]), "fmu": str(fmu), "map": str(map)}
-    return CalibrationResult(found, time.monotonic() - begun, arguments)
+    return CalibrationResult(found, time.monotonic() - begun, arguments=arguments)

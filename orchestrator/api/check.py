@@ -1,9 +1,9 @@
 """FMI compliance of FMUs."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from orchestrator.api.shown import Block, Result
 from orchestrator.checking.batch import check_fmus, find_fmus, policy_of
@@ -30,7 +30,6 @@ class CheckResult(Result):
 
     command: ClassVar[str] = "check"
     verdicts: tuple[Verdict, ...]
-    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
@@ -134,4 +133,4 @@ def check(
         "size_limit": size_limit,
     }
     rules = policy if isinstance(policy, Policy) else policy_of(policy)
-    return CheckResult(tuple(check_fmus(paths, options, rules, progress)), given)
+    return CheckResult(tuple(check_fmus(paths, options, rules, progress)), arguments=given)

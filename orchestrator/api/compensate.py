@@ -1,8 +1,8 @@
 """The same plants under the plain LQR, the LQR shifted by the half-gap, and the compensator of the gap."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -32,6 +32,7 @@ from orchestrator.scenarios.scenario import simulate
 from orchestrator.shared.numbers import within
 from orchestrator.shared.output import write_columns
 from orchestrator.shared.results.compensate import HARD, UPPER, CompensateFound, LawFound, laws_tables
+from orchestrator.shared.results.fields import copy_fields
 from orchestrator.shared.results.regulator import ForecastFound
 
 # Least and largest value of each argument: rad, s, rad/s, N.m, N.m, s, plants, seed.
@@ -76,7 +77,6 @@ class CompensateResult(PlottedResult):
     bound: float
     task: ControlTask
     forecast: ForecastFound
-    arguments: Mapping[str, Any] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
     name: str = ""
 
@@ -107,13 +107,12 @@ class CompensateResult(PlottedResult):
         times, path = quickest_path(self.task, self.task.impact_speed)
         bounds = {speed: least_time(self.task, speed) for speed in _BOUND_SPEEDS.tolist()}
         bounds = {speed: time for speed, time in bounds.items() if time > 0.0}
-        return CompensateFound(
+        return copy_fields(
+            CompensateFound,
+            self,
             alpha=self.task.machine.alpha,
             tau=self.task.nominal.tau,
             impact_speed=self.task.impact_speed,
-            bound=self.bound,
-            forecast=self.forecast,
-            laws=self.laws,
             bound_speeds=tuple(bounds),
             bound_times=tuple(bounds.values()),
             path_times=tuple(times.tolist()),
@@ -122,8 +121,6 @@ class CompensateResult(PlottedResult):
             plants=int(self.arguments["plants"]),
             weights=self.task.state_weights,
             gains=self.task.gains,
-            doubts=self.doubts,
-            files=self.files,
         )
 
     @property
@@ -252,8 +249,8 @@ def compensate(
     doubts += (f"Do not run this controller: {unstable}. {CURE}.",) if unstable else ()
     doubts += (*more, *([CYCLES] if forecast.cycles and said is not None else []))
     name = "" if said is None else re.sub(r"\W+", "_", Path(machine.source).stem).strip("_") or "machine"
-    asked = given | {"model": None if said is None else said.source, "native": native, "fmi": fmi}
-    return CompensateResult(laws, bound, task, forecast, asked | {"force": force}, doubts, name[:60])
+    asked = given | {"model": None if said is None else said.source, "native": native, "fmi": fmi, "force": force}
+    return CompensateResult(laws, bound, task, forecast, doubts, name[:60], arguments=asked)
 
 
 def _run_laws(

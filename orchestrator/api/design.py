@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -69,7 +69,6 @@ class DesignResult(SampledResult):
     time: NDArray[np.float64]
     candidates: tuple[Excitation, ...]
     request: RequestUnit | None = None
-    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def best(self) -> Excitation:
@@ -82,11 +81,7 @@ class DesignResult(SampledResult):
         return self.best.bound <= 0.5 * self.size
 
     def signals(self) -> Mapping[str, NDArray[np.float64]]:
-        """Return the best record: ``time`` [s], ``u`` [N.m], and the request as the drive takes it where that differs.
-
-        Returns:
-            Arrays of shape (n,) by name.
-        """
+        """Return the best record: ``u`` [N.m], and the request as the drive takes it where that differs."""
         columns = {"time": self.time, "u": self.best.u}
         request = self.request
         return columns if request is None else columns | {request.label: request.number(self.best.u)}
@@ -188,7 +183,7 @@ def design(
     time, candidates = designing.design(model, size, limits, duration, rate, motor_only, progress)
     given = {"size": size, "torque_limit": torque_limit, "speed_limit": speed_limit, "duration": duration}
     given |= {"rate": rate, "motor_only": motor_only}
-    return DesignResult(size, time, tuple(candidates), _request_unit(model), given)
+    return DesignResult(size, time, tuple(candidates), _request_unit(model), arguments=given)
 
 
 def _request_unit(model: Model) -> RequestUnit | None:

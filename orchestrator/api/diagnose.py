@@ -132,7 +132,7 @@ def diagnose(
         "test": None if tested is None else tested.source,
     }  # fmt: skip
     seconds = time.monotonic() - begun
-    return DiagnosisResult(found, measured, validated, seconds, given, tuple(more))
+    return DiagnosisResult(found, measured, validated, seconds, tuple(more), arguments=given)
 
 
 def _of_an_fmu(

@@ -1,10 +1,10 @@
 """A diagnosis as it is shown, drawn, written and built."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -51,7 +51,6 @@ class DiagnosisResult(AnyDiagnosisResult):
     record: Record
     validation: TestMisfit | None
     seconds: float
-    arguments: Mapping[str, Any] = field(default_factory=dict)
     more: tuple[Record, ...] = ()
 
     def build(self, out: Path | str) -> Path:
@@ -87,10 +86,9 @@ class DiagnosisResult(AnyDiagnosisResult):
             return before_and_after(self.diagnosis, fmu)
 
     def signals(self) -> Mapping[str, Array]:
-        """Return the test part: time [s], request [N.m], and each angle, measured and simulated.
+        """Return the test part: request [N.m], and each angle, measured and simulated.
 
-        Returns:
-            Arrays of shape (n,) by name; ``NAME_before`` is of the nominal FMU, ``NAME_after`` of the corrected one.
+        ``NAME_before`` is of the nominal FMU, ``NAME_after`` of the corrected one.
         """
         runs = self.runs
         names: Sequence[str] = ("theta_m", "theta_l")[: runs.measured.shape[1]]
@@ -99,11 +97,6 @@ class DiagnosisResult(AnyDiagnosisResult):
         return columns | {f"{name}{k}": values[:, n] for n, name in enumerate(names) for k, values in shown.items()}
 
     def summary(self) -> Iterator[str]:
-        """Yield what was found, one sentence a line.
-
-        Yields:
-            What is missing, how sure, what it does, what is left and what to do next; notes and trust.
-        """
         d = self.diagnosis
         yield from summarise(d)
         if d.law is not None:

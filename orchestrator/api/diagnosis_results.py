@@ -1,5 +1,6 @@
 """What results of a diagnosis have in common, be the model ours or any FMU."""
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from typing import ClassVar
 
@@ -43,6 +44,14 @@ class AnyDiagnosisResult(SampledResult):
     def notes(self) -> tuple[str, ...]:
         """What to bear in mind, a sentence each."""
         return self.diagnosis.notes
+
+    @abstractmethod
+    def summary(self) -> Iterator[str]:
+        """Yield what was found, one sentence a line.
+
+        Yields:
+            What is missing, how sure, what it does, what is left and what to do next; notes and trust.
+        """
 
     def _closing_lines(self) -> Iterator[str]:
         yield from (f"Note: {note}" for note in self.notes)

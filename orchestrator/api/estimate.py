@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
@@ -63,7 +63,6 @@ class EstimateResult(PlottedResult):
     model: Model
     methods: tuple[MethodResult, ...]
     diagnosis: "orchestrator.DiagnosisResult | None" = None
-    arguments: Mapping[str, Any] = field(default_factory=dict)
     more: tuple[Record, ...] = ()
     repeats: Repeats | None = None
     settings: EstimationSettings = DEFAULT_SETTINGS
@@ -305,8 +304,8 @@ def estimate(
     first: tuple[MethodResult, ...] = ()
     if missing is not None and missing.gap is not None:
         first = (MethodResult(DIAGNOSIS, missing.gap, math.inf, missing.seconds, trust=missing.trust),)
-    repeats = repeats_of([measured, *more])
-    return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen, why)
+    methods, repeats = (*first, *judged), repeats_of([measured, *more])
+    return EstimateResult(measured, model, methods, missing, tuple(more), repeats, chosen, why, arguments=given)
 
 
 def _compare_diagnosis(estimates: Sequence[Estimate]) -> str:

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from orchestrator.records.model_file import DEFAULT, Model, read_model
 from orchestrator.records.record import Record
 from orchestrator.shared.output import write_arrays
 from orchestrator.shared.results.estimate import ExcitationFound
+from orchestrator.shared.results.fields import copy_fields
 from orchestrator.shared.results.inspect import (
     BandFound,
     ChannelFound,
@@ -82,7 +83,6 @@ class InspectResult(PlottedResult):
     assumed: tuple[str, ...]
     starter: str
     two_angles: Estimate | None = None
-    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def smallest_gap(self) -> float:
@@ -121,10 +121,10 @@ class InspectResult(PlottedResult):
 
     def results(self, place: Path | None = None) -> InspectFound:
         r, found, angles = self.record, self.sufficiency, self.two_angles
-        return InspectFound(
+        return copy_fields(
+            InspectFound,
+            self,
             record=describe_record(r),
-            channels=self.channels,
-            excitation=self.excitation,
             reversals=ReversalsFound(*self.reversals),
             delay=None if self.delay is None else LagFound(*self.delay),
             smallest_gap=found.smallest if math.isfinite(found.smallest) else None,
@@ -132,11 +132,9 @@ class InspectResult(PlottedResult):
                 GapShown(size, bound if math.isfinite(bound) else None, bound < SEEN * size)
                 for size, bound in found.bounds
             ),
-            effects=self.effects,
             better_experiments=tuple(
                 ExcitationFound(c.name, c.bound, c.torque, c.speed) for c in found.better[:SHOWN_EXPERIMENTS]
             ),
-            assumed=tuple(self.assumed),
             verdict=tuple(self.verdict()),
             two_angles=None if angles is None else method_entry(MethodResult(angles.method, angles, math.inf, 0.0)),
         )
@@ -201,7 +199,7 @@ def inspect(
     return InspectResult(
         measured, machine, tuple(channels_of(measured)), tuple(excitation_of(measured)), delay_between(measured),
         reversals_of(measured), enough, tuple(effects), assumed, text, _of_two_angles(measured, machine),
-        {
+        arguments={
             "record": measured.source, "model": base.source, "part": part, "resample": resample, "rate": rate,
             "header": header,
         },

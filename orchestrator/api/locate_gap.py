@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -53,7 +53,6 @@ class LocationResult(SampledResult):
     record: Record
     model: Model
     location: Location
-    arguments: Mapping[str, Any] = field(default_factory=dict)
     settings: EstimationSettings = DEFAULT_SETTINGS
 
     @property
@@ -129,11 +128,7 @@ class LocationResult(SampledResult):
         )
 
     def signals(self) -> Mapping[str, Array]:
-        """Return record, fit, twist and flank of each stage, and one-step errors.
-
-        Returns:
-            Arrays of shape (n,) by name.
-        """
+        """Return record, fit, twist and flank of each stage, and one-step errors."""
         return self.location.curves
 
 
@@ -176,7 +171,7 @@ def locate_gap(
     with numeric_errors(f"{measured.source}: no train can be fitted to this record"):
         found = find_gap(measured, model, chosen, time_limit, lambda stage, share: progress(METHOD, stage, share), stop)
     given = {"record": measured.source, "model": model.source, "method": METHOD}
-    return LocationResult(measured, model, found, given, chosen)
+    return LocationResult(measured, model, found, chosen, arguments=given)
 
 
 def complete_record(record: Record | Path | str, model: Model, **reading: Any) -> Record:

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -43,7 +43,6 @@ class PairResult(SampledResult):
     experiment: Experiment
     run: PairRun
     seed: int | None = 0
-    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def total(self) -> float:
@@ -72,11 +71,7 @@ class PairResult(SampledResult):
         return int(np.sum(flank[1:] != flank[:-1]))
 
     def signals(self) -> dict[str, Array]:
-        """Return time [s], reference [rad] and the signals of both loops, those of the twin as ``twin_NAME``.
-
-        Returns:
-            Arrays of shape (n,) by name.
-        """
+        """Return reference [rad] and signals of both loops, those of the twin as ``twin_NAME``."""
         signals = {"time": self.machine.time, "reference": self.experiment.reference()[0]}
         signals |= self.machine.signals
         return signals | {f"twin_{name}": values for name, values in self.twin.signals.items()}
@@ -168,4 +163,4 @@ def run_pair(
         run = pair.run_pair(chosen, fmus, alpha, seed, start)
     else:
         run = run_pair_within(time_limit, chosen, fmus, alpha, seed, start)
-    return PairResult(alpha, chosen, run, seed, given)
+    return PairResult(alpha, chosen, run, seed, arguments=given)

@@ -1,7 +1,7 @@
 """Gains of an LQR for a machine, and what its loop does at rest before anyone runs it."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -45,7 +45,6 @@ class RegulatorResult(PlottedResult):
     sample_time: float
     delay: int
     forecast: ForecastFound
-    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def gains_by_name(self) -> dict[str, float]:
@@ -147,7 +146,7 @@ def design_regulator(
         given["state_weights"] = weights
         chosen = design.design_regulator(five_state_model(values), np.diag(weights), torque_weight, sample_time).gains
     forecast = forecast_rest(values, chosen, sample_time, delay)
-    return RegulatorResult(chosen, values, sample_time, delay, forecast, given)
+    return RegulatorResult(chosen, values, sample_time, delay, forecast, arguments=given)
 
 
 def five(name: str, numbers: Sequence[float], least: float) -> tuple[float, ...]:

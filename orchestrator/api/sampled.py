@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -27,16 +28,13 @@ class SampledResult(PlottedResult):
     digits: ClassVar[int | None] = None
     """Of numbers in the CSV file; None: all. With digits, NaN is an empty cell."""
 
+    @abstractmethod
     def signals(self) -> Mapping[str, NDArray[np.float64]]:
         """Collect the samples.
 
         Returns:
             Arrays of shape (n,) by name, ``time`` [s] first.
-
-        Raises:
-            NotImplementedError: of this base alone.
         """
-        raise NotImplementedError
 
     @property
     def units(self) -> Mapping[str, str | None]:

@@ -1,7 +1,7 @@
 """A sweep over any scenario of FMUs."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,6 @@ class ScenarioSweepResult(AnySweepResult):
     sweep: Sweep
     seed: int | None = 0
     parquet: bool = False
-    arguments: Mapping[str, Any] = field(default_factory=dict)
     isolation: WallsFound | None = None
 
     def blocks(self) -> Sequence[Block]:
@@ -104,7 +103,7 @@ def sweep_scenario(
     done = options.run(cases, scenario_work(chosen, cases, options.trust))
     given = {"scenario": chosen.origin or chosen.name, "vary": list(words), "samples": samples}
     walls = describe_walls(chosen.system, Safety(trust=options.trust))
-    return ScenarioSweepResult(chosen, cases, done, seed, options.parquet, given, walls)
+    return ScenarioSweepResult(chosen, cases, done, seed, options.parquet, walls, arguments=given)
 
 
 def _last_values(row: Row, count: int) -> list[str]:

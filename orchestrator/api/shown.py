@@ -1,7 +1,8 @@
 """What results show of themselves: the same tables on a terminal, as text and in a notebook."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any, ClassVar
@@ -29,7 +30,8 @@ def doubts_of(records: Sequence[Any]) -> list[str]:
     return [f"{record.source}: {text}." for record in records for text in record.doubts]
 
 
-class Result:
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Result(ABC):
     """Base of what the workflows return: it prints itself, and saves itself as the command of its name does.
 
     A subclass gives ``blocks``, ``results`` and ``write_data``. ``arguments`` are what was asked for.
@@ -38,24 +40,22 @@ class Result:
     command: ClassVar[str]
     replaces: ClassVar[tuple[str, ...]] = ()
     """Files that not every result of the command has: those of an earlier one do not stay."""
-    arguments: Mapping[str, Any]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def seed(self) -> int | None:
         """Seed of what is random; None where nothing is."""
         return None
 
+    @abstractmethod
     def blocks(self) -> Sequence[Block]:
         """Show the result.
 
         Returns:
             Lines of text and tables, in the order in which they are read.
-
-        Raises:
-            NotImplementedError: of this base alone.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def results(self, place: Path) -> Any:
         """Collect what goes into ``COMMAND.json``.
 
@@ -64,13 +64,9 @@ class Result:
 
         Returns:
             The results by name.
-
-        Raises:
-            NotImplementedError: of this base alone.
         """
-        raise NotImplementedError
 
-    def write_data(self, folder: Path) -> None:
+    def write_data(self, folder: Path) -> None:  # noqa: B027 - not every page has data
         """Write the data that the page shows.
 
         Args:

@@ -39,8 +39,7 @@ class SimulationResult(SampledResult):
     run: master.Recording
     title: str
     isolation: WallsFound | None = None
-    command: str = "simulate"  # type: ignore[misc]
-    arguments: Mapping[str, Any] = field(default_factory=dict)
+    command: str = field(default="simulate", kw_only=True)  # type: ignore[misc]
 
     def __getitem__(self, name: str) -> Array:
         """Return a recorded signal.
@@ -73,11 +72,6 @@ class SimulationResult(SampledResult):
         return len(self.time) - 1
 
     def signals(self) -> Mapping[str, Array]:
-        """Return time [s] and the recorded signals.
-
-        Returns:
-            Arrays of shape (n,) by name.
-        """
         return {"time": self.time} | {name: self[name] for name in self.names}
 
     def blocks(self) -> Sequence[Block]:
@@ -176,7 +170,7 @@ def _run(
     if walls.not_enforced and tell is not None:
         tell(f"FMUs that are not ours run with {LIMITS}, but {walls.not_enforced}")
     result = scenarios.simulate(scenario if stop is None else replace(scenario, stop=stop), safety)
-    return SimulationResult(result, title, walls, command, given)
+    return SimulationResult(result, title, walls, command=command, arguments=given)
 
 
 def run_ssp(

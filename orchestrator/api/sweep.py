@@ -1,7 +1,7 @@
 """Sweeps: many sizes, noise levels and seeds of the paired loops."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,6 @@ class SweepResult(AnySweepResult):
     fmus: Mapping[str, Path]
     calibrations: Mapping[float, Calibration]
     parquet: bool = False
-    arguments: Mapping[str, Any] = field(default_factory=dict)
     fmu_kind: str = PYTHON
 
     @property
@@ -181,7 +180,7 @@ def sweep(
     done = options.run(cases, sweep_work(plan, fmus, calibrations))
     given: dict[str, object] = {"experiment": chosen.name, "backlash_model": chosen.backlash_model, "sizes": text}
     given |= {"noise": ",".join(exact_text(level) for level in levels), "seeds": seeds, "vary": list(words)}
-    return SweepResult(plan, cases, done, fmus, calibrations, options.parquet, given, builds.kind)
+    return SweepResult(plan, cases, done, fmus, calibrations, options.parquet, builds.kind, arguments=given)
 
 
 def _levels(noise: float | Sequence[float]) -> tuple[float, ...]:
