@@ -24,24 +24,15 @@ FADING = 1.0  # of the fastest time constant of what only fades, where an error 
 
 @dataclass(frozen=True)
 class Body:
-    """A body at which torques act.
+    """A body at which torques act."""
 
-    Attributes:
-        name: of the site, "motor" or "load".
-        angle, speed: places of its states.
-        inertia: name of its parameter.
-        geared: True if it lies behind the gear.
-        encoder: name of the encoder that measures its angle: a column of a record and an output of the FMU.
-        viscous: name of its viscous friction; "": it has none.
-    """
-
-    name: str
-    angle: int
+    name: str  # of the site, "motor" or "load"
+    angle: int  # place of its angle in the state
     speed: int
-    inertia: str
-    encoder: str
-    geared: bool = False
-    viscous: str = ""
+    inertia: str  # name of its parameter
+    encoder: str  # name of the encoder that measures its angle: a column of a record and an output of the FMU
+    geared: bool = False  # True if it lies behind the gear
+    viscous: str = ""  # name of its viscous friction; "": it has none
 
 
 @dataclass(frozen=True)

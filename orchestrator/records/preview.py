@@ -42,23 +42,17 @@ class ChannelShown(msgspec.Struct, frozen=True):
 
 
 class ColumnTaken(msgspec.Struct, frozen=True):
-    """A column of a record: the place of its channel, None where there is none, and what becomes of its numbers.
-
-    Attributes:
-        how: "named", "recognised" or "absent".
-        needs: keys that its unit still asks for, such as ``torque_constant``.
-        least, most: of the first rows, in ``si``; None where they cannot be converted yet.
-    """
+    """A column of a record: the place of its channel, None where there is none, and what becomes of its numbers."""
 
     column: str
     meaning: str
     place: int | None
-    how: str
+    how: str  # "named", "recognised" or "absent"
     unit: str = ""
     kind: str = ""
     si: str = ""
-    needs: tuple[str, ...] = ()
-    least: float | None = None
+    needs: tuple[str, ...] = ()  # keys that its unit still asks for, such as ``torque_constant``
+    least: float | None = None  # of the first rows, in ``si``; None where they cannot be converted yet
     most: float | None = None
 
 

@@ -30,25 +30,16 @@ LINEAR = "LinearTransformation"
 
 @dataclass(frozen=True)
 class Given:
-    """A value as an SSP file has it.
+    """A value as an SSP file has it."""
 
-    Attributes:
-        type: ``Real``, ``Integer``, ``Boolean``, ``String`` or ``Enumeration``.
-        unit: its unit, if it has one.
-        units: units declared beside it.
-        factor, offset: of a mapping: the value in the unit of its target, times ``factor``, plus ``offset``.
-        texts: the values of an array's elements; empty for a scalar.
-        mapped: a mapping names the variable; else the entry's own name does.
-    """
-
-    type: str
+    type: str  # ``Real``, ``Integer``, ``Boolean``, ``String`` or ``Enumeration``
     text: str
-    unit: str | None
-    units: Mapping[str, Unit]
-    factor: float = 1.0
+    unit: str | None  # its unit, if it has one
+    units: Mapping[str, Unit]  # units declared beside it
+    factor: float = 1.0  # of a mapping: the value in the unit of its target, times ``factor``, plus ``offset``
     offset: float = 0.0
-    texts: tuple[str, ...] = ()
-    mapped: bool = False
+    texts: tuple[str, ...] = ()  # the values of an array's elements; empty for a scalar
+    mapped: bool = False  # a mapping names the variable; else the entry's own name does
 
 
 def read_units(root: etree._Element, space: str) -> dict[str, Unit]:

@@ -30,22 +30,13 @@ class Limits:
 
 @dataclass(frozen=True)
 class Setup:
-    """What a child is told before anything else; plain data.
+    """What a child is told before anything else; plain data."""
 
-    Attributes:
-        parent: process that owns the child.
-        path: ``sys.path`` of the child.
-        entry: ``module:function`` to be called with the unpickled ``argument``.
-        limits: what the child may use.
-        read, write: files and folders that it may read and run libraries from, and those that it may write too.
-        walls: whether the kernel shall enforce ``read``, ``write``, no network and no further processes.
-    """
-
-    parent: int
-    path: tuple[str, ...]
-    entry: str
+    parent: int  # process that owns the child
+    path: tuple[str, ...]  # ``sys.path`` of the child
+    entry: str  # ``module:function`` to be called with the unpickled ``argument``
     argument: bytes
-    limits: Limits
-    read: tuple[str, ...]
-    write: tuple[str, ...]
-    walls: bool
+    limits: Limits  # what the child may use
+    read: tuple[str, ...]  # files and folders that it may read and run libraries from
+    write: tuple[str, ...]  # those that it may write too
+    walls: bool  # whether the kernel shall enforce ``read``, ``write``, no network and no further processes
