@@ -1,4 +1,4 @@
-"""HDF5 files whose numbers are packed, as netCDF does it, and tables of pandas in HDF5."""
+"""HDF5 files whose numbers are packed, as netCDF does it; tables of pandas in HDF5 are refused."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,7 +9,6 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import RecordError
-from orchestrator.records.formats import open_source
 from orchestrator.records.record import Column, read_record
 from tests.support.independent_plant import make_record
 
@@ -172,63 +171,16 @@ def test_netcdf_of_the_classic_format_is_named(tmp_path: Path, columns: dict[str
         read_record(path)
 
 
-def _fixed(
-    group: Any, index: np.ndarray, blocks: list[tuple[list[str], np.ndarray]], marks: Mapping[str, str] = {}
+@pytest.mark.parametrize("members", [
+    ("table",), ("axis0", "axis1", "block0_items", "block0_values"),
+])  # fmt: skip
+def test_a_table_of_pandas_is_refused_with_the_cure(
+    tmp_path: Path, columns: dict[str, np.ndarray], members: tuple[str, ...]
 ) -> None:
-    """Write a table as pandas does in its fixed format."""
-    group.attrs["pandas_type"] = np.bytes_(b"frame")
-    names = [name for entries, _ in blocks for name in entries]
-    group["axis0"] = np.array(names, dtype="S")
-    axis = group.create_dataset("axis1", data=index)
-    for key, value in marks.items():
-        axis.attrs[key] = np.bytes_(value.encode())
-    for number, (entries, values) in enumerate(blocks):
-        group[f"block{number}_items"] = np.array(entries, dtype="S")
-        group[f"block{number}_values"] = values
-
-
-def test_a_fixed_table_of_pandas(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
-    numbers = np.column_stack([columns[name] for name in ("theta_m", "theta_l", "u")])
-    rows = columns["time"].size
-    for case, index, marks in (
-        ("number", np.arange(rows), {"name": "N."}),
-        ("time", columns["time"], {"name": "time"}),
-        ("date", np.rint(columns["time"] * 1e9).astype("i8") + 1_700_000_000 * 10**9,
-         {"name": "when", "kind": "datetime64[ns]"}),
-        ("duration", np.rint(columns["time"] * 1e6).astype("i8"), {"name": "time", "kind": "timedelta64[us]"}),
-    ):  # fmt: skip
-        path = tmp_path / f"{case}.h5"
-        with h5py.File(path, "w") as file:
-            blocks = [(["theta_m", "theta_l", "u"], numbers), (["state"], np.ones((rows, 1), dtype="i8"))]
-            if case == "number":
-                blocks.append((["time"], columns["time"][:, None]))
-            _fixed(file.create_group("logs/machine"), index, blocks, marks)
-        record = read_record(path, {"time": Column("when")} if case == "date" else {})
-        np.testing.assert_allclose(record.time - record.time[0], columns["time"], atol=1e-8)
-        for name in ("u", "theta_m", "theta_l"):
-            np.testing.assert_allclose(getattr(record, name), columns[name], atol=1e-12)
-
-
-def test_a_table_of_pandas_whose_columns_are_columns(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
     path = tmp_path / "log.h5"
-    fields = [("index", "i8"), *((name, "f8") for name in columns)]
-    rows = np.zeros(columns["time"].size, dtype=fields)
-    for name, values in columns.items():
-        rows[name] = values
+    rows = np.zeros(columns["time"].size, dtype=[("index", "i8"), *((name, "f8") for name in columns)])
     with h5py.File(path, "w") as file:
-        file["df/table"] = rows
-        file["df/_i_table/time/sorted"] = np.sort(columns["time"])[::-1]  # an index of the file, and no column
-    record = read_record(path)
-    np.testing.assert_allclose(record.theta_m, columns["theta_m"], atol=1e-12)
-    with open_source(path) as source:
-        assert [head.name for head in source.heads] == [name for name, _ in fields]
-
-
-def test_a_table_of_pandas_with_pickled_names_is_refused(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
-    path = tmp_path / "log.h5"
-    rows = np.zeros(columns["time"].size, dtype=[("index", "i8"), ("values_block_0", "f8", (4,))])
-    rows["values_block_0"] = np.column_stack(list(columns.values()))
-    with h5py.File(path, "w") as file:
-        file["df/table"] = rows
-    with pytest.raises(RecordError, match=r"`/df` of pandas: the names .* are pickled, .* `format=\"fixed\"`, or"):
+        for name in members:
+            file[f"logs/machine/{name}"] = rows
+    with pytest.raises(RecordError, match="`/logs/machine` is a table of pandas: save it by `to_parquet` or `to_csv`"):
         read_record(path)

@@ -1,4 +1,4 @@
-"""Records in HDF5, by h5py: MAT files of version 7.3, netCDF-4 and tables of pandas are kinds of it."""
+"""Records in HDF5, by h5py: MAT files of version 7.3 and netCDF-4 are kinds of it."""
 
 import re
 from pathlib import Path
@@ -10,8 +10,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.formats.nested import DEEPEST, PassedOver, vectors_of
 from orchestrator.records.formats.numpy_file import ArraySource
 from orchestrator.records.formats.packing import unpack
-from orchestrator.records.formats.pandas_frames import frame_columns, is_frame
-from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, extra_error, in_a_line
+from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, damage_error, extra_error
 
 _NUMBERS = frozenset(b"double single logical int8 int16 int32 int64 uint8 uint16 uint32 uint64".split())
 
@@ -29,7 +28,7 @@ def open_file(path: Path) -> ArraySource:
     except RecordError:
         raise
     except Exception as error:  # h5py raises whatever a broken file makes it meet
-        raise RecordError(f"{path}: must be a whole HDF5 file, but is not: {in_a_line(error)}") from None
+        raise damage_error(path, "HDF5", error) from None
     if not found.arrays:
         raise RecordError(
             f"{path}: must hold vectors of numbers, but holds none: save arrays, not timeseries or tables, or save as "
@@ -50,8 +49,11 @@ class _Reader:
         """Return the members of a group, groups as mappings."""
         import h5py
 
-        if is_frame(group):
-            return self._frame(group)
+        if _is_frame(group):
+            raise RecordError(
+                f"{self._path}: must hold arrays, but `{group.name}` is a table of pandas: save it by `to_parquet` or "
+                "`to_csv`"
+            )
         members: dict[str, Any] = {}
         for count, name in enumerate(group):
             if count > MAXIMUM_CHANNELS:
@@ -110,21 +112,18 @@ class _Reader:
             self.unpacked.append(f"`{name}` {said}")
         return physical
 
-    def _frame(self, group: Any) -> dict[str, Any]:
-        """Return the columns of a table of pandas."""
-        try:
-            return frame_columns(group, self._read_rows, _text)
-        except ValueError as error:
-            raise RecordError(f"{self._path}: table `{group.name}` of pandas: {error}") from None
-
-    def _read_rows(self, item: Any) -> Any:
-        return self._read(item).reshape(item.shape)
-
     def _follow_references(self, item: Any, depth: int) -> Any:
         """Return what a dataset of references points to: a field of each structure of an array."""
         if depth >= DEEPEST or item.size > MAXIMUM_CHANNELS:
             return PassedOver("cell")
         return [self._item(self._file[reference], depth + 1) for reference in np.ravel(item[()]) if reference]
+
+
+def _is_frame(group: Any) -> bool:
+    """Return whether a group is a table that pandas wrote by ``to_hdf``, by its members."""
+    if "table" in group and getattr(group["table"], "dtype", None) is not None:
+        return "index" in (group["table"].dtype.names or ())
+    return {"axis0", "axis1", "block0_items", "block0_values"} <= set(group)
 
 
 def _text(value: Any) -> str:

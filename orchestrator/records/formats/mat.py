@@ -17,7 +17,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.formats.mat_results import is_result, result_vectors
 from orchestrator.records.formats.nested import PassedOver, Vectors, vectors_of
 from orchestrator.records.formats.numpy_file import ArraySource
-from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, in_a_line
+from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, damage_error
 
 HEAD = 128  # bytes of a file of version 5 to 7
 MOST_OF_A_HEAD = 4096  # bytes of a variable that are looked at for its name
@@ -35,7 +35,7 @@ def open_file(path: Path) -> ArraySource:
     except RecordError:
         raise
     except Exception as error:  # scipy's reader raises whatever a broken file makes it meet
-        raise RecordError(f"{path}: must be a whole MAT file, but is not: {in_a_line(error)}") from None
+        raise damage_error(path, "MAT", error) from None
     if not found.arrays:
         raise RecordError(
             f"{path}: a MAT file must hold vectors of numbers, but this one holds none: save arrays, not timeseries or "

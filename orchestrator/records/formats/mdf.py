@@ -20,8 +20,8 @@ from orchestrator.records.formats.source import (
     Head,
     RecordSource,
     as_numbers,
+    damage_error,
     extra_error,
-    in_a_line,
 )
 from orchestrator.records.units import parse_unit
 from orchestrator.records.words import names_time
@@ -74,7 +74,7 @@ class MdfSource(RecordSource):
             except RecordError:
                 raise
             except Exception as error:  # asammdf raises whatever a broken file makes it meet
-                raise _damage_error(self._path, error) from None
+                raise damage_error(self._path, "MDF", error) from None
             numbers = as_numbers(values, self.heads[place].name, self._path)
             if invalid is not None and np.any(invalid):  # samples that the file marks, each at its own row
                 numbers[np.asarray(invalid, dtype=bool)] = np.nan if numbers.dtype.kind == "f" else np.datetime64("NaT")
@@ -124,7 +124,7 @@ def open_file(path: Path) -> MdfSource:
             rows = sum(int(group.channel_group.cycles_nr) for group in file.groups)
             channels = sum(len(group.channels) for group in file.groups)
     except Exception as error:  # asammdf raises whatever a broken file makes it meet
-        told = _damage_error(path, error)
+        told = damage_error(path, "MDF", error)
         _drop_silently(error)
         raise told from None
     if rows * 8 > MAXIMUM_BYTES or channels > MAXIMUM_CHANNELS:
@@ -140,7 +140,3 @@ def _drop_silently(error: Exception) -> None:
         gc.collect()
     finally:
         sys.unraisablehook = hook
-
-
-def _damage_error(path: Path, error: BaseException) -> RecordError:
-    return RecordError(f"{path}: must be a whole MDF file, but is not: {in_a_line(error)}")

@@ -14,8 +14,8 @@ from orchestrator.records.formats.source import (
     MAXIMUM_CHANNELS,
     Head,
     RecordSource,
+    damage_error,
     extra_error,
-    in_a_line,
 )
 
 
@@ -35,7 +35,7 @@ class ParquetSource(RecordSource):
             table = self._file.read(columns=names)
             return [_values(table.column(name), name, self._path) for name in names]
         except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
-            raise RecordError(f"{self._path}: must be a whole Parquet file, but is not: {in_a_line(error)}") from None
+            raise damage_error(self._path, "Parquet", error) from None
 
 
 def open_file(path: Path) -> ParquetSource:
@@ -51,7 +51,7 @@ def open_file(path: Path) -> ParquetSource:
         )
         columns, rows = len(file.schema_arrow.names), file.metadata.num_rows
     except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
-        raise RecordError(f"{path}: must be a whole Parquet file, but is not: {in_a_line(error)}") from None
+        raise damage_error(path, "Parquet", error) from None
     if columns > MAXIMUM_CHANNELS or rows * 8 > MAXIMUM_BYTES:
         raise RecordError(
             f"{path}: a record must have at most {MAXIMUM_BYTES // 8} rows and {MAXIMUM_CHANNELS} columns, but has "

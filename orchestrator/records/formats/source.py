@@ -109,6 +109,11 @@ def in_a_line(error: BaseException) -> str:
     return " ".join(str(error).split())[:120]
 
 
+def damage_error(path: Path, kind: str, error: BaseException) -> RecordError:
+    """Return the error that says that a file of a kind is broken, with what a library says of it."""
+    return RecordError(f"{path}: must be a whole {kind} file, but is not: {in_a_line(error)}")
+
+
 def extra_error(path: Path, kind: str, package: str, extra: str) -> RecordError:
     """Return the error that says which extra reads a format."""
     return RecordError(
