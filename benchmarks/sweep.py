@@ -23,7 +23,7 @@ from pathlib import Path
 from orchestrator.building.fastest import ensure_fastest
 from orchestrator.engine import LocalProcesses, OpenPool, choose_pool, run_cases, write_csv
 from orchestrator.paired.cosimulation import FMUS
-from orchestrator.paired.experiment import experiment_of
+from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.sweep import SweepPlan, sweep_work
 from tests.support.dask_cluster import DaskProcesses
 from tests.support.fmpy_pairs import FmpyPairs
@@ -86,7 +86,7 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--script-cases", type=int, default=20, help="pairs that FMPy's calls get in each round")
     args = parser.parse_args()
-    experiment = experiment_of("default")
+    experiment = Experiment()
     plan = SweepPlan(experiment, f"random:{args.cases}")
     times: dict[str, list[Timing]] = {}
     hashes = set()

@@ -112,7 +112,7 @@ def diagnose_with_fmu(record: Path, fmu: Path, map_path: Path) -> Outcome:
     """
     begun = _processor_time()
     try:
-        result = diagnose_fmu(record, fmu, map_path)
+        result = diagnose_fmu([record], fmu, map_path)
     except OrchestratorError as error:
         return Outcome(refused=str(error), seconds=_processor_time() - begun)
     result.close()

@@ -8,7 +8,6 @@ changes (a test says so); until then they are made on the user's machine.
 
 from orchestrator.paired.calibration import SHIPPED, calibrate, calibration_text
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.pair import with_settings
 from tools import refuse_arguments
 
 NOISE = (0.0, 1e-4)
@@ -16,7 +15,7 @@ NOISE = (0.0, 1e-4)
 
 def main() -> None:
     """Make both, then replace those that are there."""
-    found = [calibrate(with_settings(Experiment(), noise=level)) for level in NOISE]
+    found = [calibrate(Experiment(encoder_noise=level)) for level in NOISE]
     SHIPPED.mkdir(exist_ok=True)
     for old in SHIPPED.glob("*.json"):
         old.unlink()

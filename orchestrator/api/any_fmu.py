@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from orchestrator.api.diagnosis_results import AnyDiagnosisResult
 from orchestrator.api.shown import Block
@@ -144,43 +144,34 @@ def read_records(records: Sequence[Path | str], given: Map, settings: DiagnosisS
 
 
 def diagnose_fmu(
-    record: Path | str | Sequence[Path | str],
+    records: Sequence[Path | str],
     fmu: Path | str,
     map: Path | str,  # noqa: A002 - as on the command line
     *,
     validate: Path | str | None = None,
     test: Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,
-    search: bool = True,
-    effects: Sequence[str] | None = None,
-    time_limit: float | None = None,
     progress: Progress = lambda what: None,
+    **search: Any,
 ) -> FmuDiagnosisResult:
-    """Return what records say of an FMU, and which effects are missing around it.
-
-    Args:
-        fmu: any co-simulation FMU of FMI 2.0 or 3.0, or a scenario file of several; they run in a child process.
-        time_limit: seconds after which the search ends with what it has; None: the map's budget.
-    """
+    """Return what records say of an FMU, and which effects are missing around it; see ``diagnose``."""
     begun = time.monotonic()
     used = choose_settings(settings, DiagnosisSettings)
     system = read_system(Path(fmu))
     given = read_map(Path(map), system)
-    paths = [record] if isinstance(record, (Path, str)) else list(record)
     others = [path for path in (validate, test) if path is not None]
-    read = read_records([*paths, *others], given, used)
+    read = read_records([*records, *others], given, used)
     further = dict(zip([name for name, path in (("validate", validate), ("test", test)) if path is not None],
-                       read[len(paths) :], strict=True))  # fmt: skip
+                       read[len(records) :], strict=True))  # fmt: skip
     found = diagnose_records(
-        system, given, read[: len(paths)], used, test=further.get("test"), search=search, effects=effects,
-        time_limit=time_limit, progress=progress,
-    )  # fmt: skip
+        system, given, read[: len(records)], used, test=further.get("test"), progress=progress, **search
+    )
     try:
         second = misfit_on_record(found.workings, further["validate"]) if "validate" in further else None
     except BaseException:
         found.workings.close()
         raise
-    files = {"record": paths[0], "fmu": fmu, "map": map, "validate": validate, "test": test}
+    files = {"record": records[0], "fmu": fmu, "map": map, "validate": validate, "test": test}
     arguments = {name: str(path) for name, path in files.items() if path is not None}
     result = FmuDiagnosisResult(found, second, time.monotonic() - begun, arguments=arguments)
     weakref.finalize(result, found.workings.close)  # child processes end with the result, or at exit

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
-from orchestrator.api.arguments import choose_experiment
 from orchestrator.api.sampled import SampledResult
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import ensure_fastest
@@ -18,8 +17,8 @@ from orchestrator.paired import pair
 from orchestrator.paired.apart import run_pair_within
 from orchestrator.paired.calibration import GapEstimate
 from orchestrator.paired.cosimulation import FMUS, LoopRun
-from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.pair import PairRun, with_settings
+from orchestrator.paired.experiment import Experiment, choose_experiment
+from orchestrator.paired.pair import PairRun
 from orchestrator.shared.arrays import Array
 from orchestrator.shared.numbers import not_negative
 from orchestrator.shared.play import Play
@@ -155,7 +154,7 @@ def run_pair(
     not_negative("noise", noise)
     if seed < 0:
         raise ScenarioError(f"`seed` must not be negative, but is {seed}", "seed")
-    chosen = with_settings(choose_experiment(experiment, backlash_model), noise=noise)
+    chosen = replace(choose_experiment(experiment, backlash_model), encoder_noise=noise)
     given = {"alpha": alpha, "noise": noise, "experiment": chosen.name, "backlash_model": chosen.backlash_model}
     given |= {"start": dict(start)} if start else {}
     fmus = ensure_fastest(FMUS).paths

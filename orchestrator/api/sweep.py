@@ -6,7 +6,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.arguments import choose_experiment
 from orchestrator.api.cases import AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
@@ -15,7 +14,7 @@ from orchestrator.engine.work import file_hash
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import Calibration
 from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system, loop_values
-from orchestrator.paired.experiment import Experiment
+from orchestrator.paired.experiment import Experiment, choose_experiment
 from orchestrator.paired.metric import ErrorStatistics, trust_of_sweep
 from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sweep import OWN_PARAMETERS, SweepArrays, SweepPlan, gather, sweep_work

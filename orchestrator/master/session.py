@@ -242,7 +242,8 @@ class Session:
             ticks = TickSamples(self.layout, signals, self._times)
             run = FixedSteps(self._events, algorithm, table, ticks, self.start)
             run.run(steps, rows, record)
-            return Statistics(steps, run.undone, self._calls(), run.passes, events=self._events.statistics())
+            calls = {stage.name: stage.steps for stage in self._events.stages}
+            return Statistics(steps, run.undone, calls, run.passes, events=self._events.statistics())
         match algorithm:
             case GaussSeidel() | Jacobi():
                 loop = self._run_fixed_step(wiring, table, rows, record, algorithm)
@@ -256,10 +257,6 @@ class Session:
             case _:
                 sweeps = algorithm.run(wiring, table, self.start, steps, rows, record)
         return Statistics(steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), sweeps)
-
-    def _calls(self) -> dict[str, int]:
-        """Return the calls for a step by instance, of a system with events."""
-        return {} if self._events is None else {stage.name: stage.steps for stage in self._events.stages}
 
     def _run_fixed_step(
         self, wiring: Wiring, table: Array, rows: Array, record: Slots, algorithm: GaussSeidel | Jacobi

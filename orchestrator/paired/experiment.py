@@ -148,11 +148,19 @@ def thesis_experiment() -> Experiment:
     )
 
 
-EXPERIMENTS = ("default", "thesis")
+EXPERIMENTS = {"default": Experiment, "thesis": thesis_experiment}
 
 
-def experiment_of(name: str) -> Experiment:
-    """Return the experiment ``name``."""
-    if name not in EXPERIMENTS:
-        raise ScenarioError(f"`experiment` must be one of {', '.join(EXPERIMENTS)}, but is {name!r}")
-    return Experiment() if name == "default" else thesis_experiment()
+def choose_experiment(experiment: str | Experiment, backlash_model: str | None = None) -> Experiment:
+    """Return the experiment that is meant, with another model of the gap where one is named."""
+    if isinstance(experiment, str):
+        if experiment not in EXPERIMENTS:
+            known = ", ".join(EXPERIMENTS)
+            raise ScenarioError(f"`experiment` must be one of {known}, but is {experiment!r}", "experiment")
+        experiment = EXPERIMENTS[experiment]()
+    if backlash_model is None:
+        return experiment
+    if backlash_model not in BACKLASH_MODELS:
+        known = ", ".join(BACKLASH_MODELS)
+        raise ScenarioError(f"`backlash_model` must be one of {known}, but is {backlash_model!r}", "backlash_model")
+    return replace(experiment, backlash_model=backlash_model)

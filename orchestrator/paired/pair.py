@@ -1,7 +1,7 @@
 """One paired run: both loops in one system of six FMUs, and the estimate from their difference."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import CalibrationError
@@ -39,7 +39,7 @@ def run_pair(
     """
     prefixes = (MACHINE, TWIN)
     system = loop_system(experiment, fmus, prefixes)
-    record = [_add_prefix(prefix, address) for prefix in prefixes for address in RECORDED.values()]
+    record = [f"{prefix}{address}" for prefix in prefixes for address in RECORDED.values()]
     errors = experiment.encoder_errors(seed)
     signals = {k: Samples(e, experiment.sample_time) for k, e in zip(ERROR_SOURCES, errors, strict=True)}
     with Session(system, record, GaussSeidel(experiment.sample_time), experiment.duration) as session:
@@ -53,16 +53,3 @@ def run_pair(
     except CalibrationError as error:
         return PairRun(machine, twin, total, None, str(error))
     return PairRun(machine, twin, total, estimate)
-
-
-def _add_prefix(prefix: str, address: str) -> str:
-    return f"{prefix}{address}"
-
-
-def with_settings(experiment: Experiment, backlash_model: str | None = None, noise: float | None = None) -> Experiment:
-    """Return ``experiment`` with another backlash model or another encoder noise [rad]; None: unchanged."""
-    if backlash_model is not None:
-        experiment = replace(experiment, backlash_model=backlash_model)
-    if noise is not None:
-        experiment = replace(experiment, encoder_noise=noise)
-    return experiment

@@ -5,7 +5,7 @@ The twin without a gap has no noise and is the same for every case, so each work
 
 from array import array
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from orchestrator.paired.calibration import DEFAULT_SETTINGS, Calibration, GapMa
 from orchestrator.paired.cosimulation import LoopSession, LoopValues, loop_values
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, difference_sum, error_statistics
-from orchestrator.paired.pair import with_settings
 from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sizes import read_sizes
 from orchestrator.shared.arrays import Array
@@ -67,7 +66,7 @@ class SweepPlan:
         self, progress: Callable[[str], None] | None = None, settings: MapSettings = DEFAULT_SETTINGS
     ) -> dict[float, Calibration]:
         """Return the calibration by noise level [rad]; ``progress`` is told of those that must be made."""
-        levels = {level: with_settings(self.experiment, noise=level) for level in self.noise}
+        levels = {level: replace(self.experiment, encoder_noise=level) for level in self.noise}
         return {level: load_or_calibrate(experiment, progress, settings) for level, experiment in levels.items()}
 
 

@@ -67,10 +67,6 @@ class Resonance:
     frequency: str
 
 
-def _accept_all(values: Mapping[str, float]) -> str:
-    return ""
-
-
 @dataclass(frozen=True, eq=False)
 class Plant:
     """One plant that records can be compared with.
@@ -97,7 +93,7 @@ class Plant:
     enumerations: tuple[str, ...] = ()  # names of parameters whose FMU variable counts from one
     spread: float = 0.0  # relative uncertainty of each linear parameter where a model file states none
     # values by name -> why records cannot be diagnosed against such a plant; "": they can
-    refused: Callable[[Mapping[str, float]], str] = _accept_all
+    refused: Callable[[Mapping[str, float]], str] = lambda _: ""
     # parameters of the analysis -> those of the FMU (n,), with what it alone has fitted put in
     realised: Callable[[Array], Array] | None = None
     # of each body with dry friction, name of the logarithm of the distance over which it builds up

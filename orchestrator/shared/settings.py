@@ -32,16 +32,13 @@ def share(why: str, le: float = 1.0) -> msgspec.Meta:
     return msgspec.Meta(description=why, ge=0.0, le=le)
 
 
-def read_settings(path: Path, kind: type[S]) -> S:
-    """Return settings with the values of a TOML file; what it does not name keeps its default."""
-    return settings_of(read_toml(path, MAXIMUM_BYTES), kind, str(path))
-
-
 def choose_settings(given: S | Path | str | None, kind: type[S]) -> S:
     """Return the settings that are meant: these, those of a file, or the defaults."""
     if given is None:
         return kind()
-    return read_settings(Path(given), kind) if isinstance(given, (str, Path)) else given
+    if isinstance(given, (str, Path)):
+        return settings_of(read_toml(Path(given), MAXIMUM_BYTES), kind, str(given))
+    return given
 
 
 def settings_of(content: dict[str, Any], kind: type[S], where: str = "settings") -> S:

@@ -71,11 +71,6 @@ def guard_room(x: State, mode: Mode, which: int, p: Parameters) -> float:
     return roundings * (1.0 + abs(x[6]) + friction_levels(p)[pair - 2] + p.k_1 * first + p.k_2 * second + turning)
 
 
-def is_violated(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -> bool:
-    """Tell whether a guard in use is negative by more than rounding."""
-    return is_in_use(mode, which, p) and guard(x, 1.0, mode, which, p, T_l) < -guard_room(x, mode, which, p)
-
-
 def with_item(mode: Mode, place: int, item: int) -> Mode:
     """Return the mode with another item at a place."""
     return (
@@ -103,7 +98,7 @@ def settle_mode(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State,
     """Return state and mode once no guard is violated any more at this moment: contacts first, then friction."""
     for _ in range(2):
         for which in range(GUARDS):
-            if is_violated(x, mode, which, p, T_l):
+            if is_in_use(mode, which, p) and guard(x, 1.0, mode, which, p, T_l) < -guard_room(x, mode, which, p):
                 x, mode = switch_mode(x, mode, which)
     return (x, mode)
 

@@ -12,7 +12,7 @@ from orchestrator.errors import CalibrationError, ScenarioError
 from orchestrator.paired import calibration as module
 from orchestrator.paired.calibration import calibrate, estimate_gap, load_or_calibrate
 from orchestrator.paired.compiled_loop import make_loop
-from orchestrator.paired.experiment import Experiment, experiment_of, thesis_experiment
+from orchestrator.paired.experiment import Experiment, choose_experiment, thesis_experiment
 from orchestrator.paired.metric import difference_sum, error_statistics
 
 PLANTS = "orchestrator.plants.design"
@@ -129,4 +129,4 @@ def test_statistics():
 
 def test_unknown_experiment():
     with pytest.raises(ScenarioError, match="must be one of default, thesis"):
-        experiment_of("x")
+        choose_experiment("x")

@@ -237,11 +237,9 @@ class CheckFound(ResultData, frozen=True, kw_only=True):
 
 def as_plain(data: Any) -> Any:
     """Turn results into what JSON knows. Return nested dictionaries, lists, numbers and texts."""
-    return data if isinstance(data, Mapping) else msgspec.to_builtins(data, enc_hook=_otherwise)
-
-
-def _otherwise(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else str(value)
+    if isinstance(data, Mapping):
+        return data
+    return msgspec.to_builtins(data, enc_hook=lambda value: value.tolist() if hasattr(value, "tolist") else str(value))
 
 
 def read(results: Any, kind: type[F]) -> F:
