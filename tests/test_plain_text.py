@@ -51,6 +51,7 @@ def test_of_a_long_value_in_a_message_the_middle_is_left_out(value: str, tmp_pat
 
 class Named(Result):
     command = "named"
+    results = None
 
     def blocks(self):
         return [f"Note: {ODD}", table(ODD, ("signal", ODD), ((ODD, ODD),))]

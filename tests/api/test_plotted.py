@@ -38,6 +38,7 @@ def test_plot_returns_the_plots_and_draws_only_into_a_given_file(pair, tmp_path,
 def test_a_result_without_plots_says_so(tmp_path):
     class Plain(PlottedResult):
         figures = Figures(Report("t", "s", ()))
+        blocks = results = None
 
     with pytest.raises(oc.InputError, match="`path` must be absent"):
         Plain().plot(tmp_path / "a.png")

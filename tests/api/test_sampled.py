@@ -13,6 +13,7 @@ ANGLE = np.array([0.1, np.nan, 0.3])
 
 
 class _Run(SampledResult):
+    blocks = results = None
     command = "run"
     digits = 3
 
