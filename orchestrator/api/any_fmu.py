@@ -19,10 +19,9 @@ from orchestrator.diagnosis.fmu.report import FmuDiagnosis, first_test, misfit_o
 from orchestrator.diagnosis.fmu.system import draft_map_text, read_system
 from orchestrator.diagnosis.report.json_results import (
     dependence_found,
-    effect_found,
-    library_found,
     misfit_found,
-    steps_found,
+    outcome_found,
+    parameters_found,
 )
 from orchestrator.diagnosis.report.summary import summarise
 from orchestrator.diagnosis.result import TestMisfit
@@ -31,9 +30,8 @@ from orchestrator.records.tables import column_names
 from orchestrator.shared.arrays import Array
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
-from orchestrator.shared.results.diagnose import ParameterFound
 from orchestrator.shared.results.fields import fields_table
-from orchestrator.shared.settings import as_tables, choose_settings
+from orchestrator.shared.settings import choose_settings
 
 Progress = Callable[[str], None]
 
@@ -69,26 +67,19 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         return lines
 
     def results(self, place: Path) -> FmuDiagnosisFound:
-        d, report = self.diagnosis, self.diagnosis.settings.report
-        return FmuDiagnosisFound(
-            verdict=d.verdict,
-            trust=d.trust.to_result(),
-            effects=tuple(effect_found(effect) for effect in d.effects),
-            parameters=parameter_results(d),
-            test=tuple(misfit_found(test, report) for test in d.test),
-            validation=None if self.validation is None else misfit_found(self.validation, report),
+        d, problem = self.diagnosis, self.diagnosis.workings.problem
+        return outcome_found(
+            FmuDiagnosisFound,
+            d,
+            d.workings.search,
+            validation=None if self.validation is None else misfit_found(self.validation, d.settings.report),
             remaining=FmuRemainingFound(dict(d.left), tuple(dependence_found(one) for one in d.remaining)),
-            notes=d.notes,
-            settings=as_tables(d.settings),
-            candidates=steps_found(d.workings.search),
-            library=library_found(d.workings.search),
             model=None if not self.delivered else str(place / self.delivered[0].file),
             delivery=tuple(self.delivered),
-            step_cost=d.workings.problem.runner.step_cost,
+            step_cost=problem.runner.step_cost,
             walls=support().in_words,
-            runs=d.workings.problem.runner.runs,
+            runs=problem.runner.runs,
             test_start=self._test_start(),
-            summary=tuple(summarise(d)),
             seconds=self.seconds,
         )
 
@@ -121,16 +112,8 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
         self.diagnosis.workings.close()
 
 
-def parameter_results(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
-    """Return re-fitted parameters as result files have them."""
-    return {
-        name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
-        for name, one in diagnosis.parameters.items()
-    }
-
-
 def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
-    parameters = parameter_results(diagnosis.diagnosis)
+    parameters = parameters_found(diagnosis.diagnosis)
     if parameters:
         yield fields_table("Parameters", parameters, names="parameter")
     yield from diagnosis._misfit_tables()

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from orchestrator.api.any_fmu import Progress, parameter_results, read_records
+from orchestrator.api.any_fmu import Progress, read_records
 from orchestrator.api.shown import Block, Result
 from orchestrator.diagnosis.fmu.diagnose import FmuCalibration, calibrate_fmu
 from orchestrator.diagnosis.fmu.mapping import read_map
 from orchestrator.diagnosis.fmu.system import read_system
-from orchestrator.diagnosis.report.json_results import misfit_found
+from orchestrator.diagnosis.report.json_results import misfit_found, parameters_found
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.isolation.walls import support
@@ -60,7 +60,7 @@ class CalibrationResult(Result):
         c, d = self.calibration, self.calibration.diagnosis
         parameters = {
             name: LearnedParameterFound(p.nominal, p.value, p.standard_error, p.interval, p.unit, c.learned[name])
-            for name, p in parameter_results(d).items()
+            for name, p in parameters_found(d).items()
         }
         return FmuCalibrationFound(
             explained=c.explained,

@@ -2,19 +2,21 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
 
 import msgspec
 
 from orchestrator.diagnosis.model.plant_effects import effects_of
 from orchestrator.diagnosis.report.missing_torque import MissingTorque, missing_torques
 from orchestrator.diagnosis.report.summary import play_of, summarise
-from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit, ValueEstimate
+from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, TestMisfit, ValueEstimate
 from orchestrator.diagnosis.selection.outcome import Dependence, SearchResult
 from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.effects.words import effect_words
 from orchestrator.shared.arrays import Array
 from orchestrator.shared.results.diagnose import (
     AnalysisFound,
+    AnyDiagnosisFound,
     DependenceFound,
     DiagnoseFound,
     EffectFound,
@@ -33,37 +35,54 @@ from orchestrator.shared.results.diagnose import (
 )
 from orchestrator.shared.settings import as_tables
 
+F = TypeVar("F", bound=AnyDiagnosisFound)
+
 
 def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
     """Return the results for ``diagnose.json``, as far as the diagnosis knows them."""
     play, law = play_of(diagnosis), diagnosis.law
     curves = {curve.label: _missing_torque(curve) for curve in missing_torques(diagnosis)}
-    return DiagnoseFound(
-        verdict=diagnosis.verdict,
+    own = [*effects_of(diagnosis.model), *(one.label for one in diagnosis.effects if one.in_model)]
+    return outcome_found(
+        DiagnoseFound,
+        diagnosis,
+        diagnosis.workings.search,
         effects=tuple(
             msgspec.structs.replace(effect_found(effect), missing_torque=curves.get(effect.label))
             for effect in diagnosis.effects
         ),
         play=None if play is None else play.to_result(),
         nuisances=tuple(NuisanceFound(n.name, n.grade.word, _values(n.parameters)) for n in diagnosis.nuisances),
-        parameters={
-            name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
-            for name, one in diagnosis.parameters.items()
-        },
-        test=tuple(misfit_found(test, diagnosis.settings.report) for test in diagnosis.test),
         remaining=RemainingFound(dict(diagnosis.left), tuple(dependence_found(one) for one in diagnosis.remaining)),
         learned_law=None if law is None else _law(law),
         analysis=_analysis(diagnosis),
-        trust=diagnosis.trust.to_result(),
-        notes=diagnosis.notes,
-        settings=as_tables(diagnosis.settings),
-        candidates=steps_found(diagnosis.workings.search),
-        library=library_found(
-            diagnosis.workings.search,
-            [*effects_of(diagnosis.model), *(one.label for one in diagnosis.effects if one.in_model)],
-        ),
-        summary=tuple(summarise(diagnosis)),
+        library=library_found(diagnosis.workings.search, own),
     )
+
+
+def outcome_found(kind: type[F], diagnosis: DiagnosisOutcome, search: SearchResult, **own: Any) -> F:
+    """Return results of a ``kind``: what those of any diagnosis have in common, and the ``own`` of this kind."""
+    common: dict[str, Any] = {
+        "verdict": diagnosis.verdict,
+        "trust": diagnosis.trust.to_result(),
+        "effects": tuple(effect_found(effect) for effect in diagnosis.effects),
+        "parameters": parameters_found(diagnosis),
+        "test": tuple(misfit_found(test, diagnosis.settings.report) for test in diagnosis.test),
+        "notes": diagnosis.notes,
+        "settings": as_tables(diagnosis.settings),
+        "candidates": steps_found(search),
+        "library": library_found(search),
+        "summary": tuple(summarise(diagnosis)),
+    }
+    return kind(**common | own)
+
+
+def parameters_found(diagnosis: DiagnosisOutcome) -> dict[str, ParameterFound]:
+    """Return re-fitted parameters as results have them."""
+    return {
+        name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
+        for name, one in diagnosis.parameters.items()
+    }
 
 
 def steps_found(search: SearchResult) -> tuple[StepFound, ...]:

@@ -6,11 +6,9 @@ import msgspec
 
 from orchestrator.shared.results import ResultData, TrustFound
 from orchestrator.shared.results.diagnose import (
+    AnyDiagnosisFound,
     DependenceFound,
-    EffectFound,
-    LibraryFound,
     ParameterFound,
-    StepFound,
     TestFound,
     misfit_tables,
 )
@@ -44,7 +42,7 @@ class DeliveredFound(msgspec.Struct, frozen=True):
     note: Annotated[str, Display("note")] = ""
 
 
-class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):
+class FmuDiagnosisFound(AnyDiagnosisFound, frozen=True, kw_only=True):
     """``diagnose`` of any FMU: graded effects, misfit on test data, what was delivered, and how it was found.
 
     ``test_start``: from which time on the first record is test data [s].
@@ -52,25 +50,12 @@ class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):
 
     schema_version: int = 3
     kind: Literal["fmu"] = "fmu"
-    verdict: str
-    trust: TrustFound | None = None
-    effects: tuple[EffectFound, ...] = ()
-    parameters: dict[str, ParameterFound] = msgspec.field(default_factory=dict)
-    test: tuple[TestFound, ...] = ()
-    validation: TestFound | None = None
     remaining: FmuRemainingFound = FmuRemainingFound()
-    notes: tuple[str, ...] = ()
-    settings: dict[str, Any] = msgspec.field(default_factory=dict)
-    candidates: tuple[StepFound, ...] = ()
-    library: dict[str, LibraryFound] = msgspec.field(default_factory=dict)
-    model: str | None = None
     delivery: tuple[DeliveredFound, ...] = ()
     step_cost: float | None = None
     walls: str = ""
     runs: int | None = None
     test_start: float | None = None
-    summary: tuple[str, ...] = ()
-    seconds: float | None = None
 
 
 class LearnedParameterFound(ParameterFound, frozen=True):

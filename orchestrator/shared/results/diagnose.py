@@ -223,31 +223,33 @@ class DifferenceFound(msgspec.Struct, frozen=True):
     unit: str = ""
 
 
-class DiagnoseFound(ResultData, frozen=True, kw_only=True):
-    """``diagnose``: graded effects, the corrected model, what is left, and how it was found.
+class AnyDiagnosisFound(ResultData, frozen=True, kw_only=True):
+    """What any diagnosis says; ``library``: by label (``name@site``) each effect that the record can show."""
 
-    ``library``: by label (``name@site``) each effect that the record can show.
-    """
-
-    schema_version: int = 4
     verdict: str
+    trust: TrustFound | None = None
     effects: tuple[EffectFound, ...] = ()
-    play: Sizes | None = None
-    nuisances: tuple[NuisanceFound, ...] = ()
     parameters: dict[str, ParameterFound] = msgspec.field(default_factory=dict)
     test: tuple[TestFound, ...] = ()
     validation: TestFound | None = None
-    remaining: RemainingFound = RemainingFound()
-    learned_law: LearnedFound | None = None
-    analysis: tuple[AnalysisFound, ...] = ()
-    trust: TrustFound | None = None
-    model: str | None = None
     notes: tuple[str, ...] = ()
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
     candidates: tuple[StepFound, ...] = ()
     library: dict[str, LibraryFound] = msgspec.field(default_factory=dict)
+    model: str | None = None
+    summary: tuple[str, ...] = ()
+    seconds: float | None = None
+
+
+class DiagnoseFound(AnyDiagnosisFound, frozen=True, kw_only=True):
+    """``diagnose``: graded effects, the corrected model, what is left, and how it was found."""
+
+    schema_version: int = 4
+    play: Sizes | None = None
+    nuisances: tuple[NuisanceFound, ...] = ()
+    remaining: RemainingFound = RemainingFound()
+    learned_law: LearnedFound | None = None
+    analysis: tuple[AnalysisFound, ...] = ()
     cosimulation: DifferenceFound = DifferenceFound()
     live: LiveFound | None = None
     angle_unit: str = "rad"
-    summary: tuple[str, ...] = ()
-    seconds: float | None = None
