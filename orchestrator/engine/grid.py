@@ -20,7 +20,9 @@ MAX_CASES = 10**9  # a Sobol sequence has 2**30 points
 
 
 class Design(Protocol):
-    """Rows of parameter values, computed on demand."""
+    """Rows of parameter values, computed on demand; a dataclass, whose fields and ``kind`` determine every row."""
+
+    kind: ClassVar[str]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -33,12 +35,14 @@ class Design(Protocol):
 
     def definition(self) -> Mapping[str, Any]:
         """Return plain JSON data that determine every row."""
+        return {"kind": self.kind, **asdict(self)}  # type: ignore[call-overload]
 
 
 @dataclass(frozen=True)
 class Listed(Design):
     """The given values of one parameter, in the given order."""
 
+    kind = "list"
     name: str
     values: tuple[Value, ...]
 
@@ -58,14 +62,12 @@ class Listed(Design):
     def row(self, index: int) -> tuple[Value, ...]:
         return (self.values[index],)
 
-    def definition(self) -> Mapping[str, Any]:
-        return {"kind": "list", **asdict(self)}
-
 
 @dataclass(frozen=True)
 class Ranged(Design):
     """``count`` values of one parameter from ``first`` to ``last``, both included, evenly or log-evenly spaced."""
 
+    kind = "range"
     name: str
     first: float
     last: float
@@ -95,9 +97,6 @@ class Ranged(Design):
         if index == self.count - 1:
             return (self.last,)
         return (_between(self.first, self.last, index / (self.count - 1), self.logarithmic),)
-
-    def definition(self) -> Mapping[str, Any]:
-        return {"kind": "range", **asdict(self)}
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,6 @@ class _Drawn(Design):
     bounds: tuple[Bounds, ...]
     count: int
     seed: int
-    kind: ClassVar[str]
 
     def __post_init__(self) -> None:
         _positive_count("samples", self.count)
@@ -151,9 +149,6 @@ class _Drawn(Design):
     def _fractions(self, index: int) -> np.ndarray:
         """Return where point ``index`` lies within the bounds, each in [0, 1)."""
         raise NotImplementedError
-
-    def definition(self) -> Mapping[str, Any]:
-        return {"kind": self.kind, **asdict(self)}
 
 
 class Randomised(_Drawn):
@@ -180,6 +175,7 @@ class Sobol(_Drawn):
 class Product(Design):
     """Every combination of the rows of several designs; the last design varies fastest."""
 
+    kind = "product"
     designs: tuple[Design, ...]
 
     def __post_init__(self) -> None:
@@ -209,7 +205,7 @@ class Product(Design):
 
     def definition(self) -> Mapping[str, Any]:
         """Return kind and the parts' definitions."""
-        return {"kind": "product", "designs": [d.definition() for d in self.designs]}
+        return {"kind": self.kind, "designs": [d.definition() for d in self.designs]}
 
 
 @dataclass(frozen=True)

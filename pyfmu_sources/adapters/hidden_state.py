@@ -13,9 +13,13 @@ def hidden_names(cls: type) -> tuple[str, ...]:
     return tuple(name for name, kind in own.items() if not str(kind).startswith("ClassVar"))
 
 
-@cache
 def hidden_type(cls: Any, name: str) -> Any:
     """Return the type that is declared for an attribute."""
+    return _type_of(cls, name)
+
+
+@cache
+def _type_of(cls: Any, name: str) -> Any:
     home = next(base for base in cls.__mro__ if name in vars(base).get("__annotations__", {}))
     return eval(home.__annotations__[name], vars(sys.modules[home.__module__]))
 
