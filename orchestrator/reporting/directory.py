@@ -39,7 +39,8 @@ def report_from_directory(directory: Path, command: str | None = None) -> Report
     source = load(directory, command or found[0])
     try:
         report: Report = _page_of(source.command).build(source)
-        return replace(report, about=source.about())
+        made = source.origin(*report.origin)
+        return replace(report, about=source.about(), origin=made, downloads=source.downloads())
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         reason = f"{type(error).__name__}: {error}"
         raise ScenarioError(f"{directory / source.command}.json must hold results of this version ({reason})") from None

@@ -8,22 +8,14 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from orchestrator.reporting.model import Facts, Findings, Fold, Plot, Report, Section, Text
+from orchestrator.reporting.model import Fold, Report
 from orchestrator.reporting.plots import asset, in_script, plot_data, plot_script, plot_style, rows_of_a_curve
 from orchestrator.reporting.quantities import angle_attributes, mark_prose, mark_unit
 from orchestrator.shared.numbers import cell_text
-from orchestrator.shared.results.fields import Cell, ReportTable
+from orchestrator.shared.results.fields import Cell
 
 EMBED_LIMIT = 1_000_000
 LONG_TEXT = 40
-_KINDS = {
-    Text: "text",
-    Facts: "facts",
-    ReportTable: "table",
-    Plot: "plot",
-    Findings: "findings",
-    Fold: "fold",
-}
 
 
 def render(report: Report, rows: int | None = None) -> str:
@@ -31,17 +23,14 @@ def render(report: Report, rows: int | None = None) -> str:
 
     It depends on the report and the files named in ``downloads`` only, never on the date.
     """
-    return (
-        _environment()
-        .get_template("page.html")
-        .render(
-            report=report,
-            rows=rows or rows_of_a_curve([part for part in report.all_sections() if isinstance(part, Plot)]),
-            folds=any(isinstance(section, Fold) for section in report.sections),
-            downloads=[_download(path) for path in report.downloads],
-            style=Markup(plot_style()),
-            script=Markup(f"{plot_script()}\n{asset('page.js')}"),
-        )
+    page = _environment().get_template("page.html")
+    return page.render(
+        report=report,
+        rows=rows or rows_of_a_curve(report.plots()),
+        folds=any(isinstance(section, Fold) for section in report.sections),
+        downloads=[_download(path) for path in report.downloads],
+        style=Markup(plot_style()),
+        script=Markup(f"{plot_script()}\n{asset('page.js')}"),
     )
 
 
@@ -63,12 +52,8 @@ def _environment() -> jinja2.Environment:
         "sort_key": _sort_key,
         "cell_class": _cell_class,
     }
-    environment.globals["kind"] = _kind
+    environment.globals["kind"] = lambda section: type(section).__name__.removeprefix("Report").lower()  # its template
     return environment
-
-
-def _kind(section: Section) -> str:
-    return _KINDS[type(section)]
 
 
 def _sort_key(value: Cell) -> str:

@@ -1,8 +1,8 @@
 """Which command lines a page may ask for: commands, their files, and the options that the workbench offers."""
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from orchestrator.errors import InputError
@@ -10,6 +10,8 @@ from orchestrator.estimation.protocol import METHODS
 from orchestrator.workbench.session import SessionFolder
 
 MOST_INPUTS, MOST_EFFECTS = 20, 100
+# A parameter of an instance, and the values that it takes.
+_VALUES = re.compile(r"[^=,\s][^=,]*=(?:range|logrange):[-+.e\d]+:[-+.e\d]+:\d{1,4}")
 Reader = Callable[[Any, str, SessionFolder], str | None]
 
 
@@ -56,45 +58,42 @@ def _is_effect(value: Any) -> bool:
     return isinstance(value, str) and len(value) <= 300 and value.isprintable() and "@" in value
 
 
-@dataclass(frozen=True)
-class CommandForm:
-    """A command as pages may ask for it."""
-
-    inputs: tuple[int, int]  # least and most number of files
-    # how the value of each option becomes text; an empty text is an option without a value
-    options: Mapping[str, Reader] = field(default_factory=dict)
-    words: tuple[str, ...] = ()  # that stand behind the command's name
+def _values(value: Any, name: str, session: SessionFolder) -> str:
+    if not isinstance(value, str) or len(value) > 300 or not _VALUES.fullmatch(value):
+        raise InputError(f"`{name}` must be such as plant.alpha=range:0:0.05:6, but is {str(value)[:60]!r}")
+    return value
 
 
-_READING: dict[str, Reader] = {
-    "part": _part, "resample": _one_of("uniform", "linear", "cubic"), "rate": _number, "header": _number,
-}  # fmt: skip
-FORMS: dict[str, CommandForm] = {
-    "inspect": CommandForm((1, 1), {"model": _file, **_READING}),
-    "estimate": CommandForm(
-        (0, MOST_INPUTS),
-        {
-            "model": _file, "motor_only": _flag, "time_limit": _number, "no_diagnose": _flag,
-            "method": _one_of(*METHODS, "all"), "design": _flag, "size": _number, "torque_limit": _number,
-            "speed_limit": _number, "duration": _number, **_READING,
-        },
+# How the value of each option becomes text; an empty text is an option without a value.
+OPTIONS: Mapping[str, Reader] = {
+    **dict.fromkeys(("model", "settings", "fmu", "map", "validate", "test", "scenario"), _file),
+    **dict.fromkeys(
+        ("motor_only", "no_diagnose", "design", "draft_map", "no_search", "static", "native", "force"), _flag
     ),
-    "diagnose": CommandForm(
-        (1, MOST_INPUTS),
-        {
-            "model": _file, "settings": _file, "fmu": _file, "map": _file, "draft_map": _flag, "validate": _file,
-            "test": _file, "no_search": _flag, "effects": _effects, "time_limit": _number,
-            **_READING,
-        },
+    **dict.fromkeys(
+        ("rate", "header", "time_limit", "size", "torque_limit", "speed_limit", "duration", "impact_speed"), _number
     ),
-    "calibrate": CommandForm((1, 1), {"fmu": _file, "map": _file}),
-    "check": CommandForm((1, MOST_INPUTS), {"static": _flag, "time_limit": _number}),
-    "simulate": CommandForm((0, 0), {"scenario": _file, "time_limit": _number}),
-    "compensate": CommandForm(
-        (0, 0), {"model": _file, "impact_speed": _number, "torque_limit": _number, "native": _flag, "force": _flag}
+    "part": _part,
+    "resample": _one_of("uniform", "linear", "cubic"),
+    "method": _one_of(*METHODS, "all"),
+    "effects": _effects,
+    "vary": _values,
+}
+_READING, _LIMITS = "part resample rate header", "size torque_limit speed_limit duration"
+# Of each command that a page may ask for: least and most number of files, and its options.
+FORMS: Mapping[str, tuple[int, int, str]] = {
+    "inspect": (1, 1, f"model {_READING}"),
+    "estimate": (0, MOST_INPUTS, f"model motor_only time_limit no_diagnose method design {_LIMITS} {_READING}"),
+    "diagnose": (
+        1, MOST_INPUTS, f"model settings fmu map draft_map validate test no_search effects time_limit {_READING}",
     ),
-    "regulator": CommandForm((0, 0), {"model": _file}),
-    "ssp": CommandForm((1, 1), {"time_limit": _number}, ("run",)),
+    "calibrate": (1, 1, "fmu map"),
+    "check": (1, MOST_INPUTS, "static time_limit"),
+    "simulate": (0, 0, "scenario time_limit"),
+    "sweep": (0, 0, "scenario vary time_limit"),
+    "compensate": (0, 0, "model impact_speed torque_limit native force"),
+    "regulator": (0, 0, "model"),
+    "ssp": (1, 1, "time_limit"),
 }  # fmt: skip
 
 
@@ -107,18 +106,16 @@ def command_line(session: SessionFolder, command: Any, inputs: Any, options: Any
     form = FORMS.get(command) if isinstance(command, str) else None
     if form is None:
         raise InputError(f"`command` must be one of {', '.join(FORMS)}, but is {str(command)[:60]!r}")
-    least, most = form.inputs
+    least, most, known = form
     if not isinstance(inputs, Sequence) or isinstance(inputs, str) or not least <= len(inputs) <= most:
         raise InputError(f"`inputs` must be {least} to {most} files of this session")
     if not isinstance(options, Mapping):
         raise InputError("`options` must be a table")
-    words = [str(command), *form.words]
+    words = [str(command), *(["run"] if command == "ssp" else [])]
     for name, value in options.items():
-        reader = form.options.get(name)
-        if reader is None:
-            known = ", ".join(form.options) or "none"
+        if name not in known.split():
             raise InputError(f"`{str(name)[:60]}` must be an option of the workbench ({known}), but is not")
-        text = reader(value, name, session)
+        text = OPTIONS[name](value, name, session)
         if text is not None:  # `--rate=100`: no value can be taken for an option
             words.append(f"--{name.replace('_', '-')}" + (f"={text}" if text else ""))
     return [*words, *(_file(one, "inputs", session) for one in inputs)]

@@ -22,10 +22,11 @@ HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (b"cross-origin-opener-policy", b"same-origin"),
     (b"x-frame-options", b"SAMEORIGIN"),
-)
-PAGE_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
-    "connect-src 'self'; frame-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'self'"
+    (
+        b"content-security-policy",
+        b"default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+        b"connect-src 'self'; frame-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'self'",
+    ),
 )
 
 
@@ -33,7 +34,7 @@ class Guard:
     """An application behind a token; what does not know it, or comes from elsewhere, gets one line and no more.
 
     Args:
-        app: the application; it sees paths without the token.
+        app: the application; its routes have no token.
         token: what the first part of a path must be.
         port: that requests must name as the one they came to.
     """
@@ -53,10 +54,7 @@ class Guard:
         if refusal:
             await _refuse(send, refusal)
             return
-        _, token, *rest = scope["path"].split("/")
-        inner = {**scope, "path": "/" + "/".join(rest), "root_path": f"/{token}"}
-        inner.pop("raw_path", None)
-        await self._app(inner, receive, _with_headers(send))
+        await self._app({**scope, "root_path": f"/{self._token}"}, receive, _with_headers(send))
 
     def _refusal(self, scope: Scope) -> str:
         """Return why a request is not answered; empty: it is."""

@@ -6,10 +6,9 @@ import math
 import re
 import secrets
 import socket
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +18,18 @@ from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response
-from starlette.routing import Route
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
 
 from orchestrator.errors import InputError, OrchestratorError, RecordError
 from orchestrator.records.model_file import read_model
 from orchestrator.records.preview import LogPreview
 from orchestrator.reporting import render
-from orchestrator.reporting.plots import SCRIPTS
 from orchestrator.shared.output import write_whole
 from orchestrator.workbench.command_lines import command_line
 from orchestrator.workbench.compare import compare_results
 from orchestrator.workbench.curves import CurvesAsked, CurvesShown, LookAsked
-from orchestrator.workbench.guard import PAGE_POLICY, Guard
+from orchestrator.workbench.guard import Guard
 from orchestrator.workbench.jobs import Jobs
 from orchestrator.workbench.log_readers import LogReaders
 from orchestrator.workbench.model_fields import model_fields, model_text
@@ -45,10 +44,11 @@ from orchestrator.workbench.uploads import UploadTooLargeError, save_upload
 _SHOWN = {".html": "text/html; charset=utf-8", ".png": "image/png", ".json": "application/json",
           ".txt": "text/plain; charset=utf-8", ".toml": "text/plain; charset=utf-8"}  # fmt: skip
 _RESULT_POLICY = "sandbox allow-scripts allow-downloads allow-popups; frame-ancestors 'self'"
-_KINDS = {".css": "text/css", ".js": "text/javascript", ".html": "text/html", ".svg": "image/svg+xml",
-          ".csv": "text/csv; charset=utf-8"}  # fmt: skip
 _OPTION_IN_ADVICE = re.compile(r"\s*\(`(--)?model`\)")
-Answer = Callable[[Request], Awaitable[Response]]
+# The status of an answer that is an error's own line; the first kind that it is counts.
+_STATUS = {UploadTooLargeError: 413, RecordError: 422, InputError: 400, OrchestratorError: 500, OSError: 507}
+_PLOTS = ("orchestrator.reporting", "templates")  # styles and plots are the reports' own
+_OWN_PAGE = Path(__file__).parent / "static" / "index.html"
 
 
 @dataclass
@@ -86,7 +86,7 @@ class Workbench:
             self.session, request.path_params["name"], request.stream(), int(stated) if stated.isdigit() else None,
             self.settings,
         )  # fmt: skip
-        return JSONResponse({"file": self.session.reference_of(path), "name": path.name}, 201)
+        return self._written(path)
 
     async def columns(self, request: Request) -> Response:
         """Return what a log holds and what its columns would be taken from, with the choices of the page."""
@@ -118,10 +118,7 @@ class Workbench:
         return log
 
     async def _read(self, log: Path, asked: LookAsked | CurvesAsked, answer: type[Any]) -> Response:
-        try:
-            found = await self.readers.ask(log, asked, answer)
-        except RecordError as error:
-            return _problem(str(error), 422)
+        found = await self.readers.ask(log, asked, answer)
         return Response(msgspec.json.encode(found), media_type="application/json")
 
     async def read_fields(self, request: Request) -> Response:
@@ -145,8 +142,7 @@ class Workbench:
             raise InputError(str(error).replace(str(draft), "the model")) from None
         finally:
             draft.unlink(missing_ok=True)
-        path = self.session.write_file(str(asked.get("name") or "machine.toml"), text)
-        return JSONResponse({"file": self.session.reference_of(path), "name": path.name}, 201)
+        return self._written(self.session.write_file(str(asked.get("name") or "machine.toml"), text))
 
     async def start(self, request: Request) -> Response:
         """Start a command."""
@@ -188,8 +184,7 @@ class Workbench:
         """Write a scenario that was drawn; whether it fits, its run says."""
         asked = await self._asked(request)
         text = scenario_text(self.session, asked)
-        path = self.session.write_file(str(asked.get("name") or "scenario.toml"), text)
-        return JSONResponse({"file": self.session.reference_of(path), "name": path.name, "text": text}, 201)
+        return self._written(self.session.write_file(str(asked.get("name") or "scenario.toml"), text))
 
     async def sliders(self, request: Request) -> Response:
         """Return the sliders of a result's model, and what was measured."""
@@ -228,6 +223,9 @@ class Workbench:
             raise InputError("the request must be a JSON object, but is not")
         return asked
 
+    def _written(self, path: Path) -> Response:
+        return JSONResponse({"file": self.session.reference_of(path), "name": path.name}, 201)
+
     def _scratch(self, text: str) -> Path:
         """Write a model file for one look."""
         path = self.session.folder / f".look-{secrets.token_hex(8)}.toml"
@@ -247,44 +245,16 @@ def _problem(text: str, status: int) -> JSONResponse:
     return JSONResponse({"error": _OPTION_IN_ADVICE.sub("", text) or "the command gave no answer"}, status)
 
 
-def _answer_in_words(answer: Answer) -> Answer:
-    """Return a route whose errors are a line that the page shows."""
-
-    async def route(request: Request) -> Response:
-        try:
-            return await answer(request)
-        except UploadTooLargeError as error:
-            return _problem(str(error), 413)
-        except InputError as error:
-            return _problem(str(error), 400)
-        except OrchestratorError as error:
-            return _problem(str(error), 500)
-        except ClientDisconnect:
-            return Response(status_code=400)
-        except OSError as error:
-            return _problem(f"the session's directory cannot be used: {error.strerror}", 507)
-
-    return route
+async def _in_words(request: Request, error: Exception) -> Response:
+    """Return an error as a line that the page shows."""
+    status = next((code for kind, code in _STATUS.items() if isinstance(error, kind)), 400)
+    said = f"the session's directory cannot be used: {error.strerror}" if isinstance(error, OSError) else str(error)
+    return _problem(said, status)
 
 
 async def _page(request: Request) -> Response:
-    """Hand out the workbench's own page, styles and modules."""
-    name = request.path_params.get("name", "index.html")
-    assets = _assets()
-    if name not in assets:
-        return Response("not found\n", 404, media_type="text/plain")
-    package, folder = assets[name]
-    body = files(package).joinpath(folder, name).read_bytes()
-    kind = _KINDS[Path(name).suffix]
-    headers = {"content-security-policy": PAGE_POLICY} if kind == "text/html" else {}
-    return Response(body, media_type=kind, headers=headers)
-
-
-def _assets() -> Mapping[str, tuple[str, str]]:
-    """Return package and folder of each file that belongs to the page; styles and plots are the reports' own."""
-    own = {entry.name for entry in files("orchestrator.workbench").joinpath("static").iterdir()}
-    shared = dict.fromkeys(("page.css", *SCRIPTS), ("orchestrator.reporting", "templates"))
-    return {name: ("orchestrator.workbench", "static") for name in own if Path(name).suffix in _KINDS} | shared
+    """Hand out the workbench's own page."""
+    return FileResponse(_OWN_PAGE)
 
 
 def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlette:
@@ -304,25 +274,26 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
 
     routes = [
         Route("/", _page),
-        Route("/static/{name}", _page),
-        Route("/state", _answer_in_words(workbench.state)),
-        Route("/notes", _answer_in_words(workbench.keep), methods=["POST"]),
-        Route("/upload/{name:path}", _answer_in_words(workbench.upload), methods=["PUT"]),
-        Route("/columns", _answer_in_words(workbench.columns), methods=["POST"]),
-        Route("/curves", _answer_in_words(workbench.curves), methods=["POST"]),
-        Route("/model", _answer_in_words(workbench.read_fields)),
-        Route("/models", _answer_in_words(workbench.write_model), methods=["POST"]),
-        Route("/jobs", _answer_in_words(workbench.start), methods=["POST"]),
-        Route("/jobs/{name}/stop", _answer_in_words(workbench.stop), methods=["POST"]),
-        Route("/jobs/{name}/remove", _answer_in_words(workbench.remove), methods=["POST"]),
-        Route("/variables", _answer_in_words(workbench.variables)),
-        Route("/scenarios", _answer_in_words(workbench.write_scenario), methods=["POST"]),
-        Route("/sliders", _answer_in_words(workbench.sliders)),
-        Route("/simulate", _answer_in_words(workbench.simulate), methods=["POST"]),
-        Route("/compare", _answer_in_words(workbench.compare)),
-        Route("/file/{reference:path}", _answer_in_words(workbench.file)),
+        Mount("/static", StaticFiles(packages=[("orchestrator.workbench", "static"), _PLOTS])),
+        Route("/state", workbench.state),
+        Route("/notes", workbench.keep, methods=["POST"]),
+        Route("/upload/{name:path}", workbench.upload, methods=["PUT"]),
+        Route("/columns", workbench.columns, methods=["POST"]),
+        Route("/curves", workbench.curves, methods=["POST"]),
+        Route("/model", workbench.read_fields),
+        Route("/models", workbench.write_model, methods=["POST"]),
+        Route("/jobs", workbench.start, methods=["POST"]),
+        Route("/jobs/{name}/stop", workbench.stop, methods=["POST"]),
+        Route("/jobs/{name}/remove", workbench.remove, methods=["POST"]),
+        Route("/variables", workbench.variables),
+        Route("/scenarios", workbench.write_scenario, methods=["POST"]),
+        Route("/sliders", workbench.sliders),
+        Route("/simulate", workbench.simulate, methods=["POST"]),
+        Route("/compare", workbench.compare),
+        Route("/file/{reference:path}", workbench.file),
     ]
-    return Starlette(routes=routes, lifespan=lifespan)
+    errors = dict.fromkeys((*_STATUS, ClientDisconnect), _in_words)
+    return Starlette(routes=routes, lifespan=lifespan, exception_handlers=errors)  # type: ignore[arg-type]
 
 
 def serve(

@@ -95,6 +95,12 @@ def pick(driver: Any, css: str, text: str) -> None:
     wait(driver, is_picked)
 
 
+def labelled(driver: Any, text: str) -> str:
+    """Return the id of the control that a label of the tab in sight belongs to."""
+    label = f"//*[@role='tabpanel'][not(@hidden)]//label[normalize-space()='{text}']"
+    return str(wait(driver, lambda d: d.find_element("xpath", label).get_attribute("for")))
+
+
 def choose_tab(driver: Any, name: str) -> None:
     def click(driver: Any) -> bool:
         driver.execute_script("scrollTo({ top: 0, behavior: 'instant' })")
@@ -328,6 +334,18 @@ def test_outputs_are_connected_to_inputs_of_the_same_quantity(inspected: Any, se
     press(inspected, "Run the scenario")
     find(inspected, "#panel-fmus iframe")
     assert served.job("simulate-1")["state"] == "done"
+    summaries = "[...document.querySelectorAll('#panel-fmus summary')]"
+    inspected.execute_script(f"{summaries}.find((one) => one.textContent === 'Sweep a parameter').click()")
+    pick(inspected, f"#{labelled(inspected, 'Parameter')}", "drivetrain.alpha")
+    for text, value in (("from", "0"), ("to", "0,04"), ("runs", "2")):
+        place = find(inspected, f"#{labelled(inspected, text)}")
+        place.clear()
+        place.send_keys(f"{value}\t")
+    press(inspected, "Run the sweep")
+    find(inspected, "#panel-fmus iframe[title='Page of sweep-1']")
+    assert served.job("sweep-1")["line"].count("--vary=drivetrain.alpha=range:0:0.04:2") == 1
+    rows = (served.folder / "results" / "sweep-1" / "sweep.csv").read_text().splitlines()
+    assert len(rows) == 3
     assert severe(inspected) == []
     set_screen(inspected, 1280, 900, "light")
 

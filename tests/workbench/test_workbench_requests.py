@@ -65,7 +65,7 @@ def test_the_page_itself_is_answered(served: Served) -> None:
     assert status == 200
     for name in ("main.js", "page.css", "workbench.css"):
         assert served.ask("GET", f"static/{name}")[0] == 200
-    for name in ("server.py", "..%2fserver.py", "../guard.py", "page.html"):
+    for name in ("server.py", "..%2fserver.py", "../guard.py", "../../errors.py"):
         assert served.ask("GET", f"static/{name}")[0] == 404
 
 
@@ -207,7 +207,8 @@ def test_uploads_are_never_shown_as_pages(served: Served) -> None:
 @pytest.mark.parametrize(
     ("asked", "word"),
     [
-        ({"command": "sweep", "inputs": []}, "command"),
+        ({"command": "sweep", "inputs": [], "options": {"vary": "a.b=range:0:1:5 --trust"}}, "vary"),
+        ({"command": "sweep", "inputs": [], "options": {"scheduler": "tcp://a:1"}}, "scheduler"),
         ({"command": "workbench", "inputs": []}, "command"),
         ({"command": ["check"], "inputs": []}, "command"),
         ({"command": "inspect", "inputs": []}, "inputs"),

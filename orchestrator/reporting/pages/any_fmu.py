@@ -1,10 +1,11 @@
 """The page of a diagnosis of any FMU: what is missing around it, how far the misfit shrinks, what is left."""
 
-from orchestrator.reporting.model import Facts, Plot, Report, Section, Series, Span, Text
+from collections.abc import Iterator
+
+from orchestrator.reporting.model import Facts, Plot, Report, Section, Span, Text
 from orchestrator.reporting.pages.diagnosis_answer import (
     answer_table,
     headline,
-    in_words,
     next_steps,
     worth_on_test_data,
 )
@@ -15,6 +16,7 @@ from orchestrator.reporting.pages.diagnosis_tables import (
     parameter_table,
 )
 from orchestrator.reporting.pages.generic import folds_of
+from orchestrator.reporting.pages.record import signal_plots
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.arrays import Array
@@ -23,20 +25,17 @@ from orchestrator.shared.results.any_fmu import FmuDiagnosisFound, FmuRemainingF
 from orchestrator.shared.results.diagnose import misfit_tables
 from orchestrator.shared.results.fields import Cell, fields_table
 
-STAGES = {"nominal": "model as given", "refitted": "with re-fitted parameters", "corrected": "with the effects"}
-
 
 def build(source: ResultDocument) -> Report:
     """Return the page."""
     found = read(source.results, FmuDiagnosisFound)
-    badge, label, _ = VERDICTS.get(found.verdict, ("neutral", found.verdict, ""))
+    badge, label = VERDICTS.get(found.verdict, ("neutral", found.verdict))
     table = source.signals("diagnose.csv")
     made = (("walls", found.walls), ("runs of the FMU", found.runs), ("time taken [s]", found.seconds))
     reasons = () if found.trust is None else found.trust.reasons
     notes = tuple(text for text in found.notes if text not in reasons)
     folds: dict[str, list[Section]] = {
         "Take note": [Text("Notes", notes)] if notes else [],
-        "In words": in_words([text for text in found.summary if text not in reasons]),
         "Evidence for each effect": [
             one.without_empty_columns() for one in evidence_table(found.effects, "outputs' misfit")
         ],
@@ -49,7 +48,7 @@ def build(source: ResultDocument) -> Report:
     }
     return Report(
         title="Diagnosis of an FMU",
-        summary=headline(found.summary) or f"{label[:1].upper()}{label[1:]}.",
+        summary=headline(found.summary),
         badge=trust_badge(found.trust, label, badge),
         sections=(
             *answer_table(found.effects, found.test),
@@ -59,8 +58,7 @@ def build(source: ResultDocument) -> Report:
             *([fields_table("Corrected system", found.delivery)] if found.delivery else []),
             *folds_of(folds),
         ),
-        origin=source.origin(*made),
-        downloads=source.downloads(),
+        origin=made,
     )
 
 
@@ -72,19 +70,12 @@ def _test_part(results: FmuDiagnosisFound, table: dict[str, Array]) -> dict[str,
     return {name: values[rows] for name, values in table.items()}
 
 
-def _output_plots(results: FmuDiagnosisFound, table: dict[str, Array]) -> list[Section]:
-    """Return each output, measured and simulated, and what each simulation misses of it; shaded: test data."""
-    units = {name: misfit.unit for test in results.test for name, misfit in test.misfit.items()}
-    made: list[Section] = []
-    for name in (n for n in units if n in table and "time" in table):
-        time, unit = table["time"], units[name]
-        test = () if results.test_start is None else (Span(results.test_start, float(time[-1]), "test data"),)
-        runs = {word: table[f"{name}_{stage}"] for stage, word in STAGES.items() if f"{name}_{stage}" in table}
-        left = tuple(Series(word, time, run - table[name]) for word, run in runs.items())
-        both = (Series("measured", time, table[name]), *(Series(word, time, run) for word, run in runs.items()))
-        made.append(Plot(f"{name}: simulated minus measured", "time [s]", f"difference [{unit}]", left, test))
-        made.append(Plot(name, "time [s]", f"{name} [{unit}]", both, test))
-    return made
+def _output_plots(results: FmuDiagnosisFound, table: dict[str, Array]) -> Iterator[Plot]:
+    """Yield each output, measured and simulated, and what each simulation misses of it; shaded: test data."""
+    units = {name: (name, misfit.unit) for test in results.test for name, misfit in test.misfit.items()}
+    start, time = results.test_start, table.get("time", ())
+    test = () if start is None or not len(time) else (Span(start, float(time[-1]), "test data"),)
+    return signal_plots(table, signals=units, shaded=test)
 
 
 def _residual_sections(remaining: FmuRemainingFound) -> list[Section]:

@@ -22,5 +22,5 @@ def build(source: ResultDocument) -> Report:
         sections.append(Text("Take note", notes))
     sections += calibration_tables(found)
     badge = trust_badge(found.trust, label, "good" if found.explained else "bad")
-    origin = source.origin(("walls", found.walls), ("time taken [s]", found.seconds))
-    return Report("Calibration of an FMU", summary, tuple(sections), badge, origin, source.downloads())
+    origin = (("walls", found.walls), ("time taken [s]", found.seconds))
+    return Report("Calibration of an FMU", summary, tuple(sections), badge, origin)

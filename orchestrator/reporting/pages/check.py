@@ -23,8 +23,6 @@ def build(source: ResultDocument) -> Report:
         ),
         badge=("good", "passed") if good == len(fmus) else ("bad", f"{len(fmus) - good} failed"),
         sections=tuple(sections),
-        origin=source.origin(),
-        downloads=source.downloads(),
     )
 
 

@@ -39,8 +39,6 @@ def build(source: ResultDocument) -> Report:
             Plot("The first traversal of each law", "time [s]", label, (quickest, *paths)),
             *rest_facts(results.forecast, "The plain LQR"),
         ),
-        origin=source.origin(),
-        downloads=source.downloads(),
     )
 
 

@@ -16,7 +16,6 @@ from orchestrator.reporting.pages.diagnosis_answer import (
     SIZES,
     answer_table,
     headline,
-    in_words,
     next_steps,
     worth_on_test_data,
 )
@@ -52,7 +51,7 @@ def build(source: ResultDocument) -> Report:
     if source.results.get("kind") == "fmu":
         return any_fmu.build(source)
     results = read(source.results, DiagnoseFound)
-    badge, label, sentence = VERDICTS[results.verdict]
+    badge, label = VERDICTS[results.verdict]
     table, live = source.signals("diagnose.csv"), results.live
     restarts = live.rows if live else ()
     sections: list[Section] = [
@@ -65,7 +64,6 @@ def build(source: ResultDocument) -> Report:
     metric = any(signal.unit == "m" for test in results.test for signal in test.misfit.values())
     folds: dict[str, list[Section]] = {
         "Take note": [Text("Notes", notes)] if notes else [],
-        "In words": in_words(results.summary),
         "Evidence for each effect": [
             *evidence_table(results.effects),
             *_missing_plots(results.effects),
@@ -82,11 +80,10 @@ def build(source: ResultDocument) -> Report:
     sections += folds_of(folds)
     return Report(
         title="Diagnosis",
-        summary=headline(results.summary) or " ".join(filter(None, [sentence, _effect_names(results.effects)])),
+        summary=headline(results.summary),
         badge=trust_badge(results.trust, label, badge),
         sections=tuple(sections),
-        origin=source.origin(("corrected model", results.model), ("time taken [s]", results.seconds)),
-        downloads=source.downloads(),
+        origin=(("corrected model", results.model), ("time taken [s]", results.seconds)),
         angle_unit=results.angle_unit,
     )
 
@@ -113,12 +110,6 @@ def _tests(results: DiagnoseFound) -> list[Section]:
 
 def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
-
-
-def _effect_names(effects: Sequence[EffectFound]) -> str:
-    named = [f"{place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
-    listed = " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]]))
-    return f"The model lacks {listed}." if named else ""
 
 
 def _missing_plots(effects: Sequence[EffectFound]) -> list[Section]:

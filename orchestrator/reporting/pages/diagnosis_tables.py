@@ -7,11 +7,11 @@ from orchestrator.reporting.model import Badge
 from orchestrator.shared.results.diagnose import TAKES, EffectFound, ParameterFound, StepFound, percent
 from orchestrator.shared.results.fields import Cell, ReportTable, TableColumn, fields_table
 
-VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
-    "none": ("good", "nothing is missing", "The model explains the record."),
-    "parameters": ("good", "some values are off", "The model explains the record once its parameters are re-fitted."),
-    "effects": ("neutral", "effects are missing", ""),
-    "unknown": ("bad", "unexplained", "Something is missing in the model, and no effect of the library is likely."),
+VERDICTS: Mapping[str, tuple[Badge, str]] = {
+    "none": ("good", "nothing is missing"),
+    "parameters": ("good", "some values are off"),
+    "effects": ("neutral", "effects are missing"),
+    "unknown": ("bad", "unexplained"),
 }
 
 

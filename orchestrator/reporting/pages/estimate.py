@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from orchestrator.effects.words import list_words, place_words
-from orchestrator.reporting.model import Badge, Facts, Plot, Report, Section, Series, Text
-from orchestrator.reporting.pages.generic import folds_of, sections_of
+from orchestrator.reporting.model import Badge, Plot, Report, Section, Series, Text
+from orchestrator.reporting.pages.generic import folds_of
 from orchestrator.reporting.pages.location import build_location
 from orchestrator.reporting.pages.meanings import fitted_parameters
 from orchestrator.reporting.pages.record import measured_and_fitted
@@ -44,12 +44,12 @@ def build(source: ResultDocument) -> Report:
         {
             "Measured and fitted": measured_and_fitted(source, "estimate.csv"),
             "How sharp the estimate is": _profile(source, diagnostics.get("profile_limit") or CHI_SQUARE_95),
-            "Values of the fit": [*fitted_parameters(fitted, results.live), *_diagnostics(found)],
+            "Values of the fit": fitted_parameters(fitted, results.live),
         }
     )
     badge, summary = _answer(results)
     unit = results.record.angle_unit if results.record else "rad"
-    return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads(), unit)
+    return Report("Backlash estimate", summary, tuple(sections), badge, angle_unit=unit)
 
 
 def _diagnosis_sections(results: EstimateFound) -> list[Section]:
@@ -174,13 +174,4 @@ def _design(source: ResultDocument, candidates: Sequence[ExcitationFound]) -> li
     if {"time", "u"} <= set(table):
         torque = Series("requested torque", table["time"], table["u"], "steps")
         made.append(Plot("The best excitation", "time [s]", "u [N.m]", (torque,)))
-    return made
-
-
-def _diagnostics(results: Methods) -> list[Section]:
-    made: list[Section] = []
-    for name, estimate in results.items():
-        given = {k: v for k, v in (estimate.diagnostics or {}).items() if k not in {"parameters", "lacking"}}
-        facts = [s for s in sections_of(f"Diagnostics of {words(name)}", given) if isinstance(s, Facts)]
-        made += facts[:1]
     return made

@@ -13,8 +13,6 @@ def build(source: ResultDocument) -> Report:
         title=source.command.capitalize(),
         summary=f"Results of `{source.command}`.",
         sections=tuple(sections_of("Results", source.results)),
-        origin=source.origin(),
-        downloads=source.downloads(),
     )
 
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from orchestrator.reporting.model import Badge, Facts, Plot, Report, Section, Series, Text
+from orchestrator.reporting.model import Badge, Facts, Report, Section, Text
 from orchestrator.reporting.pages.record import signal_plots
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.shared.results import read
@@ -20,17 +20,15 @@ def build(source: ResultDocument) -> Report:
         sections.append(Text("Assumed: put right in the model file", results.assumed))
     sections.append(Text("How the file was read", results.record.notes))
     sections += signal_plots(source.signals(RECORD))
-    sections += _spectrum(results)
     sections += [_facts(results), *inspect_tables(results)]
-    sections += _better(results)
+    if results.better_experiments:
+        sections.append(fields_table("Experiments of the same length, torque and speed", results.better_experiments))
     return Report(
         "Inspection of a record",
         results.verdict[0],
         tuple(sections),
         _badge(results),
-        source.origin(),
-        source.downloads(),
-        results.record.angle_unit,
+        angle_unit=results.record.angle_unit,
     )
 
 
@@ -60,18 +58,3 @@ def _facts(results: InspectFound) -> Facts:
         lag = f"{1e3 * delay.value:.3g} ± {1e3 * delay.standard_error:.2g}"
         facts.append(("lag of the load's angle [ms]", lag))
     return Facts("The record in numbers", tuple(facts))
-
-
-def _spectrum(results: InspectFound) -> list[Section]:
-    """Return the torque's power by frequency."""
-    bands = results.excitation
-    if not bands:
-        return []
-    shares = Series("share of the torque's power", list(range(len(bands))), [100.0 * b.share for b in bands], "bars")
-    names = tuple(f"{b.low:g} to {b.high:g}" for b in bands)
-    return [Plot("Excitation by frequency", "band [Hz]", "share of the power [%]", (shares,), categories=names)]
-
-
-def _better(results: InspectFound) -> list[Section]:
-    title = "Experiments of the same length, torque and speed"
-    return [fields_table(title, results.better_experiments)] if results.better_experiments else []

@@ -31,7 +31,7 @@ def build_location(source: ResultDocument, results: EstimateFound, location: Loc
     said = f"in {location.answer}" if location.answers else "nowhere seen"
     badge = trust_badge(results.trust, said, "good" if len(location.answers) == 1 else "warn")
     unit = results.record.angle_unit if results.record else "rad"
-    return Report("Where the gap is", summary, tuple(sections), badge, source.origin(), source.downloads(), unit)
+    return Report("Where the gap is", summary, tuple(sections), badge, angle_unit=unit)
 
 
 def _size(gap: GapFound) -> str:

@@ -20,7 +20,14 @@ SIGNALS = {
 # The same of an axis that moves in metres.
 METRIC = {"rad": "m", "rad/s": "m/s", "N.m": "N", "angle": "position", "torque": "force", "Twist": "Stretch"}
 GIVEN = {"u": "requested"}  # what is not measured
-RUNS = {"before": "model as given", "after": "corrected model"}
+RUNS = {  # endings of the columns of simulations
+    "fitted": "fitted",
+    "before": "model as given",
+    "nominal": "model as given",
+    "refitted": "with re-fitted parameters",
+    "after": "corrected model",
+    "corrected": "corrected model",
+}
 HELD = frozenset({"u"})  # from sample to sample
 ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
 MOST_SPANS = 1000
@@ -32,11 +39,14 @@ def metric_words(text: str, metric: bool) -> str:
     return " ".join(METRIC.get(word, word) for word in text.split()) if metric else text
 
 
-def signal_plots(table: Table, restarts: Sequence[int] = (), metric: bool = False) -> Iterator[Plot]:
+def signal_plots(
+    table: Table, restarts: Sequence[int] = (), metric: bool = False,
+    signals: Mapping[str, tuple[str, str]] = SIGNALS, shaded: tuple[Span, ...] = (),
+) -> Iterator[Plot]:  # fmt: skip
     """Yield plots against ``time`` of measured columns (``theta_m``) and simulated ones (``theta_m_after``).
 
     For each signal with simulated columns a plot of simulated minus measured comes first. None without a column
-    ``time``. ``metric``: the axis moves in metres.
+    ``time``. ``metric``: the axis moves in metres. ``signals``: title and unit by column.
     """
     if "time" not in table:
         return
@@ -44,20 +54,22 @@ def signal_plots(table: Table, restarts: Sequence[int] = (), metric: bool = Fals
     moments = tuple(Span(float(t), float(t), "free run starts anew") for t in time[list(restarts)] if np.isfinite(t))
     spans = out_of_contact(time, table["contact"]) if "contact" in table else ()
     note = "Shaded: the teeth are not in contact." if spans else ""
-    for signal, shown in SIGNALS.items():
+    for signal, shown in signals.items():
         title, unit = (metric_words(text, metric) for text in shown)
-        simulated = {_words(c, signal): v for c, v in table.items() if c.startswith(f"{signal}_")}
+        simulated = {name: table[f"{signal}_{run}"] for run, name in RUNS.items() if f"{signal}_{run}" in table}
         measured = table.get(signal)
         found = ({GIVEN.get(signal, "measured"): measured} if measured is not None else {}) | simulated
         if measured is not None and simulated:
             gaps = tuple(Series(name, time, values - measured) for name, values in simulated.items())
-            yield Plot(f"{title}: simulated minus measured", "time [s]", f"difference [{unit}]", gaps, moments)
+            yield Plot(
+                f"{title}: simulated minus measured", "time [s]", f"difference [{unit}]", gaps, (*shaded, *moments)
+            )
         if found:
             kind: Kind = "steps" if signal in HELD else "line"
             curves = tuple(Series(name, time, values, kind) for name, values in found.items())
-            label = f"{title.lower()} {signal if signal != 'twist' else ''}".strip()
-            shaded = (*spans, *(moments if simulated else ()))
-            yield Plot(title, "time [s]", f"{label} [{unit}]", curves, shaded, note=note)
+            label = title if signal in ("twist", title) else f"{title.lower()} {signal}"
+            marked = (*shaded, *spans, *(moments if simulated else ()))
+            yield Plot(title, "time [s]", f"{label} [{unit}]", curves, marked, note=note)
 
 
 def measured_and_fitted(source: ResultDocument, name: str) -> list[Section]:
@@ -67,11 +79,6 @@ def measured_and_fitted(source: ResultDocument, name: str) -> list[Section]:
     note = "Measured minus predicted one sample ahead: noise when the model is right."
     errors = [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)] if curves else []
     return [*signal_plots(table), *errors]
-
-
-def _words(column: str, signal: str) -> str:
-    ending = column.removeprefix(f"{signal}_")
-    return RUNS.get(ending, ending.replace("_", " "))
 
 
 def out_of_contact(time: Array, contact: Array) -> tuple[Span, ...]:

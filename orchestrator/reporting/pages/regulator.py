@@ -32,8 +32,6 @@ def build(source: ResultDocument) -> Report:
             Plot(OPEN_LOOP, "frequency [Hz]", "gain [dB]", (gain,), log_x=True),
             Plot("Open-loop phase", "frequency [Hz]", "phase [rad]", (phase,), log_x=True),
         ),
-        origin=source.origin(),
-        downloads=source.downloads(),
         angle_unit="deg",
     )
 

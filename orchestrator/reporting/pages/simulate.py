@@ -32,7 +32,7 @@ def build(source: ResultDocument) -> Report:
     title = "Simulation"
     if source.command == "ssp":
         title, summary = f"SSP file {file}", f"{_what_ran(file, read(results, SignalsFound), table)} {summary}"
-    return Report(title, summary, tuple(sections), None, source.origin(), source.downloads())
+    return Report(title, summary, tuple(sections))
 
 
 def _what_ran(file: str, results: SignalsFound, table: Columns) -> str:
@@ -50,7 +50,7 @@ def _page_of_export(source: ResultDocument, file: str) -> Report:
     components = ", ".join(str(name) for name in results.get("components") or ())
     summary = f"{file} was written: {components}; {results.get('connections', 0)} connections. It was not run."
     sections = tuple(sections_of("The file", results))
-    return Report(f"SSP file {file}", summary, sections, None, source.origin(), source.downloads())
+    return Report(f"SSP file {file}", summary, sections)
 
 
 def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[list[Section], str]:

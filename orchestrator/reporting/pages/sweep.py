@@ -3,20 +3,14 @@
 from collections.abc import Mapping, Sequence
 
 from orchestrator.errors import ScenarioError
-from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.reporting.model import POINT_LIMIT, Badge, Plot, Report, Section, Series
-from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.source import ResultDocument, by_column, numbers, plain, table_of, words
+from orchestrator.reporting.source import ResultDocument, by_column, numbers, plain, words
 from orchestrator.reporting.trust import trust_badge, trust_section
-from orchestrator.shared.results import ErrorsFound, SweepFound, TrustFound, as_plain, read
+from orchestrator.shared.results import ErrorsFound, SweepFound, TrustFound, read
 from orchestrator.shared.results.fields import ROW_LIMIT, Cell, ReportTable, TableColumn, fields_table
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
-EXPERIMENT_UNITS = {
-    "amplitude": "rad", "frequency": "Hz", "duration": "s", "sample_time": "s", "torque_limit": "N.m",
-    "assumed_encoder_noise": "rad", "encoder_noise": "rad", "smallest": "rad", "largest": "rad",
-}  # fmt: skip
 MOST_PLOTS = 12
 OWN = frozenset({"alpha", "noise", "repetition"})
 SUMMARIES = frozenset({"last", "min", "max", "mean", "rms"})
@@ -41,14 +35,11 @@ def build(source: ResultDocument) -> Report:
     else:
         sections += _signals(table, units)
     sections.append(_cases("Cases", first, UNITS | units, total))
-    sections += _provenance(results)
     return Report(
         title="Backlash sweep" if statistics else f"Sweep of {name}" if name else "Sweep",
         summary=_summary(statistics, total, failed) if statistics else _count(source, results),
         badge=_badge(results.trust, failed, total),
         sections=tuple(sections),
-        origin=source.origin(),
-        downloads=source.downloads(),
     )
 
 
@@ -204,22 +195,4 @@ def _whole(value: Cell) -> Cell:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _provenance(results: SweepFound) -> list[Section]:
-    made: list[Section] = []
-    calibrations = {noise: as_plain(calibration) for noise, calibration in results.calibrations.items()}
-    if calibrations:
-        made.append(
-            table_of("Calibrations", [{"noise [rad]": n, **c} for n, c in calibrations.items()], note=CALIBRATION_NOTE)
-        )
-    if results.experiment is not None:
-        settings = dict(results.experiment)
-        plant = settings.pop("values", None)
-        made += sections_of("Experiment", settings, EXPERIMENT_UNITS)
-        made += sections_of("Plant", plant, {entry.name: entry.unit for entry in DRIVETRAIN.table}) if plant else []
-    if results.fmus is not None:
-        made += sections_of("FMUs by content", results.fmus)
-    return made
-
-
 COVERAGE = "Intervals that hold the size: cases whose 95 % interval has the actual half-gap in it; 95 % are due."
-CALIBRATION_NOTE = "The monotone map from S to the half-gap, made from runs that no sweep uses."

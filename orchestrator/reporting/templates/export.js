@@ -2,7 +2,7 @@
 
 function save(plot, ending, kind, content) {
   const name = plot.data.title.replace(/[^\p{L}\p{N}]+/gu, "-").toLowerCase();
-  const link = element("a", { href: URL.createObjectURL(new Blob([content], { type: kind })), download: `${name}.${ending}` });
+  const link = make("a", { href: URL.createObjectURL(new Blob([content], { type: kind })), download: `${name}.${ending}` });
   link.click();
   URL.revokeObjectURL(link.href);
 }

@@ -46,7 +46,7 @@ class PlotFigure {
 
   build() {
     this.makeLegend();
-    const buttons = element("div", { class: "buttons" },
+    const buttons = make("div", { class: "buttons" },
       this.button("+", "Zoom in", () => this.zoom(0.5)),
       this.button("−", "Zoom out", () => this.zoom(2)),
       this.button("◀", "Move left", () => this.move(-0.25)),
@@ -55,19 +55,19 @@ class PlotFigure {
       this.button("SVG", "Save the picture as SVG", () => savePicture(this)),
       this.button("CSV", "Save the numbers in view as CSV", () => saveNumbers(this)));
     this.svg = shape("svg", { tabindex: 0, role: "img", "aria-label": this.description() });
-    this.tip = element("div", { class: "tip", hidden: "" });
-    this.spoken = element("div", { class: "quiet", "aria-live": "polite" });
-    this.figure.append(element("div", { class: "tools" }, this.legend, buttons), this.svg, this.tip, this.spoken);
+    this.tip = make("div", { class: "tip", hidden: "" });
+    this.spoken = make("div", { class: "quiet", "aria-live": "polite" });
+    this.figure.append(make("div", { class: "tools" }, this.legend, buttons), this.svg, this.tip, this.spoken);
     this.listen();
   }
 
   makeLegend() {
-    this.legend = element("div", { class: "legend" });
+    this.legend = make("div", { class: "legend" });
     this.data.series.forEach((series, n) => this.legend.append(this.legendButton(series, n)));
     for (const [name, span] of new Map(this.data.spans.map((span) => [span.name, span]))) {
-      this.legend.append(element("span", {}, swatch(span.start === span.end ? "var(--soft)" : "var(--span)"), name));
+      this.legend.append(make("span", {}, swatch(span.start === span.end ? "var(--soft)" : "var(--span)"), name));
     }
-    if (this.data.diagonal) this.legend.append(element("span", {}, swatch("var(--soft)"), "equal"));
+    if (this.data.diagonal) this.legend.append(make("span", {}, swatch("var(--soft)"), "equal"));
     return this.legend;
   }
 
@@ -79,13 +79,13 @@ class PlotFigure {
   }
 
   button(text, label, action) {
-    const made = element("button", { type: "button", "aria-label": `${label}: ${this.data.title}`, title: label }, text);
+    const made = make("button", { type: "button", "aria-label": `${label}: ${this.data.title}`, title: label }, text);
     made.addEventListener("click", action);
     return made;
   }
 
   legendButton(series, n) {
-    const made = element("button", { type: "button", "aria-pressed": "true" }, swatch(colour(n)), series.name);
+    const made = make("button", { type: "button", "aria-pressed": "true" }, swatch(colour(n)), series.name);
     made.addEventListener("click", () => {
       if (!this.hidden.delete(n)) this.hidden.add(n);
       made.setAttribute("aria-pressed", String(!this.hidden.has(n)));

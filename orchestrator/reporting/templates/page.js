@@ -8,7 +8,7 @@ function sortable(table) {
       heading.classList.add("number");
       cells.forEach((cell) => cell.classList.add("number"));
     }
-    const button = element("button", { type: "button" });
+    const button = make("button", { type: "button" });
     button.append(...heading.childNodes);
     heading.append(button);
     button.addEventListener("click", () => {
@@ -32,21 +32,7 @@ function sortRows(body, column, sign) {
   body.append(...[...body.rows].sort(compare));
 }
 
-// On a phone each row of a table that is wide, or does not fit, is a card of named values.
-function fitted(table) {
-  const box = table.parentElement;
-  const phone = matchMedia("screen and (max-width: 36rem)");
-  const fit = () => {
-    table.classList.remove("cards");
-    const wide = table.tHead.rows[0].cells.length > 3 || box.scrollWidth > box.clientWidth;
-    table.classList.toggle("cards", phone.matches && wide);
-  };
-  phone.addEventListener("change", fit);
-  fit();
-}
-
 document.querySelectorAll("table.sortable").forEach(sortable);
-document.querySelectorAll("table.sortable").forEach(fitted);
 document.querySelectorAll("figure.plot").forEach((figure) => new Plot(figure));
 unitSwitch(document.getElementById("units"));
 

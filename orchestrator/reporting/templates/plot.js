@@ -184,7 +184,7 @@ class Plot extends PlotFigure {
     if (!this.cursor) return;
     const { x, y } = this.pointAt(this.cursor);
     const words = this.words();
-    this.tip.replaceChildren(...words.map((text) => element("div", {}, text)));
+    this.tip.replaceChildren(...words.map((text) => make("div", {}, text)));
     if (speak) this.spoken.textContent = words.join(", ");
     if (Number.isNaN(x + y) || !this.x.holds(x)) return;
     const [px, py] = [this.x.pixel(x), this.y.pixel(y)];

@@ -1,18 +1,24 @@
-// Making elements.
+// Elements of HTML and SVG.
 function colour(n) {
   return `var(--s${n % 8})`;
 }
 
 function swatch(fill) {
-  const made = element("i", { "aria-hidden": "true" });
+  const made = make("i", { "aria-hidden": "true" });
   made.style.background = fill;
   return made;
 }
 
-function element(name, attributes = {}, ...children) {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...children);
+// Elements: make("button", { onclick: act, class: "main" }, "Text", child).
+function make(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (name in made && typeof value === "boolean") made[name] = value;
+    else if (name === "value") made.value = value;
+    else if (value !== null && value !== undefined && value !== false) made.setAttribute(name, value);
+  }
+  made.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
   return made;
 }
 

@@ -61,7 +61,7 @@ function unitSwitch(select) {
   const angular = [...document.querySelectorAll("[data-unit]")].some(({ dataset }) => ANGULAR.test(dataset.unit));
   if (!angular && !Plot.all.some((plot) => plot.isAngular())) return;
   select.parentElement.hidden = false;
-  select.append(...Object.keys(ANGLES).map((name) => element("option", { value: name }, name)));
+  select.append(...Object.keys(ANGLES).map((name) => make("option", { value: name }, name)));
   select.value = Units.chosen;
   select.addEventListener("change", () => Units.choose(select.value));
   if (Units.chosen !== "rad") Units.choose(Units.chosen);

@@ -17,21 +17,13 @@ export async function post(path, given = {}, last = false) {
   return answer(await fetch(path, { method: "POST", headers: { "content-type": "application/json" }, body, keepalive }));
 }
 
-// Send a file; `tell` is called with the share that is sent.
-export function upload(file, tell = () => {}) {
-  return new Promise((resolve, reject) => {
-    const request = new XMLHttpRequest();
-    request.open("PUT", `upload/${encodeURIComponent(file.name)}`);
-    request.upload.onprogress = (event) => event.lengthComputable && tell(event.loaded / event.total);
-    request.onload = () => {
-      let found = null;
-      try { found = JSON.parse(request.responseText); } catch { /* a line of words */ }
-      if (request.status === 201) resolve(found);
-      else reject(new Error(found?.error ?? (request.responseText.trim() || "the file was not taken")));
-    };
-    request.onerror = () => reject(new Error("the file was not taken: it is larger than the session allows, or the workbench has ended"));
-    request.send(file);
-  });
+export async function upload(file) {
+  try {
+    return await answer(await fetch(`upload/${encodeURIComponent(file.name)}`, { method: "PUT", body: file }));
+  } catch (error) {
+    if (!(error instanceof TypeError)) throw error;  // the connection was cut
+    throw new Error("the file was not taken: it is larger than the session allows, or the workbench has ended");
+  }
 }
 
 export const fileAddress = (reference) => `file/${reference.split("/").map(encodeURIComponent).join("/")}`;

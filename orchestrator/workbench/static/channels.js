@@ -1,5 +1,5 @@
 import { TITLES } from "./advice.js";
-import { choice, fill, make } from "./dom.js";
+import { choice, fill } from "./dom.js";
 
 const SHOWN = 40;  // channels at once: more are found by their names
 const VALUES = 5;  // of the first rows

@@ -1,12 +1,11 @@
-import { field, fill, make, table } from "./dom.js";
-import { duration, jobButtons, message } from "./parts.js";
-import { isOver, session, watch } from "./state.js";
+import { field, fill, table } from "./dom.js";
+import { duration, framed, jobButtons, message } from "./parts.js";
+import { isOver, session, whenChanged } from "./state.js";
 
 // Two results of one command side by side, and the history of the session.
 export function build(panel) {
   const said = message(), page = make("div", {}), place = make("div", {});
   const first = make("select", {}), second = make("select", {});
-  let shown = "";
   const whole = () => session.jobs.filter((job) => isOver(job) && job.files.includes(`${job.command}.json`));
   const alike = () => {
     const one = whole().find((job) => job.name === first.value);
@@ -15,10 +14,8 @@ export function build(panel) {
     second.replaceChildren(...names.map((name) => make("option", { value: name, selected: name === before }, name)));
   };
   first.addEventListener("change", alike);
-  watch(() => {
-    const jobs = session.jobs.filter(isOver), now = JSON.stringify(jobs.map((job) => [job.name, job.state]));
-    if (now === shown) return;
-    shown = now;
+  whenChanged(() => session.jobs.filter(isOver).map((job) => [job.name, job.state]), () => {
+    const jobs = session.jobs.filter(isOver);
     const before = first.value;
     first.replaceChildren(...whole().map((job) => make("option", { value: job.name, selected: job.name === before }, job.name)));
     alike();
@@ -28,8 +25,7 @@ export function build(panel) {
     said.say("");
     if (!first.value || !second.value) { said.say("two results of one command are needed"); return; }
     const address = `compare?first=${encodeURIComponent(first.value)}&second=${encodeURIComponent(second.value)}`;
-    fill(page, make("p", {}, make("a", { href: address, target: "_blank", rel: "noopener" }, "Open this page in a tab of its own")),
-      make("iframe", { src: address, title: `${first.value} and ${second.value}`, sandbox: "allow-scripts allow-downloads allow-popups" }));
+    fill(page, framed(address, `${first.value} and ${second.value}`));
   };
   panel.append(
     make("div", { class: "row" }, field("One result", first, "grows"), field("Another of the same command", second, "grows"),

@@ -1,6 +1,6 @@
 /* global shape */
 import { post } from "./api.js";
-import { digits, fill, make } from "./dom.js";
+import { digits, fill } from "./dom.js";
 
 const WIDE = 300, HIGH = 60, STRETCHES = 300;
 const MOST = 24;  // channels that are asked for at once

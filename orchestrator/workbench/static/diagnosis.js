@@ -1,5 +1,5 @@
 /* global Units */
-import { check, digits, fill, make } from "./dom.js";
+import { check, digits, fill } from "./dom.js";
 import { inputs, needLog, reading } from "./gap.js";
 import { action, fileChoice, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, jobOf, modelOfLog, start } from "./state.js";

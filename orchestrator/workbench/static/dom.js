@@ -1,16 +1,3 @@
-// Elements: make("button", { onclick: act, class: "main" }, "Text", child).
-export function make(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-    else if (name in made && typeof value === "boolean") made[name] = value;
-    else if (name === "value") made.value = value;
-    else if (value !== null && value !== undefined && value !== false) made.setAttribute(name, value);
-  }
-  made.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
-  return made;
-}
-
 let count = 0;
 
 // A labelled control: the label's text, and the control below it.

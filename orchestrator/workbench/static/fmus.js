@@ -1,6 +1,6 @@
 import { plain } from "./advice.js";
 import { get, post } from "./api.js";
-import { field, fill, make, numberIn, numberInput } from "./dom.js";
+import { field, fill, numberIn, numberInput } from "./dom.js";
 import { action, dropZone, fileChoice, isFmu, isLog, isModel, jobView, kept, message } from "./parts.js";
 import { Scenario } from "./scenario.js";
 import { choices, choose, refresh, start, watch } from "./state.js";

@@ -1,4 +1,4 @@
-import { check, field, make, numberIn, numberInput } from "./dom.js";
+import { check, field, numberIn, numberInput } from "./dom.js";
 import { action, fileChoice, jobView, kept, message } from "./parts.js";
 import { choices, choose, modelOfLog, start, watch } from "./state.js";
 import { unsaved } from "./machine.js";

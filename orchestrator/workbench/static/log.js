@@ -2,7 +2,7 @@ import { adviceOf, NUMBERS, plain, rivalsOf, TITLES } from "./advice.js";
 import { post } from "./api.js";
 import { ChannelList } from "./channels.js";
 import { Curves } from "./curves.js";
-import { choice, digits, field, fill, make, numberInput } from "./dom.js";
+import { choice, digits, field, fill, numberInput } from "./dom.js";
 import { action, dropZone, fileChoice, isLog, jobView, message, resultOf } from "./parts.js";
 import { choices, choose, jobOf, noteColumns, session, start, state, stated, watch } from "./state.js";
 
@@ -193,7 +193,7 @@ class LogTab {
     const radio = (line, checked) => make("input", { type: "radio", name: "header", checked, onchange: () => set(line) });
     return make("details", { open: seen.names_line === null || header !== null || !seen.channels.length },
       make("summary", {}, seen.names_line ? `The names are in line ${seen.names_line}; choose another line` : "Which line holds the names?"),
-      make("fieldset", { class: "raw" }, make("legend", { class: "visually-hidden" }, "Line of the names"),
+      make("fieldset", { class: "raw" }, make("legend", { class: "quiet" }, "Line of the names"),
         make("label", {}, radio(0, header === 0), "none of them"),
         seen.lines.map((text, n) => make("label", { class: seen.names_line === n + 1 ? "names" : "" },
           radio(n + 1, seen.names_line === n + 1), make("span", { class: "at" }, String(n + 1)), text))),

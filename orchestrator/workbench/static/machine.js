@@ -1,5 +1,5 @@
 import { fileAddress, get, post } from "./api.js";
-import { digits, field, fill, make, numberInput, table } from "./dom.js";
+import { digits, field, fill, numberInput, table } from "./dom.js";
 import { action, dropZone, fileChoice, isModel, message } from "./parts.js";
 import { choices, choose, session, watch } from "./state.js";
 

@@ -1,5 +1,5 @@
-import { fill, make } from "./dom.js";
-import { isOver, refresh, session, watch } from "./state.js";
+import { fill } from "./dom.js";
+import { isOver, refresh, session, watch, whenChanged } from "./state.js";
 import { jobLine } from "./parts.js";
 import * as begin from "./start.js";
 import * as log from "./log.js";
@@ -35,7 +35,7 @@ for (const [name, title, part] of TABS) {
   tabs.append(make("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, onclick: () => go(name) }, title));
   const panel = make("section", { role: "tabpanel", id: `panel-${name}`, "aria-labelledby": `tab-${name}` });
   panels.append(panel);
-  panel.append(make("h2", { class: "visually-hidden" }, title));
+  panel.append(make("h2", { class: "quiet" }, title));
   part.build(panel, go);
 }
 
@@ -50,7 +50,6 @@ tabs.addEventListener("keydown", (event) => {
 // Jobs that run, whoever of the open tabs has started them.
 const running = document.getElementById("running");
 const lines = new Map();
-let shown = "";
 watch(() => {
   document.getElementById("folder").textContent = session.folder;
   const jobs = session.jobs.filter((job) => !isOver(job));
@@ -59,9 +58,8 @@ watch(() => {
     if (!lines.has(job.name)) lines.set(job.name, jobLine(job));
     lines.get(job.name).update(job);
   }
-  const now = JSON.stringify([session.gone, session.unkept, [...lines.keys()]]);
-  if (now === shown) return;
-  shown = now;
+});
+whenChanged(() => [session.gone, session.unkept, [...lines.keys()]], () => {
   const held = running.contains(document.activeElement);
   const alarm = session.gone ? "The workbench has ended: start it again; files, choices and results are in its directory."
     : session.unkept && `What you chose is not kept: ${session.unkept}`;

@@ -1,7 +1,7 @@
-import { check, choice, field, fill, make, numberIn, numberInput } from "./dom.js";
+import { check, choice, field, fill, numberIn, numberInput } from "./dom.js";
 import { action, fileChoice, jobView, kept, message } from "./parts.js";
 import { sliders } from "./sliders.js";
-import { choices, choose, isOfFmu, isOver, session, start, watch } from "./state.js";
+import { choices, choose, isOfFmu, isOver, session, start, whenChanged } from "./state.js";
 
 const CORRECTED = /(^|\/)corrected\.toml$/;
 
@@ -15,16 +15,10 @@ function simulation() {
   const said = message(), moving = make("div", {}), which = make("div", { class: "field grows" });
   const able = () => session.jobs.filter((job) => isOver(job) && ["diagnose", "estimate"].includes(job.command) && !isOfFmu(job) && job.files.includes(`${job.command}.csv`)).map((job) => job.name);
   const chosen = () => { const names = able(); return names.includes(choices.fields.sliders) ? choices.fields.sliders : names.at(-1) ?? ""; };
-  let shown = "";
-  const draw = () => {
-    const names = able(), now = JSON.stringify([names, chosen()]);
-    if (now === shown) return;
-    shown = now;
+  whenChanged(() => [able(), chosen()], ([names, now]) => {
     const options = names.length ? names.map((name) => [name, name]) : [["", "none yet"]];
-    fill(which, ...field("Model of", choice(options, chosen(), (name) => choose({ fields: { sliders: name } }))).children);
-  };
-  watch(draw);
-  draw();
+    fill(which, ...field("Model of", choice(options, now, (name) => choose({ fields: { sliders: name } }))).children);
+  });
   return [make("div", { class: "row" }, which, action("Simulate under sliders", said, async () => {
     if (!chosen()) throw new Error("a diagnosis or an estimate is needed first");
     fill(moving, make("p", { class: "note", role: "status" }, "Building the FMU …"));

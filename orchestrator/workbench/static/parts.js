@@ -1,7 +1,7 @@
 import { fileAddress, upload } from "./api.js";
 import { plain } from "./advice.js";
-import { choice, fill, field, make, wrongField } from "./dom.js";
-import { choices, choose, discard, isOver, jobOf, open, refresh, runAgain, session, stop, watch } from "./state.js";
+import { choice, fill, field, wrongField } from "./dom.js";
+import { choices, choose, discard, isOver, jobOf, open, refresh, runAgain, session, stop, watch, whenChanged } from "./state.js";
 
 const NO_LOGS = /\.(toml|fmu|ssp|json|html|png)$/i;
 const PLACES = "logs go into the tab Log, model files (.toml) into Machine, FMUs and SSP files into FMUs";
@@ -38,7 +38,8 @@ export function dropZone(text, able, taken, multiple = false) {
     for (const file of files) {
       try {
         if (!able(file.name)) throw new Error(`${file.name}: ${PLACES}`);
-        const found = await upload(file, (share) => { said.textContent = `${file.name}: ${Math.round(100 * share)} %`; });
+        said.textContent = `${file.name} …`;
+        const found = await upload(file);
         said.textContent = `${found.name} is here`;
         await refresh();
         await taken(found.file);
@@ -62,18 +63,11 @@ export function dropZone(text, able, taken, multiple = false) {
 // A choice among files of the session that follows what comes and goes.
 export function fileChoice(text, kind, value, picked, none = "none") {
   const place = make("div", { class: "field grows" });
-  let shown = "";
-  const draw = () => {
-    const options = [["", none], ...filesOf(kind)];
-    const now = JSON.stringify([options, value()]);
-    if (now === shown) return;
-    shown = now;
-    const made = choice(options, options.some(([key]) => key === value()) ? value() : "", picked);
+  whenChanged(() => [[["", none], ...filesOf(kind)], value()], ([options, now]) => {
+    const made = choice(options, options.some(([key]) => key === now) ? now : "", picked);
     made.dataset.key = text;
     fill(place, ...field(text, made).children);
-  };
-  watch(draw);
-  draw();
+  });
   return place;
 }
 
@@ -81,21 +75,17 @@ const STATES = { waiting: "", running: "", done: "good", stopped: "warn", ended:
 
 // One job: its stage, the time left, Stop; then what it said, and its page. `key` keeps which one over a reload of the page.
 export function jobView(key, result = () => []) {
-  const place = make("div", {});
-  let shown = "";
+  const place = make("div", {}), name = () => choices.shown[key];
   const draw = () => {
-    const name = choices.shown[key], job = jobOf(name);
-    if (!name) { shown = ""; fill(place); }
+    const job = jobOf(name());
+    if (!name()) fill(place);
     if (!job) return;
-    const now = JSON.stringify([name, job.state]);
-    if (now === shown) return;
-    shown = now;
     fill(place, isOver(job) ? finished(job) : make("p", { class: "note", role: "status" }, `${job.name} is ${job.state}; its stage and Stop stand at the top.`));
     if (isOver(job)) for (const part of [result(job)].flat()) place.append(part);
-    if (isOver(job) && job.files.includes("report.html")) place.append(reportOf(job));
+    if (isOver(job) && job.files.includes("report.html")) place.append(framed(fileAddress(`results/${job.name}/report.html`), `Page of ${job.name}`));
   };
-  watch(draw);
-  return { element: place, show(job) { shown = ""; choose({ shown: { ...choices.shown, [key]: job } }); }, name: () => choices.shown[key] };
+  const again = whenChanged(() => [name(), jobOf(name())?.state], draw);
+  return { element: place, show(job) { choose({ shown: { ...choices.shown, [key]: job } }); again(); }, name };
 }
 
 // A job that runs: its line stays, so that Stop can be pressed at any moment; `update` brings what it says up to date.
@@ -140,11 +130,11 @@ export function jobButtons(job, more = null) {
   return make("div", {}, make("div", { class: "row" }, more === "open" ? named("Open", open) : null, named("Run again", runAgain), named("Remove", discard)), said.element);
 }
 
-function reportOf(job) {
-  const address = fileAddress(`results/${job.name}/report.html`);
+// A page of the session's own, walled off, and a way to see it alone.
+export function framed(address, title) {
   return make("div", {},
     make("p", {}, make("a", { href: address, target: "_blank", rel: "noopener" }, "Open this page in a tab of its own")),
-    make("iframe", { src: address, title: `Page of ${job.name}`, sandbox: "allow-scripts allow-downloads allow-popups" }));
+    make("iframe", { src: address, title, sandbox: "allow-scripts allow-downloads allow-popups" }));
 }
 
 export function duration(seconds) {

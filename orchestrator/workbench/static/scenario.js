@@ -1,5 +1,5 @@
 import { fileAddress, post } from "./api.js";
-import { check, choice, field, fill, make, numberInput } from "./dom.js";
+import { check, choice, field, fill, numberInput } from "./dom.js";
 import { interfaceOf } from "./fmus.js";
 import { Graph, fits, inputsOf, outputsOf } from "./graph.js";
 import { action, fileChoice, message } from "./parts.js";
@@ -112,7 +112,7 @@ export class Scenario {
       ins.length ? make("h3", {}, "Inputs") : null, this.sources.map((source) => this.sourceRow(source, ins)),
       ins.length ? make("button", { type: "button", onclick: feed }, "Feed an input") : null,
       Object.entries(this.nodes).map(([name, node]) => parametersOf(name, node)),
-      outs.length ? [this.recorded(outs), this.running()] : null);
+      outs.length ? [this.recorded(outs), this.running(), this.varying()] : null);
   }
 
   connecting(outs, ins) {
@@ -140,6 +140,21 @@ export class Scenario {
       field("Master", choice(MASTERS, this.run.algorithm, (value) => { this.run.algorithm = value; })));
   }
 
+  // Many runs, in which one parameter takes several values.
+  varying() {
+    const keys = Object.entries(this.nodes).flatMap(([name, node]) => numbersOf(node).map((one) => `${name}.${one.name}`)), { run } = this;
+    if (!keys.length) return null;
+    const sweep = async () => {
+      const values = [run.from, run.to, run.count], key = keys.includes(run.vary) ? run.vary : keys[0];
+      if (values.some((value) => !Number.isFinite(value))) throw new Error("say from which value to which the parameter goes, and how many runs there are");
+      this.show(await start("sweep", [], { scenario: await this.write(), vary: `${key}=range:${values.join(":")}`, ...this.options() }));
+    };
+    run.count ??= 5;
+    return make("details", {}, make("summary", {}, "Sweep a parameter"), make("div", { class: "row" },
+      field("Parameter", choice(keys.map((key) => [key, key]), run.vary ?? keys[0], (key) => { run.vary = key; })),
+      this.number("from", run, "from", false), this.number("to", run, "to", false), this.number("runs", run, "count"), action("Run the sweep", this.said, sweep)));
+  }
+
   drop(name) {
     const inside = (key) => key.startsWith(`${name}.`);
     delete this.nodes[name];
@@ -151,8 +166,8 @@ export class Scenario {
     return make("button", { type: "button", "aria-label": `Remove ${what}`, onclick: () => { act(); this.draw(); } }, "Remove");
   }
 
-  number(text, table, key) {
-    return field(text, numberInput({ value: table[key] ?? "", required: true }, (value) => { table[key] = value; }));
+  number(text, table, key, required = true) {
+    return field(text, numberInput({ value: table[key] ?? "", required }, (value) => { table[key] = value; }));
   }
 
   sourceRow(source, ins) {
@@ -189,8 +204,10 @@ export class Scenario {
   }
 }
 
+const numbersOf = (node) => node.variables.filter((one) => one.causality === "parameter" && ["Real", "Integer"].includes(one.type)).slice(0, 200);
+
 function parametersOf(name, node) {
-  const open = node.variables.filter((one) => one.causality === "parameter" && ["Real", "Integer"].includes(one.type)).slice(0, 200);
+  const open = numbersOf(node);
   if (!open.length) return null;
   return make("details", {}, make("summary", {}, `Parameters of ${name} (${open.length})`), make("div", { class: "row" }, open.map((one) => {
     const input = numberInput({ placeholder: String(one.start ?? ""), value: node.parameters[one.name] ?? "" }, (value) => {

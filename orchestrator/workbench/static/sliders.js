@@ -1,6 +1,6 @@
 /* global Plot, Units */
 import { get, post } from "./api.js";
-import { choice, digits, field, fill, make } from "./dom.js";
+import { choice, digits, field, fill } from "./dom.js";
 import { resultOf } from "./parts.js";
 import { jobOf } from "./state.js";
 

@@ -1,7 +1,7 @@
 import { upload } from "./api.js";
-import { fill, make } from "./dom.js";
+import { fill } from "./dom.js";
 import { action, message } from "./parts.js";
-import { choices, choose, isOfFmu, refresh, session, watch } from "./state.js";
+import { choices, choose, isOfFmu, refresh, session, whenChanged } from "./state.js";
 
 const EXAMPLE = "example-drive.csv";
 
@@ -36,17 +36,11 @@ export function build(panel, go) {
     choose({ log, model: "", logs: { [log]: { columns: { u: { torque_constant: 0.5 } }, header: null } } });
     go("log");
   }
-  let shown = "";
-  const draw = () => {
-    const now = steps(), text = JSON.stringify(now);
-    if (text === shown) return;
-    shown = text;
+  whenChanged(steps, (now) => {
     fill(list, now.map(([tab, title, what, done, missing]) => make("li", { class: done ? "done" : "" },
       make("h3", {}, link(tab, title)), make("p", {}, what),
       make("p", { class: "note" }, make("span", { class: done ? "tag good" : "tag" }, done ? "✓ done" : "to do"), ` ${done || missing}`))));
-  };
-  watch(draw);
-  draw();
+  });
   panel.append(
     make("p", { class: "answer" }, "From a log of a drive to the play in its gears, with an interval, and to what a model of the machine misses."),
     make("div", { class: "row" },

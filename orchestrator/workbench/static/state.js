@@ -10,6 +10,20 @@ let pending = {}, sending = false;
 
 export function watch(act) { watchers.add(act); }
 
+// Call `act` with what `look` gives, now and whenever that has changed; the function that is returned forgets what it was.
+export function whenChanged(look, act) {
+  let shown;
+  const draw = () => {
+    const found = look(), now = JSON.stringify(found);
+    if (now === shown) return;
+    shown = now;
+    act(found);
+  };
+  watch(draw);
+  draw();
+  return () => { shown = undefined; draw(); };
+}
+
 function tell() { watchers.forEach((act) => act()); }
 
 const isTable = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
@@ -122,7 +136,7 @@ export async function stop(name) {
 // Where the results of a command are shown: the tab, and its view of a job.
 const PLACES = {
   inspect: ["log", "log"], estimate: ["gap", "gap"], diagnose: ["diagnosis", "diagnosis"],
-  check: ["fmus", "fmu"], ssp: ["fmus", "fmu"], simulate: ["fmus", "fmus"],
+  check: ["fmus", "fmu"], ssp: ["fmus", "fmu"], simulate: ["fmus", "fmus"], sweep: ["fmus", "fmus"],
   calibrate: ["fmus", "fmu"], compensate: ["model", "control"], regulator: ["model", "control"],
 };
 

@@ -1,4 +1,4 @@
-import { field, fill, make, table } from "./dom.js";
+import { field, fill, table } from "./dom.js";
 
 const MOST = 300;  // variables of one table
 const HEADS = ["variable", "causality", "type", "start", "unit", "limits", "description"];
