@@ -12,7 +12,7 @@ from orchestrator.shared.results.fields import Cell, ReportTable
 
 Numbers = Sequence[float | None] | NDArray[np.float64]
 Badge = Literal["good", "warn", "bad", "neutral"]
-Kind = Literal["line", "steps", "points", "bars"]
+Kind = Literal["line", "steps", "points"]
 Severity = Literal["error", "warning", "info"]
 
 POINT_LIMIT = 4000
@@ -40,7 +40,7 @@ class Series:
 
     Attributes:
         name: as in the legend.
-        kind: "line", "steps" (each value held to the next x), "points", or "bars" from zero.
+        kind: "line", "steps" (each value held to the next x), or "points".
         low, high: ends of an interval around each y; both or neither.
         labels: words for each point, shown when the reader hovers over it.
     """

@@ -20,8 +20,6 @@ COLOURS = ("#2166ac", "#d6604d", "#4d9221", "#762a83", "#8c510a", "#555555")
 SHADE, MOMENT = "#f4d58d", "#555555"
 WIDTH, HEIGHT = 9.0, 2.6
 """Inches of a picture, and of each plot in it without its title."""
-BAR = 0.3
-"""Inches of a bar with a name."""
 TITLE_WIDTH = 90
 """Characters of a title's line."""
 NAMES, LINE = 4, 14.0
@@ -33,10 +31,9 @@ DPI = 130
 
 def draw_plots(path: Path, plots: Sequence[Plot]) -> None:
     """Draw plots one below the other into a PNG, SVG or PDF file; those over the same x have one scale."""
-    heights = [max(HEIGHT, BAR * len(plot.categories)) if _is_across(plot) else HEIGHT for plot in plots]
-    figure = Figure(figsize=(WIDTH, sum(heights) + 0.5 * len(plots)), layout="constrained")
+    figure = Figure(figsize=(WIDTH, (HEIGHT + 0.5) * len(plots)), layout="constrained")
     FigureCanvasAgg(figure)
-    axes: list[Axes] = list(figure.subplots(len(plots), 1, squeeze=False, height_ratios=heights)[:, 0])
+    axes: list[Axes] = list(figure.subplots(len(plots), 1, squeeze=False)[:, 0])
     shared: dict[tuple[str, bool], Axes] = {}
     for axis, plot in zip(axes, plots, strict=True):
         if not plot.categories:
@@ -47,14 +44,8 @@ def draw_plots(path: Path, plots: Sequence[Plot]) -> None:
     figure.savefig(path, dpi=DPI, metadata={"Software": None} if path.suffix.lower() == ".png" else None)
 
 
-def _is_across(plot: Plot) -> bool:
-    """Tell whether bars have names, which are read where they lie across the picture."""
-    return bool(plot.categories) and all(series.kind == "bars" for series in plot.series)
-
-
 def _draw(axis: Axes, plot: Plot) -> None:
-    across = _is_across(plot)
-    _label(axis, plot, across)
+    _label(axis, plot)
     named: set[str] = set()
     for span in plot.spans:
         label = "" if span.name in named else _text(span.name)
@@ -64,7 +55,7 @@ def _draw(axis: Axes, plot: Plot) -> None:
         else:
             axis.axvline(span.start, color=MOMENT, linewidth=0.8, linestyle=":", label=label)
     for n, series in enumerate(plot.series):
-        _draw_series(axis, thin_series(series, ROWS), COLOURS[n % len(COLOURS)], across)
+        _draw_series(axis, thin_series(series, ROWS), COLOURS[n % len(COLOURS)])
     if plot.diagonal:
         low, high = (f(axis.get_xlim()[n], axis.get_ylim()[n]) for n, f in enumerate((max, min)))
         axis.plot((low, high), (low, high), color=MOMENT, linewidth=0.8)
@@ -76,32 +67,25 @@ def _draw(axis: Axes, plot: Plot) -> None:
     axis.set_title(fill(_text(plot.title), TITLE_WIDTH), fontsize=10, pad=6.0 + LINE * -(-entries // NAMES))
 
 
-def _label(axis: Axes, plot: Plot, across: bool) -> None:
-    """Set labels and scales; the names of an axis of names stand at its numbers."""
-    x, y = (axis.yaxis, axis.xaxis) if across else (axis.xaxis, axis.yaxis)
-    x.set_label_text(_text(plot.x_label))
-    y.set_label_text(_text(plot.y_label))
-    for of_names, is_log in ((True, plot.log_x), (False, plot.log_y)):
+def _label(axis: Axes, plot: Plot) -> None:
+    """Set labels and scales."""
+    axis.set_xlabel(_text(plot.x_label))
+    axis.set_ylabel(_text(plot.y_label))
+    for side, is_log, scale in ((axis.xaxis, plot.log_x, axis.set_xscale), (axis.yaxis, plot.log_y, axis.set_yscale)):
         if is_log:
-            (axis.set_yscale if of_names is across else axis.set_xscale)("log")
-            (x if of_names else y).set_major_formatter(LogFormatter())
-            (x if of_names else y).set_minor_formatter(LogFormatter(minor_thresholds=(2.0, 0.5)))
+            scale("log")
+            side.set_major_formatter(LogFormatter())
+            side.set_minor_formatter(LogFormatter(minor_thresholds=(2.0, 0.5)))
     if plot.categories:
-        x.set_ticks(range(len(plot.categories)), [_text(name) for name in plot.categories])
-    if across:
-        axis.invert_yaxis()  # the first name on top
-    elif not plot.categories:
+        axis.set_xticks(range(len(plot.categories)), [_text(name) for name in plot.categories])
+    else:
         axis.margins(x=0.01)
 
 
-def _draw_series(axis: Axes, series: Series, colour: str, across: bool) -> None:
+def _draw_series(axis: Axes, series: Series, colour: str) -> None:
     x, y = as_column(series.x), as_column(series.y)
     style: dict[str, Any] = {"color": colour, "label": _text(series.name)}
-    if series.kind == "bars" and across:
-        axis.barh(x, y, xerr=_reach(series, y), ecolor=MOMENT, **style)
-    elif series.kind == "bars":
-        axis.bar(x, y, yerr=_reach(series, y), ecolor=MOMENT, width=0.7 * _spacing(x), **style)
-    elif series.kind == "points":
+    if series.kind == "points":
         axis.errorbar(x, y, _reach(series, y), fmt="o", markersize=3.0, linewidth=0.9, capsize=2.0, **style)
     else:
         if series.low is not None and series.high is not None:
@@ -114,10 +98,6 @@ def _reach(series: Series, y: Array) -> Array | None:
     if series.low is None or series.high is None:
         return None
     return np.nan_to_num(np.maximum(np.array([y - as_column(series.low), as_column(series.high) - y]), 0.0))
-
-
-def _spacing(x: Array) -> float:
-    return float(np.min(np.diff(np.unique(x)), initial=1.0))
 
 
 def _text(name: str) -> str:

@@ -33,7 +33,7 @@ def test_each_kind_of_series_is_drawn_with_its_interval(drawn):
     (axis,) = drawn(
         Plot("All", "x [m]", "y [s]", (
             Series("line", X, y, "line", **band), Series("steps", X, y, "steps"),
-            Series("dots", X, y, "points", **band), Series("bars", X, y, "bars"),
+            Series("dots", X, y, "points", **band),
         ))
     )  # fmt: skip
     assert (axis.get_title(), axis.get_xlabel(), axis.get_ylabel()) == ("All", "x [m]", "y [s]")
@@ -41,11 +41,10 @@ def test_each_kind_of_series_is_drawn_with_its_interval(drawn):
     styles = {line.get_label(): line.get_drawstyle() for line in axis.lines}
     assert (styles["line"], styles["steps"]) == ("default", "steps-post")
     assert {0.5, 5.0} <= set(axis.collections[0].get_paths()[0].vertices[:, 1])
-    dots, bars = axis.containers
+    (dots,) = axis.containers
     np.testing.assert_allclose(dots.lines[2][0].get_segments()[1][:, 1], [3.5, 5.0])
-    assert [bar.get_height() for bar in bars.patches][:2] == [1.0, 4.0]
     shown = [text.get_text() for text in axis.get_legend().get_texts()]
-    assert sorted(shown) == ["bars", "dots", "line", "steps"]
+    assert sorted(shown) == ["dots", "line", "steps"]
 
 
 def test_spans_are_shaded_moments_are_lines_and_each_is_named_once(drawn):
@@ -65,17 +64,6 @@ def test_logarithmic_scales_and_the_diagonal_are_those_of_the_plot(drawn):
     diagonal = next(line for line in axis.lines if line.get_linestyle() == "-" and len(line.get_xdata()) == 2)
     assert list(diagonal.get_xdata()) == list(diagonal.get_ydata())
     assert axis.get_legend() is None  # a single curve is named by its axis
-
-
-def test_bars_with_names_lie_across_the_first_on_top(drawn):
-    plot = Plot(
-        "Bars", "band [Hz]", "share [%]", (Series("share", [0, 1], [30.0, 70.0], "bars"),), categories=("low", "high")
-    )
-    (axis,) = drawn(plot)
-    assert [text.get_text() for text in axis.get_yticklabels()] == ["low", "high"]
-    assert [bar.get_width() for bar in axis.patches] == [30.0, 70.0]
-    assert (axis.get_xlabel(), axis.get_ylabel()) == ("share [%]", "band [Hz]")
-    assert axis.get_ylim()[0] > axis.get_ylim()[1]
 
 
 def test_plots_over_the_same_x_share_its_scale_and_no_name_is_a_formula(drawn):

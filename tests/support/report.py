@@ -27,7 +27,7 @@ def example(directory: Path) -> Report:
         Series("without", time, [math.sin(t + 0.1) if not 5.0 < t < 6.0 else None for t in time]),
         Series("held", time[::50], [round(math.sin(t), 1) for t in time[::50]], "steps"),
     )
-    scores = Series("score", [0, 1, 2, 3], [5.0, 3.0, 0.5, -1.0], "bars")
+    scores = Series("score", [0, 1, 2, 3], [5.0, 3.0, 0.5, -1.0], "points")
     rows = tuple((i, 10.0 ** dice.uniform(-3, 2), "error" if i % 9 == 0 else "done", i % 2 == 0) for i in range(60))
     return Report(
         "Example",

@@ -6,6 +6,7 @@ from orchestrator.reporting.model import Facts, Plot, Report, Section, Span, Tex
 from orchestrator.reporting.pages.diagnosis_answer import (
     answer_table,
     headline,
+    in_words,
     next_steps,
     worth_on_test_data,
 )
@@ -36,6 +37,7 @@ def build(source: ResultDocument) -> Report:
     notes = tuple(text for text in found.notes if text not in reasons)
     folds: dict[str, list[Section]] = {
         "Take note": [Text("Notes", notes)] if notes else [],
+        "In words": in_words([text for text in found.summary if text not in reasons]),
         "Evidence for each effect": [
             one.without_empty_columns() for one in evidence_table(found.effects, "outputs' misfit")
         ],

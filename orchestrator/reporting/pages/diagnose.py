@@ -16,6 +16,7 @@ from orchestrator.reporting.pages.diagnosis_answer import (
     SIZES,
     answer_table,
     headline,
+    in_words,
     next_steps,
     worth_on_test_data,
 )
@@ -64,6 +65,7 @@ def build(source: ResultDocument) -> Report:
     metric = any(signal.unit == "m" for test in results.test for signal in test.misfit.values())
     folds: dict[str, list[Section]] = {
         "Take note": [Text("Notes", notes)] if notes else [],
+        "In words": in_words(results.summary),
         "Evidence for each effect": [
             *evidence_table(results.effects),
             *_missing_plots(results.effects),

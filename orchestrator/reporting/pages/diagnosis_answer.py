@@ -83,6 +83,12 @@ def next_steps(summary: Sequence[str], more: str = "") -> list[Section]:
     return [Text("What to do next", lines)] if lines else []
 
 
+def in_words(summary: Sequence[str]) -> list[Section]:
+    """Return the rest of a summary."""
+    lines = tuple(line.strip() for line in summary[1:] if not line.strip().startswith(NEXT))
+    return [Text("In words", lines)] if lines else []
+
+
 def quantity(p: ValueFound) -> str:
     """Return a value with its interval and unit."""
     if p.value is None:

@@ -114,11 +114,10 @@ class PlotFigure {
   reset(withOthers = true) {
     const { spans, diagonal, logX, logY, categories } = this.data, shown = this.visible().map((one) => one.series);
     const series = shown.length ? shown : this.data.series;
-    const flat = series.some((s) => s.kind === "bars") ? [[0]] : [];
     const edges = spans.map((span) => [span.start, span.end]);
     const names = categories.length ? [[-0.5, categories.length - 0.5]] : [];
     let x = extent([...series.map((s) => (s.ascending && !logX ? [s.x[0], s.x.at(-1)] : s.x)), ...edges, ...names], logX);
-    let y = extent([...series.flatMap((s) => [s.y, s.low ?? [], s.high ?? []]), ...flat], logY);
+    let y = extent([...series.flatMap((s) => [s.y, s.low ?? [], s.high ?? []])], logY);
     if (diagonal) x = y = [Math.min(x[0], y[0]), Math.max(x[1], y[1])];
     this.range = { x, y };
     this.home = this.range;

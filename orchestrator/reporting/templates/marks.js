@@ -1,4 +1,4 @@
-// Paths of curves, clouds, bars and intervals. `x` and `y` are the plot's scales.
+// Paths of curves, clouds and intervals. `x` and `y` are the plot's scales.
 const round = (pixel) => Math.round(pixel * 10) / 10;
 
 class Marks {
@@ -13,7 +13,6 @@ class Marks {
     const made = [];
     if (series.low) made.push(shape("path", { d: this.whiskers(series), stroke, "stroke-width": 1, fill: "none" }));
     if (series.kind === "points") made.push(shape("path", { d: this.dots(series), fill: stroke }));
-    else if (series.kind === "bars") made.push(shape("path", { d: this.bars(series), fill: stroke, "fill-opacity": 0.75 }));
     else made.push(shape("path", { d: this.curve(series), stroke, class: series.name === "measured" && this.several ? "curve broad" : "curve" }));
     return made;
   }
@@ -31,9 +30,8 @@ class Marks {
     const first = Math.max(0, firstAtLeast(series.x, this.x.low) - 1);
     const end = Math.min(series.x.length, firstAtLeast(series.x, this.x.high) + 1);
     const pixels = this.x.to - this.x.from;
-    if (end - first <= 3 * pixels) return this.rows(series, first, end);
-    series.pyramid ??= new Pyramid(series.y);
-    return this.blocks(series, series.pyramid.level(end - first, pixels), first, end);
+    const size = Math.ceil((end - first) / pixels);
+    return size > 3 ? this.blocks(series, size, first, end) : this.rows(series, first, end);
   }
 
   rows(series, first, end) {
@@ -52,11 +50,17 @@ class Marks {
     return parts.join("");
   }
 
-  blocks(series, { size, low, high }, first, end) {
+  // Blocks begin at multiples of their size, so that they stay the same where the view moves.
+  blocks(series, size, first, end) {
     const parts = [];
     let [pen, last] = [false, 0];
-    for (let block = Math.floor(first / size); block * size < end; block++) {
-      const [least, most] = [low[block], high[block]];
+    for (let start = first - (first % size); start < end; start += size) {
+      let [least, most] = [NaN, NaN];
+      for (let n = start; n < Math.min(start + size, series.y.length); n++) {
+        const value = series.y[n];
+        if (!(least <= value) && !Number.isNaN(value)) least = value;
+        if (!(most >= value) && !Number.isNaN(value)) most = value;
+      }
       if (Number.isNaN(most) || (this.y.logarithmic && most <= 0)) {
         pen = false;
         continue;
@@ -64,7 +68,7 @@ class Marks {
       const bottom = this.y.logarithmic && least <= 0 ? this.y.low : least;
       const ends = [bottom, most].map((value) => round(this.y.pixel(value)));
       const [from, to] = Math.abs(ends[0] - last) <= Math.abs(ends[1] - last) ? ends : ends.reverse(); // a slope has no teeth
-      parts.push(pen ? "L" : "M", round(this.x.pixel(series.x[block * size])), " ", from);
+      parts.push(pen ? "L" : "M", round(this.x.pixel(series.x[start])), " ", from);
       if (to !== from || !pen) parts.push("V", to);
       [pen, last] = [true, to];
     }
@@ -75,14 +79,6 @@ class Marks {
     const places = Array.from(series.x, (_, n) => this.at(series, n)).filter(Boolean);
     const radius = places.length > 400 ? 2 : 3.5;
     return places.map(([x, y]) => `M${x - radius} ${y}a${radius} ${radius} 0 1 0 ${2 * radius} 0a${radius} ${radius} 0 1 0 ${-2 * radius} 0`).join("");
-  }
-
-  bars(series) {
-    const count = series.x.length;
-    const half = Math.max(1, Math.min(24, ((this.x.to - this.x.from) / Math.max(count, 1)) * 0.35));
-    const floor = round(this.y.pixel(this.y.logarithmic ? this.y.low : 0));
-    return Array.from(series.x, (_, n) => this.at(series, n)).filter(Boolean)
-      .map(([x, y]) => `M${x - half} ${floor}V${y}h${2 * half}V${floor}Z`).join("");
   }
 
   whiskers(series) {
