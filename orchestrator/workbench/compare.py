@@ -12,6 +12,7 @@ import numpy as np
 from orchestrator.errors import InputError
 from orchestrator.records.units import ANGLES
 from orchestrator.reporting import Plot, Report, ReportTable, Series, TableColumn
+from orchestrator.reporting.model import Badge
 from orchestrator.reporting.plots import as_column
 from orchestrator.reporting.source import ResultDocument, load
 from orchestrator.shared.arrays import Array
@@ -57,10 +58,12 @@ class ResultNumber:
             return not math.isclose(self.value, other.value, rel_tol=SAME, abs_tol=1e-300)
         return self.interval[0] > other.interval[1] or other.interval[0] > self.interval[1]
 
-    def words(self) -> str:
-        """Return value and interval in words."""
+    def __str__(self) -> str:
         between = "" if self.interval is None else f" ({self.interval[0]:.5g} to {self.interval[1]:.5g})"
         return f"{self.value:.5g} {'' if self.unit == '1' else self.unit}".strip() + between
+
+
+Fact = ResultNumber | str
 
 
 def compare_results(first: Path, second: Path) -> Report:
@@ -74,42 +77,45 @@ def compare_results(first: Path, second: Path) -> Report:
     commands = [document["command"] for document in documents]
     if commands[0] != commands[1]:
         raise InputError(f"results to compare must be of one command, but are of {commands[0]} and {commands[1]}")
-    left, right = ({n: v for n, v in facts_of(d["results"]) if isinstance(v, ResultNumber)} for d in documents)
-    both = [name for name in left if name in right]
-    beyond = [name for name in both if left[name].differs_beyond(right[name])]
-    sure = [name for name in beyond if left[name].interval is not None and right[name].interval is not None]
+    left, right = (dict(facts_of(document["results"])) for document in documents)
+    pairs = {
+        name: (one, other)
+        for name, one in left.items()
+        if isinstance(one, ResultNumber) and isinstance(other := right.get(name), ResultNumber)
+    }
+    compared = [name for name, (one, other) in pairs.items() if one.interval and other.interval]
+    beyond = [name for name, (one, other) in pairs.items() if one.differs_beyond(other)]
+    sure = [name for name in beyond if name in compared]
+    others = [name for name in beyond if name not in sure]
+    words = [name for name in {**left, **right} if name not in pairs and left.get(name) != right.get(name)]
     tables = [
-        _table("Differ by more than their intervals", names, sure, left, right),
-        _table("Agree within their intervals", names, [
-            name for name in both if name not in beyond and left[name].interval and right[name].interval
-        ], left, right),
-        _table("Numbers without an interval that differ", names, [n for n in beyond if n not in sure], left, right),
-        _table("In one of the two alone", names, sorted(left.keys() ^ right.keys()), left, right),
-        _texts(names, documents),
-    ]  # fmt: skip
+        _table(title, names, found, left, right)
+        for title, found in (
+            ("Differ by more than their intervals", sure),
+            ("Agree within their intervals", [name for name in compared if name not in sure]),
+            ("Numbers without an interval that differ", others),
+            ("Words that differ, and what one of the two alone says", words),
+        )
+        if found
+    ]
     curves = list(_curves(first, second))
-    plots = tuple(plot for curve in curves for plot in curve.plots)
     apart = [curve for curve in curves if curve.apart]
-    compared = [n for n in both if left[n].interval and right[n].interval]
-    others = [_with_spaces(name) for name in beyond if name not in sure]
     changed = _changes(documents)
     summary = (
         f"{len(sure)} of {len(compared)} numbers with an interval differ by more than their intervals; of the others "
-        f"{len(others)} differ{_list_names(others)}. {len(apart)} of {len(curves)} curves differ"
-        f"{_list_names([f'{c.name} by {c.rms:.3g} (rms)' for c in apart])}."
+        f"{len(others)} differ{_list_names([_with_spaces(name) for name in others])}. "
+        f"{len(apart)} of {len(curves)} curves differ{_list_names([f'{c.name} by {c.rms:.3g} (rms)' for c in apart])}."
     )
-    summary = f"Changed: {changed}. {summary}" if changed else summary
-    badge = _badge(bool(sure), bool(compared), [curve.name for curve in apart])
     return Report(
         f"{names[0]} and {names[1]}",
-        summary,
-        (*(t for t in tables if t.rows), *plots),
-        badge,  # type: ignore[arg-type]
+        f"Changed: {changed}. {summary}" if changed else summary,
+        (*tables, *(plot for curve in curves for plot in curve.plots)),
+        _badge(bool(sure), bool(compared), bool(apart)),
         angle_unit=_angle_unit(documents[0].get("results")),
     )
 
 
-def _badge(differ: bool, compared: bool, apart: list[str]) -> tuple[str, str]:
+def _badge(differ: bool, compared: bool, apart: bool) -> tuple[Badge, str]:
     """Return colour and word: green only where intervals were compared and nothing stands against them."""
     if differ:
         return "warn", "they differ"
@@ -133,7 +139,7 @@ def _list_names(names: list[str]) -> str:
     return f": {', '.join(names[:MOST_NAMED])}{more}" if names else ""
 
 
-def facts_of(results: Any, path: str = "") -> Iterator[tuple[str, ResultNumber | str]]:
+def facts_of(results: Any, path: str = "") -> Iterator[tuple[str, Fact]]:
     """Yield every number and text of a result with its place, as ``parameters J_m``; entries of lists by their name."""
     if isinstance(results, Mapping):
         value = next((results[key] for key in ("value", "alpha") if _is_number(results.get(key))), None)
@@ -187,20 +193,13 @@ def _document(folder: Path) -> Mapping[str, Any]:
 
 
 def _table(
-    title: str,
-    names: tuple[str, str],
-    rows: list[str],
-    left: Mapping[str, ResultNumber],
-    right: Mapping[str, ResultNumber],
+    title: str, names: tuple[str, str], rows: list[str], left: Mapping[str, Fact], right: Mapping[str, Fact]
 ) -> ReportTable:
-    def cell(values: Mapping[str, ResultNumber], name: str) -> str:
-        return values[name].words() if name in values else "none"
-
-    columns = (TableColumn("quantity"), *(TableColumn(name) for name in names), TableColumn("second over first"))
-    return ReportTable(title, columns, tuple(
-        (_with_spaces(name), cell(left, name), cell(right, name), _ratio(left.get(name), right.get(name)))
-        for name in rows
-    ))  # fmt: skip
+    """Return a row for each fact: its name, what the two results say of it, and their ratio."""
+    columns = (TableColumn("what"), *(TableColumn(name) for name in names), TableColumn("second over first"))
+    found = [(name, left.get(name), right.get(name)) for name in rows]
+    cells = tuple((_with_spaces(name), str(a or "none"), str(b or "none"), _ratio(a, b)) for name, a, b in found)
+    return ReportTable(title, columns, cells).without_empty_columns()
 
 
 def _with_spaces(name: str) -> str:
@@ -208,20 +207,10 @@ def _with_spaces(name: str) -> str:
     return re.sub(r"(?<=[a-z]{2})_(?=[a-z]{2})", " ", name)
 
 
-def _ratio(first: ResultNumber | None, second: ResultNumber | None) -> float | None:
-    return second.value / first.value if first is not None and second is not None and first.value else None
-
-
-def _texts(names: tuple[str, str], documents: Sequence[Mapping[str, Any]]) -> ReportTable:
-    """Return the words that differ: verdicts, grades, arguments."""
-    facts = ([*facts_of(d.get("arguments")), *facts_of(d["results"])] for d in documents)
-    left, right = ({name: text for name, text in found if isinstance(text, str)} for found in facts)
-    rows = [
-        (_with_spaces(name), left.get(name, "none"), right.get(name, "none"))
-        for name in dict.fromkeys([*left, *right])
-        if left.get(name) != right.get(name)
-    ]
-    return ReportTable("Words that differ", (TableColumn("what"), *(TableColumn(n) for n in names)), tuple(rows))
+def _ratio(first: Fact | None, second: Fact | None) -> float | None:
+    if not isinstance(first, ResultNumber) or not isinstance(second, ResultNumber) or not first.value:
+        return None
+    return second.value / first.value
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,38 @@
 """A scenario that was drawn, as TOML: instances, connections, sources, what is recorded.
 
 What a scenario may hold, and whether it fits, is for the reader of scenarios. Here only kinds are checked, so that no
-value can become a key or a table of its own.
+value can become a key or a table of its own, and that each file is one of the session.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import msgspec
 
 from orchestrator.errors import InputError
 from orchestrator.records.model_text import toml_text
 from orchestrator.workbench.session import FILES, SessionFolder
 
-SOURCE_KEYS = {
-    "kind", "value", "amplitude", "frequency", "phase", "offset", "period", "delay", "after", "time", "before", "file",
-    "column", "unit",
-}  # fmt: skip
-MASTER_KEYS = {"algorithm", "step"}
-MOST = 1000  # connections, sources and recorded variables
+MOST = msgspec.Meta(max_length=1000)  # connections, sources and recorded variables
+Name = Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
+Value = float | int | bool | str
+
+
+def _table(name: str, needed: Mapping[str, Any], known: str = "", kind: Any = Value) -> Any:
+    """Return a kind of table: keys that must be there, and keys that may be."""
+    more = [(key, kind | msgspec.UnsetType, msgspec.UNSET) for key in known.split()]
+    return msgspec.defstruct(name, [*needed.items(), *more], forbid_unknown_fields=True)
+
+
+_SOURCE = "kind value amplitude frequency phase offset period delay after time before file column unit"
+Drawn = _table("Drawn", {
+    "stop": float,
+    "record": Annotated[list[Name], MOST],
+    "master": _table("Master", {}, "algorithm step"),
+    "instances": dict[Name, _table("Instance", {"fmu": str}, "parameters", dict[Name, Value])],
+    "connections": Annotated[list[_table("Connection", {"from": Name, "to": Name})], MOST],
+    "sources": Annotated[list[_table("Source", {"to": Name}, _SOURCE)], MOST],
+})  # fmt: skip
 
 
 def scenario_text(session: SessionFolder, drawn: Mapping[str, Any]) -> str:
@@ -29,70 +45,35 @@ def scenario_text(session: SessionFolder, drawn: Mapping[str, Any]) -> str:
     Raises:
         InputError: something of it is of the wrong kind, or no file of this session.
     """
-    lines = [f"stop = {_value(drawn.get('stop', 1.0), 'stop')}", f"record = [{_names(drawn.get('record', []))}]"]
-    lines += ["", "[master]", *_pairs(drawn.get("master", {}), MASTER_KEYS, "master")]
-    for name, entry in _table(drawn.get("instances"), "instances").items():
-        table = _table(entry, f"instances.{name}")
-        lines += ["", f"[instances.{_quoted(name)}]", f"fmu = {toml_text(_relative_path(session, table.get('fmu')))}"]
-        parameters = _table(table.get("parameters", {}), f"instances.{name}.parameters")
-        if parameters:
-            given = ", ".join(f"{_quoted(key)} = {_value(value, key)}" for key, value in parameters.items())
-            lines += [f"parameters = {{ {given} }}"]
-    for pair in _list(drawn.get("connections", []), "connections"):
-        ends = _table(pair, "connections")
-        lines += ["", "[[connections]]", f"from = {_quoted(ends.get('from'))}", f"to = {_quoted(ends.get('to'))}"]
-    for source in _list(drawn.get("sources", []), "sources"):
-        table = dict(_table(source, "sources"))
-        to = table.pop("to", None)
-        if "file" in table:
-            table["file"] = _relative_path(session, table["file"])
-        lines += ["", "[[sources]]", f"to = {_quoted(to)}", *_pairs(table, SOURCE_KEYS, "sources")]
+    empty = {"stop": 1.0, "record": [], "master": {}, "instances": {}, "connections": [], "sources": []}
+    asked = {name: value for name, value in drawn.items() if name != "name"}
+    try:
+        found = msgspec.to_builtins(msgspec.convert({**empty, **asked}, Drawn))
+    except msgspec.ValidationError as error:
+        raise InputError(f"a scenario must be drawn of tables, numbers and texts, but: {error}") from None
+    for key, tables in (("fmu", found["instances"].values()), ("file", found["sources"])):
+        for table in tables:
+            if key in table:
+                table[key] = _relative_path(session, str(table[key]))
+    parts = [
+        ("[master]", found["master"]),
+        *((f"[instances.{toml_text(name)}]", table) for name, table in found["instances"].items()),
+        *(("[[connections]]", table) for table in found["connections"]),
+        *(("[[sources]]", table) for table in found["sources"]),
+    ]
+    lines = [f"stop = {_text(found['stop'])}", f"record = {toml_text(tuple(found['record']))}"]
+    for heading, table in parts:
+        lines += ["", heading, *(f"{key} = {_text(value)}" for key, value in table.items())]
     return "\n".join(lines) + "\n"
 
 
-def _relative_path(session: SessionFolder, reference: Any) -> str:
+def _relative_path(session: SessionFolder, reference: str) -> str:
     """Return a file of the session as a scenario among the uploads calls it."""
-    if not isinstance(reference, str):
-        raise InputError(f"`fmu` must be a file of this session, but is {str(reference)[:60]!r}")
     path = session.reference_of(session.path_of(reference))
     return path.removeprefix(f"{FILES}/") if path.startswith(f"{FILES}/") else f"../{path}"
 
 
-def _pairs(table: Any, known: set[str], where: str) -> list[str]:
-    pairs = _table(table, where)
-    for name in pairs:
-        if name not in known:
-            raise InputError(f"`{where}.{str(name)[:60]}` must be one of {', '.join(sorted(known))}, but is not")
-    return [f"{name} = {_value(value, name)}" for name, value in pairs.items()]
-
-
-def _names(record: Any) -> str:
-    return ", ".join(_quoted(name) for name in _list(record, "record"))
-
-
-def _quoted(name: Any) -> str:
-    if not isinstance(name, str) or not name or len(name) > 1000:
-        raise InputError(f"a name of the scenario must be a text, but is {str(name)[:60]!r}")
-    return toml_text(name)
-
-
-def _value(value: Any, name: str) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (int, float)):
-        return repr(value)
-    if isinstance(value, str):
-        return toml_text(value)
-    raise InputError(f"`{str(name)[:60]}` must be a number, a text, or true or false, but is {str(value)[:60]!r}")
-
-
-def _table(value: Any, where: str) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise InputError(f"`{where[:60]}` must be a table, but is {str(value)[:60]!r}")
-    return value
-
-
-def _list(value: Any, where: str) -> Sequence[Any]:
-    if not isinstance(value, list) or len(value) > MOST:
-        raise InputError(f"`{where}` must be a list of at most {MOST}, but is {str(value)[:60]!r}")
-    return value
+def _text(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{toml_text(key)} = {_text(one)}' for key, one in value.items())} }}"
+    return str(value).lower() if isinstance(value, bool) else toml_text(value)
