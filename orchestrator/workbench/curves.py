@@ -1,4 +1,4 @@
-"""What the page draws of a log: every channel by level of detail. It runs in a child process behind walls.
+"""What the page shows of a file, in a child process behind walls: the channels of a log, the interface of an FMU.
 
 Of a channel the smallest and the largest value of each stretch of ``STRETCH`` rows are kept, not its rows. A large
 text is first drawn of a few rows of each of its blocks, and is read whole meanwhile: ``SLICE`` seconds a request.
@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
+from orchestrator.fmi.preview import preview_fmu
 from orchestrator.records.columns import Column
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.formats.text import TextSource
 from orchestrator.records.preview import LogPreview, preview_opened, raw_lines
+from orchestrator.scenarios.ssp.preview import preview_ssp
 from orchestrator.shared.arrays import Array, plain_numbers
 
 STRETCH = 64  # rows
@@ -68,6 +70,10 @@ class LookAsked(msgspec.Struct, frozen=True):
 
     columns: Mapping[str, Column]
     header: int | None
+
+
+class InterfaceAsked(msgspec.Struct, frozen=True):
+    """What an FMU or SSP file offers; the answer is an ``FmuPreview`` or a ``SystemPreview``."""
 
 
 class CurvesAsked(msgspec.Struct, frozen=True):
@@ -281,6 +287,8 @@ def reader(folder: str) -> Callable[[tuple[str, Any]], Any]:
 
     def answer(request: tuple[str, Any]) -> Any:
         name, asked = request
+        if isinstance(asked, InterfaceAsked):
+            return preview_ssp(Path(name)) if name.lower().endswith(".ssp") else preview_fmu(Path(name))
         if name not in opened:
             opened[name] = LogReader(Path(name))
         return opened[name].answer(asked)

@@ -83,7 +83,7 @@ class Jobs:
 
     def __init__(self, session: SessionFolder, settings: WorkbenchSettings) -> None:
         self._session, self._settings = session, settings
-        self._room, self._looks = (asyncio.Semaphore(settings.jobs_at_once) for _ in range(2))
+        self._room = asyncio.Semaphore(settings.jobs_at_once)
         self._tasks: set[asyncio.Task[None]] = set()
         self.all: dict[str, Job] = {job.name: job for job in _of_earlier_servers(session)}
 
@@ -147,25 +147,6 @@ class Jobs:
                     signal_group(job.process.pid, KILLED)
             if late:
                 await asyncio.wait(late, timeout=self._settings.stop_seconds)
-
-    async def answer(self, words: Sequence[str]) -> tuple[int, str, str]:
-        """Run a command that looks at a file and stops; as many at once as jobs.
-
-        Returns:
-            Exit code, standard output and standard error.
-        """
-        async with self._looks:
-            return await self._answer(words)
-
-    async def _answer(self, words: Sequence[str]) -> tuple[int, str, str]:
-        process = await _spawn(words, self._session.folder, asyncio.subprocess.PIPE)
-        try:
-            out, said = await asyncio.wait_for(process.communicate(), self._settings.answer_seconds)
-        except (TimeoutError, asyncio.CancelledError):
-            signal_group(process.pid, KILLED)
-            await process.wait()
-            raise InputError(f"the answer must come within {self._settings.answer_seconds:g} s, but did not") from None
-        return process.returncode or 0, out.decode("utf-8", "replace"), said.decode("utf-8", "replace").strip()
 
     async def _run(self, job: Job) -> None:
         async with self._room:

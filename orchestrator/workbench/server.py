@@ -22,13 +22,15 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from orchestrator.errors import InputError, OrchestratorError, RecordError
+from orchestrator.fmi.preview import FmuPreview
 from orchestrator.records.model_file import read_model
 from orchestrator.records.preview import LogPreview
 from orchestrator.reporting import render
+from orchestrator.scenarios.ssp.preview import SystemPreview
 from orchestrator.shared.output import write_whole
 from orchestrator.workbench.command_lines import command_line
 from orchestrator.workbench.compare import compare_results
-from orchestrator.workbench.curves import CurvesAsked, CurvesShown, LookAsked
+from orchestrator.workbench.curves import CurvesAsked, CurvesShown, InterfaceAsked, LookAsked
 from orchestrator.workbench.guard import Guard
 from orchestrator.workbench.jobs import Jobs
 from orchestrator.workbench.log_readers import LogReaders
@@ -117,7 +119,7 @@ class Workbench:
             raise InputError(f"`file` must be a log, but {self.session.reference_of(log)} is an FMU or SSP file")
         return log
 
-    async def _read(self, log: Path, asked: LookAsked | CurvesAsked, answer: type[Any]) -> Response:
+    async def _read(self, log: Path, asked: LookAsked | CurvesAsked | InterfaceAsked, answer: type[Any]) -> Response:
         found = await self.readers.ask(log, asked, answer)
         return Response(msgspec.json.encode(found), media_type="application/json")
 
@@ -174,11 +176,11 @@ class Workbench:
 
     async def variables(self, request: Request) -> Response:
         """Return the interface of an FMU."""
-        words = command_line(self.session, "inspect", [request.query_params.get("file", "")], {})
-        code, out, said = await self.jobs.answer([words[0], "--columns", *words[1:]])
-        if code:
-            return _problem(said.removeprefix("error: "), 422)
-        return Response(out, media_type="application/json")
+        path = self.session.path_of(request.query_params.get("file", ""))
+        if kind_of(path) != "fmu":
+            raise InputError(f"`file` must be an FMU or SSP file, but is {self.session.reference_of(path)}")
+        answer = SystemPreview if path.suffix.lower() == ".ssp" else FmuPreview
+        return await self._read(path, InterfaceAsked(), answer)
 
     async def write_scenario(self, request: Request) -> Response:
         """Write a scenario that was drawn; whether it fits, its run says."""

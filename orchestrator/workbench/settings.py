@@ -16,7 +16,7 @@ class WorkbenchSettings:
     largest_notes: int = 4 * MEBIBYTE
     jobs_at_once: int = 4  # further ones wait: each of them keeps a core busy
     answer_seconds: float = 120.0  # that a look at a file or a model may take
-    logs_open: int = 3  # logs whose channels are drawn without reading them anew: each holds a process
+    logs_open: int = 4  # logs and FMUs that are shown without reading them anew: each holds a process
     slider_models: int = 3  # models that stay ready under sliders: each holds an instance of an FMU
     stop_seconds: float = 10.0  # that jobs have to clean up when the server ends
     longest_message: int = 2000  # characters of a line that a job writes to standard error

@@ -246,14 +246,6 @@ def test_the_page_of_an_ssp_file_says_what_ran(tmp_path):
     )
 
 
-def test_the_page_of_an_ssp_file_that_was_written(tmp_path):
-    written = {"file": "paired.ssp", "components": ["plant", "controller"], "connections": 4, "stop": 2.0, "step": 1e-3}
-    write_result(tmp_path, "ssp", {"action": "export", "file": None}, None, written)
-    assert report_from_directory(tmp_path).summary == (
-        "paired.ssp was written: plant, controller; 4 connections. It was not run."
-    )
-
-
 def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delivered(tmp_path):
     level = {"value": 0.8, "standard_error": 1e-4, "interval": [0.79, 0.81], "unit": "N.m"}
     friction = {

@@ -185,19 +185,6 @@ def test_advice_names_fields_and_names_keep_their_brackets(page: Any, served: Se
         assert call(page, "tree.js", "partsOf", name) == parts
 
 
-def test_channels_that_look_alike_become_a_button_each(page: Any, served: Served, tmp_path: Path) -> None:
-    log = tmp_path / "alike.csv"
-    log.write_text("time,T_cmd,phi1,phi2\n" + "".join(f"{n / 100},{n % 7},{n},{n / 9}\n" for n in range(50)))
-    file = served.upload(log)
-    problem = served.ask("POST", "columns", {"file": file, "columns": {}})[1]["problem"]
-    open_workbench(page, served)
-    rivals = call(page, "advice.js", "rivalsOf", problem)
-    assert rivals == {"column": "theta_m", "names": ["phi1", "phi2"]}
-    columns = {"theta_m": {"name": "phi1"}, "theta_l": {"name": "phi2"}}
-    problem = served.ask("POST", "columns", {"file": file, "columns": columns})[1]["problem"]
-    assert call(page, "advice.js", "rivalsOf", problem) is None
-
-
 def test_a_file_dropped_in_another_tab_is_told_where_it_goes(page: Any, served: Served, tmp_path: Path) -> None:
     open_workbench(page, served)
     for tab, name in (("log", "axis.toml"), ("log", "axis.fmu"), ("machine", "axis.trc"), ("fmus", "axis2.html")):

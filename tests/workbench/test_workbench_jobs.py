@@ -1,6 +1,5 @@
 """Jobs of the workbench: the command itself, its numbers, its Ctrl-C, and what is left when the server dies."""
 
-import asyncio
 import json
 import os
 import re
@@ -15,9 +14,6 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.operating_system import command_options
-from orchestrator.workbench import jobs
-from orchestrator.workbench.session import open_session
-from orchestrator.workbench.settings import WorkbenchSettings
 from tests.support.broken_archives import ARCHIVES
 from tests.support.c_fmu import have_compiler
 from tests.support.engine_process import children, wait_until_gone
@@ -207,29 +203,3 @@ def test_a_stop_that_comes_first_of_all_is_told_in_a_word() -> None:
     command = [sys.executable, "-m", "orchestrator", "inspect", "none.csv"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, preexec_fn=stopped_at_once)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
-
-
-def test_looks_at_files_wait_for_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever clicks faster than a file is read does not start a process for each click at once."""
-    under_way, most = 0, 0
-
-    class Process:
-        returncode = 0
-
-        async def communicate(self) -> tuple[bytes, bytes]:
-            nonlocal under_way, most
-            most = max(most, under_way := under_way + 1)
-            await asyncio.sleep(0)
-            under_way -= 1
-            return b"{}", b""
-
-    async def spawn(*given: object) -> Process:
-        return Process()
-
-    async def look(count: int) -> list[tuple[int, str, str]]:
-        found = jobs.Jobs(open_session(tmp_path / "session"), WorkbenchSettings(jobs_at_once=3))
-        return await asyncio.gather(*(found.answer(["inspect"]) for _ in range(count)))
-
-    monkeypatch.setattr(jobs, "_spawn", spawn)
-    assert asyncio.run(look(20)) == 20 * [(0, "{}", "")]
-    assert most == 3

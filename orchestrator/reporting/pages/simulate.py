@@ -24,7 +24,7 @@ def build(source: ResultDocument) -> Report:
     results = source.results
     file = Path(str(source.arguments.get("file") or results.get("file") or "")).name
     if not table:
-        return _page_of_export(source, file) if source.command == "ssp" and file else generic.build(source)
+        return generic.build(source)
     if "alpha" in results:
         sections, summary = _pair(source, read(results, PairFound), table)
     else:
@@ -42,15 +42,6 @@ def _what_ran(file: str, results: SignalsFound, table: Columns) -> str:
     step = f" of {end / results.steps:.6g} s" if results.steps else ""
     named = f", with signals of {', '.join(components)}" if components else ""
     return f"The system in {file} was run from 0 to {end:g} s in steps{step}{named}."
-
-
-def _page_of_export(source: ResultDocument, file: str) -> Report:
-    """Return the page of an SSP file that was written, not run."""
-    results = source.results
-    components = ", ".join(str(name) for name in results.get("components") or ())
-    summary = f"{file} was written: {components}; {results.get('connections', 0)} connections. It was not run."
-    sections = tuple(sections_of("The file", results))
-    return Report(f"SSP file {file}", summary, sections)
 
 
 def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[list[Section], str]:

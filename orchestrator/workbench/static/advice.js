@@ -32,9 +32,3 @@ export function adviceOf(line) {
   if (key === "unit") return { column, key, value: text === '"..."' ? undefined : text.replace(/^"(.*)"$/, "$1") };
   return { column, key, value: Number.isFinite(Number(text)) ? Number(text) : undefined };
 }
-
-// The two channels of which a line says that both look like one column.
-export function rivalsOf(line) {
-  const [, column, first, second] = /both look like .*`\[columns\.(\w+)\] name = "([^"]+)"` \(or `([^`]+)`\)/.exec(line ?? "") ?? [];
-  return column in TITLES ? { column, names: [first, second] } : null;
-}

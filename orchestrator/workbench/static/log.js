@@ -1,4 +1,4 @@
-import { adviceOf, NUMBERS, plain, rivalsOf, TITLES } from "./advice.js";
+import { adviceOf, NUMBERS, plain, TITLES } from "./advice.js";
 import { post } from "./api.js";
 import { ChannelList } from "./channels.js";
 import { Curves } from "./curves.js";
@@ -164,7 +164,7 @@ class LogTab {
       fill(this.body,
         make("p", { class: "note" }, plain(seen.dialect)),
         seen.problem ? make("p", { class: "message", role: "alert" }, problemOf(seen)) : make("p", {}, make("span", { class: "tag good" }, "can be read")),
-        ...this.namesakes(seen.problem), this.advised(seen.problem),
+        this.advised(seen.problem),
         this.curves.tools, make("div", { class: "cards" }, seen.columns.map((one) => this.card(one))), this.changes,
         make("p", {}, action("Look at this log", this.said, () => this.inspect(), "main")));
     }
@@ -178,12 +178,6 @@ class LogTab {
     if (told?.value === undefined) return null;
     const text = `Set “${NUMBERS[told.key] ?? told.key}” of “${TITLES[told.column]}” to ${told.value}`;
     return action(text, this.said, async () => this.change(told.column, { [told.key]: told.value }));
-  }
-
-  // A button for each channel of which a line says that both look like one column.
-  namesakes(line) {
-    const { column, names } = rivalsOf(line) ?? { names: [] };
-    return names.map((name) => action(`Use “${name}” as “${TITLES[column]}”`, this.said, async () => this.change(column, { name })));
   }
 
   lines() {
@@ -224,12 +218,10 @@ const labelOf = (seen, one) => (one.place !== null ? seen.channels[one.place].la
 const rangeOf = (one) => (one.least === null ? "" : `${digits(one.least)} to ${digits(one.most)} ${one.si}`);
 
 function problemOf(seen) {
-  const rivals = rivalsOf(seen.problem);
   const needs = seen.columns.flatMap((one) => one.needs.map((key) => `${TITLES[one.column]}: ${NUMBERS[key] ?? key}`));
   const missing = seen.columns.filter((one) => one.how === "absent" && seen.missing.includes(one.column));
   const orRate = (one) => (one.column === "time" ? `, or ${NUMBERS.rate}` : "");
-  const alike = (one) => (one.column === rivals?.column ? ` (${rivals.names.map((name) => `“${name}”`).join(" and ")} both look like it)` : "");
-  const asked = [...missing.map((one) => `${TITLES[one.column]}: the channel that holds it${alike(one)}${orRate(one)}`), ...needs];
+  const asked = [...missing.map((one) => `${TITLES[one.column]}: the channel that holds it${orRate(one)}`), ...needs];
   return asked.length ? `Still needed. ${asked.join("; ")}` : plain(seen.problem);
 }
 
