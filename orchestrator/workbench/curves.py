@@ -1,7 +1,7 @@
 """What the page shows of a file, in a child process behind walls: the channels of a log, the interface of an FMU.
 
 Of a channel the smallest and the largest value of each stretch of ``STRETCH`` rows are kept, not its rows. A large
-text is first drawn of a few rows of each of its blocks, and is read whole meanwhile: ``SLICE`` seconds a request.
+log is drawn as far as it is read, and read on: ``SLICE`` seconds a request.
 """
 
 import os
@@ -27,8 +27,6 @@ from orchestrator.shared.arrays import Array, plain_numbers
 
 STRETCH = 64  # rows
 SLICE = 0.1  # s of a request that go into reading on
-LARGE = 4_000_000  # bytes of a log of which a few rows are drawn first
-FEW = 30  # rows of each block, then
 
 
 class CurveShown(msgspec.Struct, frozen=True):
@@ -95,12 +93,9 @@ class Trace:
         self.least, self.most, self.at_least, self.at_most = np.inf, -np.inf, 0, 0
         self.problem, self.whole = "", False
 
-    def add(self, values: Array, first: int | None = None) -> None:
-        """Take the next rows; or, with ``first``, a few rows of many as one stretch."""
+    def add(self, values: Array) -> None:
+        """Take the next rows."""
         self._count(values)
-        if first is not None:
-            self._parts.append((np.array([first]), np.fmin.reduce(values)[None], np.fmax.reduce(values)[None]))
-            return
         start = self.rows - self._rest.size
         self.rows += values.size
         self._rest = np.concatenate([self._rest, values])
@@ -175,7 +170,6 @@ class LogReader:
 
     def _forget(self) -> None:
         self._traces: dict[int, Trace] = {}
-        self._sampled: dict[int, Trace] = {}
         self._pass: Iterator[float] | None = None
         self._share = 1.0
 
@@ -201,17 +195,13 @@ class LogReader:
         heads, stretches = source.heads, asked.stretches
         places = [place for place in asked.places if 0 <= place < len(heads) and heads[place].kind == "number"]
         unread = [place for place in places if place not in self._traces]
-        fresh = [place for place in unread if place not in self._sampled]
-        if fresh and isinstance(source, TextSource) and self._path.stat().st_size > LARGE:
-            self._sampled |= self._sample(source, fresh)
         if self._pass is None and unread:
             self._pass, self._share = self._read(source, unread), 0.0
         self._read_on()
         shown = {}
         for place in places:
-            trace = self._traces.get(place) or self._sampled.get(place) or Trace()
-            shown[place] = trace.show(place, asked.first, asked.last, stretches)
-        close = [place for place in shown if 0 < self._rows_in_view(place, asked) < STRETCH * stretches]
+            shown[place] = self._traces.get(place, Trace()).show(place, asked.first, asked.last, stretches)
+        close = [n for n, one in shown.items() if one.whole and 0 < self._rows_in_view(n, asked) < STRETCH * stretches]
         for group in _groups(source, close):
             shown |= _closer(shown, source, group, asked)
         rows = max((trace.rows for trace in self._traces.values()), default=0)
@@ -219,20 +209,14 @@ class LogReader:
 
     def _rows_in_view(self, place: int, asked: CurvesAsked) -> int:
         """Return how many rows of a channel that was read lie in view."""
-        return min(self._traces[place].rows, asked.last + 1) - asked.first if place in self._traces else 0
-
-    def _sample(self, source: RecordSource, places: list[int]) -> dict[int, Trace]:
-        traces = {place: Trace() for place in places}
-        for first, _, values in source.pieces(places, FEW):
-            for place, part in zip(places, values, strict=True):
-                traces[place].add(part, first)
-        return traces
+        return min(self._traces[place].rows, asked.last + 1) - asked.first
 
     def _read(self, source: RecordSource, places: list[int]) -> Iterator[float]:
         """Read channels to their end; yield the share that is done, piece by piece."""
         groups = _groups(source, places)
         for n, group in enumerate(groups):
             traces = {place: Trace() for place in group}
+            self._traces |= traces
             try:
                 for first, count, values in source.pieces(group):
                     for place, part in zip(group, values, strict=True):
@@ -243,7 +227,6 @@ class LogReader:
                     trace.problem = str(error)
             for trace in traces.values():
                 trace.finish()
-            self._traces |= traces
 
     def _read_on(self) -> None:
         end = time.monotonic() + SLICE

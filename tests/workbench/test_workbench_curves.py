@@ -4,6 +4,7 @@ import asyncio
 import os
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -82,18 +83,16 @@ def test_few_rows_in_view_are_shown_as_they_are(log: Path, values: np.ndarray) -
 
 
 @pytest.mark.parametrize("log", ["csv"], indirect=True)  # other formats are read at once
-def test_a_large_text_is_drawn_before_it_is_read(
-    log: Path, values: np.ndarray, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(curves, "LARGE", 0)
-    monkeypatch.setattr(curves, "SLICE", 0.0)
+def test_a_log_is_drawn_as_far_as_it_is_read(log: Path, values: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter((0.0, 0.0, 1.0))  # the second look is too late: one block is read
+    monkeypatch.setattr(curves, "time", SimpleNamespace(monotonic=lambda: next(clock)))
     reader = LogReader(log)
     first = reader.answer(CurvesAsked((1,)))
-    assert (first.share, first.curves[0].whole) == (0.0, False)
-    few = values[: curves.FEW, 1]
-    assert first.curves[0].high[0] == pytest.approx(few.max(), rel=1e-6)
-    monkeypatch.setattr(curves, "SLICE", 9.0)
-    assert reader.answer(CurvesAsked((1,))).curves[0].whole
+    assert 0 < first.rows < ROWS
+    assert not first.curves[0].whole
+    assert max(first.curves[0].high) == pytest.approx(values[: first.rows, 1].max(), rel=1e-6)
+    monkeypatch.undo()
+    assert whole(reader).curves[1].whole
 
 
 def test_what_is_no_column_of_numbers_is_left_out_or_told(tmp_path: Path) -> None:

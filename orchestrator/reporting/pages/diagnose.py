@@ -13,7 +13,6 @@ from orchestrator.reporting.model import Facts, Plot, Report, Section, Series, T
 from orchestrator.reporting.pages import any_fmu
 from orchestrator.reporting.pages.diagnosis_answer import (
     SIGNALS,
-    SIZES,
     answer_table,
     headline,
     in_words,
@@ -29,7 +28,7 @@ from orchestrator.reporting.pages.diagnosis_tables import (
 from orchestrator.reporting.pages.generic import folds_of
 from orchestrator.reporting.pages.meanings import with_meanings
 from orchestrator.reporting.pages.record import signal_plots
-from orchestrator.reporting.source import ResultDocument, words
+from orchestrator.reporting.source import ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
 from orchestrator.shared.results.diagnose import (
@@ -43,8 +42,6 @@ from orchestrator.shared.results.diagnose import (
 from orchestrator.shared.results.fields import fields_table
 
 MISSING = "The torque that the model misses without the effect, and how much of that its law accounts for."
-BLOCKS = "The size as every block of the record by itself says it. Where blocks agree, a size is sure."
-UNSIZED = frozenset({"phase", "cycles_per_rev"})  # parameters that are no sizes
 
 
 def build(source: ResultDocument) -> Report:
@@ -69,7 +66,6 @@ def build(source: ResultDocument) -> Report:
         "Evidence for each effect": [
             *evidence_table(results.effects),
             *_missing_plots(results.effects),
-            *_block_plots(results.effects),
         ],
         "Test data": [*_tests(results), *signal_plots(table, restarts, metric)],
         "What remains unexplained": [*_residual_sections(results.remaining), *_law_sections(results.learned_law)],
@@ -128,29 +124,6 @@ def _missing_plots(effects: Sequence[EffectFound]) -> list[Section]:
         law = Series("of it the effect", curve.x, curve.law)
         title = f"Missing torque: {place_words(effect.name, effect.site)}"
         made.append(Plot(title, curve.x_label, curve.y_label, (missing, law), note=MISSING))
-    return made
-
-
-def _block_plots(effects: Sequence[EffectFound]) -> list[Section]:
-    """Return the size of each effect as every block of the record by itself says it."""
-    made: list[Section] = []
-    for effect in effects:
-        for name, values in effect.block_values.items():
-            size = effect.parameters.get(name)
-            if name in UNSIZED or size is None or len(values) < 2:
-                continue
-            blocks = list(range(1, len(values) + 1))
-            low, high = size.interval or (None, None)
-            series = [Series("of each block by itself", blocks, values, "points")]
-            series += [
-                Series(label, (blocks[0], blocks[-1]), (value, value))
-                for label, value in (("of all", size.value), ("95 % from", low), ("to", high))
-                if value is not None
-            ]
-            what = SIZES.get(name, words(name))
-            label = f"{what} [{size.unit or '1'}]"
-            title = f"Block by block: {place_words(effect.name, effect.site)}, {what}"
-            made.append(Plot(title, "block of the record", label, tuple(series), note=BLOCKS))
     return made
 
 

@@ -101,7 +101,7 @@ export class Curves {
     for (const place of places) this.known.set(place, { whole: true, rows: [], ...found.curves.find((one) => one.place === place), first, last });
     for (const [figure, place] of this.seen) this.draw(figure, this.known.get(place));
     const rows = `rows ${(this.first + 1).toLocaleString("en")} to ${(this.end() + 1).toLocaleString("en")}`;
-    this.said.textContent = found.share < 1 ? `A first look; ${Math.round(100 * found.share)} % of the rows are read` : rows;
+    this.said.textContent = found.share < 1 ? `${Math.round(100 * found.share)} % of the rows are read` : rows;
   }
 
   draw(figure, curve) {
