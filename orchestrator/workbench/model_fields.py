@@ -5,10 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from orchestrator.errors import InputError
 from orchestrator.plain_text import plain_text
-from orchestrator.records.columns import COLUMNS
-from orchestrator.records.model_file import COLUMN_NUMBERS, Model, ModelParameter, read_model
+from orchestrator.records.model_file import Model, ModelParameter, read_model
 from orchestrator.records.model_text import entry_texts, toml_text
 
 YOURS = "yours"
@@ -55,47 +56,60 @@ def entry_values(entry: Any) -> dict[str, Any]:
     return {name: getattr(entry, name) for name in entry_texts(entry)}
 
 
+class ModelChanges(msgspec.Struct):
+    """What a page changes of a model file: values by name; columns, encoders and header in place of the file's."""
+
+    parameters: dict[str, dict[str, float]] = {}  # ``value`` and ``uncertainty`` (absolute)
+    columns: dict[str, dict[str, float | int | str]] | msgspec.UnsetType = msgspec.UNSET
+    encoders: dict[str, dict[str, float | int | str]] | msgspec.UnsetType = msgspec.UNSET
+    header: int | msgspec.UnsetType | None = msgspec.UNSET
+
+
 def model_text(base: Path | None, changes: Mapping[str, Any]) -> str:
     """Return the text of a model file: ``base`` with some values changed.
 
     Args:
         base: the model file that the fields were read from; None: the default model.
-        changes: ``parameters``: by name ``value`` and ``uncertainty`` (absolute); ``columns``, ``encoders`` and
-            ``header`` in place of those of ``base``.
+        changes: see ``ModelChanges``.
 
     Raises:
-        InputError: something of this is unknown, or of the wrong kind. What values may be, ``read_model`` says.
+        InputError: something of this is of the wrong kind. What keys and values may be, ``read_model`` says.
     """
     model = read_model(base)
     said = {} if base is None else _remarks(base.read_text(encoding="utf-8"))
-    given = _tables(changes, "parameters")
-    for name in given:
-        if name not in model.parameters:
-            raise InputError(f"`parameters.{name[:60]}` must be a parameter of {model.fmu}, but is not")
-    lines = [f"fmu = {toml_text(model.fmu)}"]
-    header = changes.get("header", model.header)
-    if header is not None:
-        lines.append(f"header = {_number(header, 'header')}")
-    for group, kept in (("columns", model.columns), ("encoders", model.encoders)):
-        entries = _tables(changes, group) if group in changes else {n: entry_values(e) for n, e in kept.items()}
+    try:
+        asked = msgspec.convert(changes, ModelChanges)
+    except msgspec.ValidationError as error:
+        raise InputError(f"changes of a model must be tables of numbers and texts, but: {error}") from None
+    header = model.header if asked.header is msgspec.UNSET else asked.header
+    lines = [f"fmu = {toml_text(model.fmu)}", *([] if header is None else [f"header = {header}"])]
+    for group, given, kept in (
+        ("columns", asked.columns, model.columns), ("encoders", asked.encoders, model.encoders),
+    ):  # fmt: skip
+        entries = {n: entry_values(e) for n, e in kept.items()} if isinstance(given, msgspec.UnsetType) else given
         for name, entry in entries.items():
-            lines += ["", f"[{group}.{_key(name)}]", *(f"{_key(key)} = {_text(v, key)}" for key, v in entry.items())]
-    stated = [name for name in model.parameters if name in model.stated or name in given]
-    for name in stated:
-        lines += ["", *_parameter_lines(model.parameters[name], given.get(name), said.get(name, ""))]
+            lines += ["", f"[{group}.{_key(name)}]"]
+            lines += [f"{_key(key)} = {toml_text(value)}" for key, value in entry.items()]
+    for name in dict.fromkeys([*model.parameters, *asked.parameters]):
+        if name in model.stated or name in asked.parameters:
+            one = model.parameters.get(name)
+            lines += ["", *_parameter_lines(name, one, asked.parameters.get(name, {}), said.get(name, ""))]
     return "\n".join(lines) + "\n"
 
 
-def _parameter_lines(parameter: ModelParameter, change: Mapping[str, Any] | None, said: str) -> list[str]:
-    value, uncertainty = parameter.value, parameter.uncertainty
-    if change is not None:
-        value = _number(change.get("value", value), f"parameters.{parameter.name}.value")
-        uncertainty = _number(change.get("uncertainty", uncertainty), f"parameters.{parameter.name}.uncertainty")
-    changed = (value, uncertainty) != (parameter.value, parameter.uncertainty)
-    remark = f"{parameter.unit or '1'}: {YOURS}" if changed else said
-    note = f"   # {plain_text(remark)}" if remark else ""
-    lines = [f"[parameters.{toml_text(parameter.name)}]", f"value = {value!r}{note}", f"uncertainty = {uncertainty!r}"]
-    return lines + ["assumed = true"] * (parameter.assumed and not changed)
+def _parameter_lines(name: str, kept: ModelParameter | None, change: Mapping[str, float], said: str) -> list[str]:
+    stated = {} if kept is None else {"value": kept.value, "uncertainty": kept.uncertainty}
+    values = {**stated, **change}
+    changed = values != stated
+    remark = f"{kept.unit if kept and kept.unit else '1'}: {YOURS}" if changed else said
+    notes = {"value": f"   # {plain_text(remark)}" if remark else ""}
+    lines = [f"{_key(key)} = {value!r}{notes.get(key, '')}" for key, value in values.items()]
+    assumed = kept is not None and kept.assumed and not changed
+    return [f"[parameters.{toml_text(name)}]", *lines, *(["assumed = true"] * assumed)]
+
+
+def _key(name: str) -> str:
+    return name if name.isidentifier() and name.isascii() else toml_text(name)
 
 
 def _remarks(text: str) -> dict[str, str]:
@@ -119,30 +133,3 @@ def _source(name: str, model: Model, said: Mapping[str, str]) -> str:
     if model.parameters[name].assumed or "of the thesis" in remark:
         return "assumed"
     return "from the record" if "record" in remark or "ROUGH" in remark else YOURS
-
-
-def _tables(changes: Mapping[str, Any], group: str) -> dict[str, Mapping[str, Any]]:
-    tables = changes.get(group, {})
-    if not isinstance(tables, Mapping) or not all(isinstance(entry, Mapping) for entry in tables.values()):
-        raise InputError(f"`{group}` must be tables by name, but is {str(tables)[:60]!r}")
-    return dict(tables)
-
-
-def _key(name: str) -> str:
-    known = {*COLUMNS, *COLUMN_NUMBERS, "name", "unit", "resolution", "noise"}
-    if name not in known:
-        raise InputError(f"`{name[:60]}` must be one of {', '.join(sorted(known))}, but is not")
-    return name
-
-
-def _text(value: Any, key: str) -> str:
-    return toml_text(value) if isinstance(value, str) else repr(_number(value, key))
-
-
-def _number(value: Any, key: str) -> float | int:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"`{key}` must be a number, but is {str(value)[:60]!r}")
-    return value
-
-
-__all__ = ["entry_values", "model_fields", "model_text"]

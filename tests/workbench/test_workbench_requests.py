@@ -264,7 +264,7 @@ def test_models_say_what_is_wrong_with_them(served: Served) -> None:
     before = files(served)
     for wrong, word in [
         ({"parameters": {"J_m": {"value": -1.0}}}, "J_m"),
-        ({"parameters": {"J_m": {"value": "1; import os"}}}, "J_m"),
+        ({"parameters": {"J_m": {"value": "1; import os"}}}, "parameters"),
         ({"parameters": {"nonsense": {"value": 1.0}}}, "nonsense"),
         ({"columns": {"u": {"name]\n[evil": "x"}}}, "must be one of"),
         ({"columns": {"u": {"unit": "furlong"}}}, "unit"),
