@@ -6,8 +6,8 @@ import math
 import re
 import secrets
 import socket
-from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -94,13 +94,10 @@ class Workbench:
         """Return what a log holds and what its columns would be taken from, with the choices of the page."""
         asked = await self._asked(request)
         log = self._log(asked)
-        chosen = self._scratch(model_text(None, {key: asked[key] for key in ("columns", "header") if key in asked}))
-        try:
+        with self._draft(
+            model_text(None, {key: asked[key] for key in ("columns", "header") if key in asked})
+        ) as chosen:
             model = await run_in_threadpool(read_model, chosen)
-        except OrchestratorError as error:
-            return _problem(str(error).replace(f" in {chosen}", ""), 422)  # a file that nobody has written
-        finally:
-            chosen.unlink(missing_ok=True)
         return await self._read(log, LookAsked(model.columns, model.header), LogPreview)
 
     async def curves(self, request: Request) -> Response:
@@ -137,13 +134,8 @@ class Workbench:
         asked = await self._asked(request)
         base = self.session.path_of(asked["base"]) if asked.get("base") else None
         text = await run_in_threadpool(model_text, base, asked)
-        draft = self._scratch(text)
-        try:
+        with self._draft(text) as draft:
             await run_in_threadpool(model_fields, draft)
-        except OrchestratorError as error:
-            raise InputError(str(error).replace(str(draft), "the model")) from None
-        finally:
-            draft.unlink(missing_ok=True)
         return self._written(self.session.write_file(str(asked.get("name") or "machine.toml"), text))
 
     async def start(self, request: Request) -> Response:
@@ -228,11 +220,17 @@ class Workbench:
     def _written(self, path: Path) -> Response:
         return JSONResponse({"file": self.session.reference_of(path), "name": path.name}, 201)
 
-    def _scratch(self, text: str) -> Path:
-        """Write a model file for one look."""
+    @contextmanager
+    def _draft(self, text: str) -> Iterator[Path]:
+        """Give a model file for one look; an error about it does not name it, for nobody has written it."""
         path = self.session.folder / f".look-{secrets.token_hex(8)}.toml"
         write_whole(path, text)
-        return path
+        try:
+            yield path
+        except OrchestratorError as error:
+            raise InputError(str(error).replace(f" in {path}", "")) from None
+        finally:
+            path.unlink(missing_ok=True)
 
 
 def _finite(text: str) -> int | float:
