@@ -11,18 +11,17 @@ beforehand. A commit of this repository is unpacked into a temporary folder.
 """
 
 import argparse
-import io
 import json
 import os
 import shutil
 import subprocess
 import sys
-import tarfile
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 from tests.support.independent_plant import make_record
+from tools.release import committed
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORD, MODEL = "docs/examples/machine.csv", "docs/examples/machine.toml"
@@ -84,12 +83,7 @@ def write_log(path: Path, rows: int) -> None:
 
 def checkout(name: str, folder: Path) -> Path:
     """Return a checkout: a folder that is one, else this repository's commit of that name, unpacked."""
-    if Path(name).is_dir():
-        return Path(name).resolve()
-    packed = subprocess.run(["git", "archive", name], cwd=ROOT, capture_output=True, check=True).stdout
-    with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
-        archive.extractall(folder, filter="data")
-    return folder
+    return Path(name).resolve() if Path(name).is_dir() else committed(ROOT, folder, name)
 
 
 def main() -> None:
@@ -108,19 +102,25 @@ def compare(names: list[str], other_root: Path, rows: int) -> None:
     print(
         f"{'command':14}{'run':6}{'this s':>8}{'other s':>9}{'ratio':>7}{'this MiB':>10}{'other MiB':>11}{'ratio':>7}"
     )
-    for name in names:
-        with tempfile.TemporaryDirectory() as folder:
-            homes = [Path(folder) / "this", Path(folder) / "other"]
-            copies = [home / "checkout" for home in homes]
-            for root, copy in zip((ROOT, other_root), copies, strict=True):
-                shutil.copytree(root, copy, ignore=shutil.ignore_patterns(".*", "__pycache__", "*.fmu"))
-            log = Path(folder) / "log.csv"
-            if name.startswith("long"):
-                write_log(log, rows)
-            command = [word.replace("{log}", str(log)) for word in COMMANDS[name]]
-            for state in ("cold", "warm"):
-                this, other = (run(root, command, home) for root, home in zip(copies, homes, strict=True))
-                print(
+    with tempfile.TemporaryDirectory() as shared:
+        log = Path(shared) / "log.csv"
+        if any(name.startswith("long") for name in names):
+            write_log(log, rows)
+        for name in names:
+            compare_command(name, other_root, log)
+
+
+def compare_command(name: str, other_root: Path, log: Path) -> None:
+    """Print the rows of one command."""
+    with tempfile.TemporaryDirectory() as folder:
+        homes = [Path(folder) / "this", Path(folder) / "other"]
+        copies = [home / "checkout" for home in homes]
+        for root, copy in zip((ROOT, other_root), copies, strict=True):
+            shutil.copytree(root, copy, ignore=shutil.ignore_patterns(".*", "__pycache__", "*.fmu"))
+        command = [word.replace("{log}", str(log)) for word in COMMANDS[name]]
+        for state in ("cold", "warm"):
+            this, other = (run(root, command, home) for root, home in zip(copies, homes, strict=True))
+            print(
                     f"{name:14}{state:6}{this.seconds:8.1f}{other.seconds:9.1f}{this.seconds / other.seconds:7.2f}"
                     f"{this.memory:10.0f}{other.memory:11.0f}{this.memory / other.memory:7.2f}", flush=True,
                 )  # fmt: skip

@@ -25,6 +25,7 @@ import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.support.engine_process import children
 from tests.support.workbench import Served, workbench
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -97,10 +98,8 @@ def family(pid: int) -> dict[int, str | None]:
     found: dict[int, str | None] = {}
     waiting = [pid]
     while waiting:
-        for path in Path(f"/proc/{waiting.pop()}/task").glob("*/children"):
-            with contextlib.suppress(OSError):
-                waiting += (mine := [int(word) for word in path.read_text().split()])
-                found |= {child: started(child) for child in mine}
+        waiting += (mine := children(waiting.pop()))
+        found |= {child: started(child) for child in mine}
     return found
 
 
@@ -238,9 +237,14 @@ def kill_job(place: Place, _: str, kills: int, dice: random.Random) -> str:
             name = start(served)
             time.sleep(dice.uniform(0.0, took))
             known = family(served.process.pid)
+            begun = time.monotonic()
             served.process.send_signal(number)
-            with contextlib.suppress(subprocess.TimeoutExpired):
+            try:
                 served.process.wait(ENDS)
+            except subprocess.TimeoutExpired:
+                served.process.kill()
+                place.faults.append(f"the workbench did not end within {ENDS:g} s of {number.name}")
+            place.slowest = max(place.slowest, time.monotonic() - begun)
         place.faults += [f"{number.name}: still runs: {line}" for line in find_left(mark, known)]
         found = set(files_of(place.out / "results" / name))
         state = "whole" if found >= whole else "mixed" if found & RESULTS else "none"

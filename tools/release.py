@@ -36,9 +36,9 @@ def commit_time(root: Path) -> int:
     return int(subprocess.run(words, cwd=root, check=True, capture_output=True, text=True).stdout)
 
 
-def committed(root: Path, folder: Path) -> Path:
-    """Unpack the last commit of a checkout into ``folder`` and return it."""
-    words = ["git", "archive", "--format=tar", "HEAD"]
+def committed(root: Path, folder: Path, commit: str = "HEAD") -> Path:
+    """Unpack a commit of a checkout, by default its last one, into ``folder`` and return it."""
+    words = ["git", "archive", "--format=tar", commit]
     archive = subprocess.run(words, cwd=root, check=True, capture_output=True).stdout
     with tarfile.open(fileobj=io.BytesIO(archive)) as found:
         found.extractall(folder, filter=_plain)

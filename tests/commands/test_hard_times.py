@@ -90,6 +90,25 @@ run()
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="threads are counted in /proc")
+@pytest.mark.parametrize("asked", ["", "3"])
+def test_libraries_of_matrices_start_no_thread_that_nobody_asked_for(tmp_path: Path, asked: str) -> None:
+    (tmp_path / "counter.py").write_text("""
+import os
+def main():
+    import scipy.linalg
+    limits = (os.environ[f"{name}_NUM_THREADS"] for name in ("OMP", "OPENBLAS", "MKL"))
+    print(len(os.listdir("/proc/self/task")), *limits)
+    return 0
+""")
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    environment |= {"PYTHONPATH": os.pathsep.join([str(ROOT), str(tmp_path)])}
+    environment |= {"OMP_NUM_THREADS": asked} if asked else {}
+    words = [sys.executable, "-c", "from orchestrator.__main__ import run; run('counter')"]
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1", asked or "1", "1", "1"]
+
+
 @pytest.mark.parametrize("error", [MemoryError(), OSError(24, "Too many open files")])
 def test_what_happens_while_a_command_runs(error: BaseException, monkeypatch, capsys, tmp_path: Path) -> None:
     def run(_: object) -> int:
