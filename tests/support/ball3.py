@@ -1,14 +1,10 @@
 """FMUs of FMI 3.0 written in C and built by the tests: a ball that bounces, correct or with one fault."""
 
-import functools
-import subprocess
-import tempfile
 from pathlib import Path
-
-import fmpy
 
 from orchestrator.checking.binaries import here
 from tests.support.c_fmu import SUFFIX, write_fmu
+from tests.support.c_library import compile_source
 
 HERE = Path(__file__).parent
 LIBRARY = f"binaries/{here('3.0')}/Ball{SUFFIX}"
@@ -73,17 +69,10 @@ def model_description(interface: str = "CoSimulation") -> str:
     return f"{text[:begin]}  {INTERFACES[interface]}\n{text[end:]}"
 
 
-@functools.cache
 def compile_library(fault: str = "") -> bytes:
     """Compile ``ball3.c`` with a fault (empty: none; "hostile": what resources/hostile.txt says)."""
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / f"Ball{SUFFIX}"
-        words = ["cc", "-std=gnu11", "-O1", "-g0", "-shared", "-fPIC", "-w", "-o", str(target), str(HERE / "ball3.c")]
-        words += [f"-I{Path(fmpy.__file__).parent / 'c-code'}"]
-        if fault:
-            words += ["-DHOSTILE", "-D_GNU_SOURCE"] if fault == "hostile" else [f"-DFAULT_{fault}"]
-        subprocess.run([*words, "-lm"], check=True, capture_output=True)
-        return target.read_bytes()
+    macros = ("HOSTILE", "_GNU_SOURCE") if fault == "hostile" else (f"FAULT_{fault}",) if fault else ()
+    return compile_source("ball3.c", *macros)
 
 
 def reference() -> str:

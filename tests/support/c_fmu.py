@@ -3,16 +3,13 @@
 It is a foreign FMU for everything that must work with FMUs that are not ours.
 """
 
-import functools
 import math
 import shutil
-import subprocess
 import sys
-import tempfile
 import zipfile
 from pathlib import Path
 
-import fmpy
+from tests.support.c_library import compile_source
 
 HERE = Path(__file__).parent
 GUID = "{7d1c6f0a-94e5-4a53-b1ce-0d6c3f4f8a11}"
@@ -28,41 +25,10 @@ def have_compiler() -> bool:
     return shutil.which("cc") is not None
 
 
-@functools.cache
 def compile_library(behaviour: str = "good", guid: str = GUID) -> bytes:
     """Compile ``c_fmu.c`` with the fault ``behaviour`` ("good": none) and return the shared library."""
-    with tempfile.TemporaryDirectory() as directory:
-        target = Path(directory) / f"{IDENTIFIER}{SUFFIX}"
-        command = [
-            "cc",
-            "-std=gnu11",
-            "-O1",
-            "-g0",
-            "-shared",
-            "-fPIC",
-            "-Wall",
-            "-Wextra",
-            "-Wno-unused",
-            f'-DFMU_GUID="{guid}"',
-        ]
-        if behaviour == "hostile":
-            command += ["-DHOSTILE", "-D_GNU_SOURCE"]
-        elif behaviour != "good":
-            command.append(f"-DFAULT_{behaviour}")
-        command += [
-            "-I",
-            str(HERE),
-            "-I",
-            str(Path(fmpy.__file__).parent / "c-code"),
-            str(HERE / "c_fmu.c"),
-            "-lm",
-            "-ldl",
-            "-lpthread",
-            "-o",
-            str(target),
-        ]
-        subprocess.run(command, check=True, capture_output=True)
-        return target.read_bytes()
+    faults = {"good": (), "hostile": ("HOSTILE", "_GNU_SOURCE")}
+    return compile_source("c_fmu.c", f'FMU_GUID="{guid}"', *faults.get(behaviour, (f"FAULT_{behaviour}",)))
 
 
 def model_description() -> str:

@@ -10,7 +10,7 @@ BRISTLE = 2e-4  # rad over which dry friction builds up
 RESOLUTION = 1e-4  # rad
 
 
-@njit
+@njit(cache=True)
 def _run(asked, speed, inertia, viscous, dry, weight):
     angle, rate, bristle = asked[0], 0.0, 0.0
     angles, torques = np.empty(asked.size), np.empty(asked.size)

@@ -47,7 +47,7 @@ class LedAxis:
     truth: dict[str, float]
 
 
-@njit
+@njit(cache=True)
 def led(asked, speed, noise, push, law, gains, bristle, count, finer, limit=np.inf, off_centre=(0.0, 0.0)):
     """Return measured angles and torques of steps of 1 ms.
 

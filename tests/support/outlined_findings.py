@@ -23,6 +23,7 @@ def outline_of(report: FmuFindings) -> list[str]:
     found = [
         " ".join(re.sub(r"(the library must load, but:).*", r"\1 ...", line, flags=re.DOTALL).split()) for line in found
     ]
+    found = [re.sub(r"(unpacked, but have) \d+", r"\1 ...", line) for line in found]  # with what the compiler made
     return [re.sub(r"-?\d[\d.e+-]*", "#", line) if report.executed else line for line in found]
 
 

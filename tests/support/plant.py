@@ -1,17 +1,12 @@
 """FMUs of FMI 2.0 and 3.0 in C, built by the tests: a plant with inputs and parameters of every type (``plant.h``)."""
 
-import functools
-import subprocess
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-import fmpy
-
 from orchestrator.checking.binaries import here
 from tests.support.c_fmu import SUFFIX, write_fmu
+from tests.support.c_library import compile_with_fault
 
-HERE = Path(__file__).parent
 TOKEN = "{plant-of-the-tests}"
 Changes = Mapping[str, str]
 """What a description has otherwise, by a word and the name of a variable: ``Output y``, ``flags``, ``step``."""
@@ -79,15 +74,9 @@ _FLAGS = {
 _NAMES = {"Real": "Float64", "Integer": "Int32"}
 
 
-@functools.cache
 def compile_plant(version: str, fault: str = "") -> bytes:
     """Compile the library of a version of FMI with a fault (empty: none)."""
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / f"Plant{SUFFIX}"
-        words = ["cc", "-std=gnu11", "-O1", "-g0", "-shared", "-fPIC", "-w", f'-DFAULT="{fault}"', "-o", str(target)]
-        words += [str(HERE / f"plant{version[0]}.c"), f"-I{Path(fmpy.__file__).parent / 'c-code'}", "-lm"]
-        subprocess.run(words, check=True, capture_output=True)
-        return target.read_bytes()
+    return compile_with_fault(f"plant{version[0]}.c", fault)
 
 
 def describe(version: str, interfaces: str = "CS", changes: Changes | None = None) -> str:

@@ -11,7 +11,7 @@ COUNT = 2.0 * np.pi / 65536
 BRISTLE = 2e-4  # rad over which dry friction builds up
 
 
-@njit
+@njit(cache=True)
 def _moved(angle, rate, bristle, acting, coupling, finer):
     """Return angle, speed and bristle one row later."""
     for _ in range(finer):
@@ -22,7 +22,7 @@ def _moved(angle, rate, bristle, acting, coupling, finer):
     return angle, rate, bristle
 
 
-@njit
+@njit(cache=True)
 def _run(asked, speed, coupling, late, finer):
     angle, rate, bristle, before, filtered = 0.0, 0.0, 0.0, 0.0, 0.0
     angles, torques = np.empty(asked.size), np.empty(asked.size)
@@ -61,7 +61,7 @@ def joint_record(seed: int, late: int = 0, seconds: float = 12.0, share: float =
     return record_from_columns({"time": time, "u": torques, "theta_m": angles}, "joint")
 
 
-@njit
+@njit(cache=True)
 def _driven(torque, finer):
     angle, rate, bristle = 0.0, 0.0, 0.0
     angles = np.empty(torque.size)

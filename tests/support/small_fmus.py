@@ -1,16 +1,12 @@
 """Two small FMUs in C, built by the tests: a thermostat of FMI 2.0 and cells of a battery of FMI 3.0."""
 
-import subprocess
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-import fmpy
-
 from orchestrator.checking.binaries import here
 from tests.support.c_fmu import SUFFIX, write_fmu
+from tests.support.c_library import compile_with_fault
 
-HERE = Path(__file__).parent
 _HEAD = 'generationTool="tests" generationDateAndTime="2024-01-01T00:00:00Z"'
 _SIZED = '<Dimension valueReference="1"/>'
 THERMOSTAT = f"""<?xml version="1.0" encoding="UTF-8"?>
@@ -92,10 +88,6 @@ def build_small_fmu(path: Path, model: str, fault: str = "", changes: Mapping[st
     for old, new in (changes or {}).items():
         assert old in description
         description = description.replace(old, new)
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / f"{model}{SUFFIX}"
-        words = ["cc", "-std=gnu11", "-O1", "-g0", "-shared", "-fPIC", "-w", f'-DFAULT="{fault}"', "-o", str(target)]
-        words += [str(HERE / f"{model}.c"), f"-I{Path(fmpy.__file__).parent / 'c-code'}", "-lm"]
-        subprocess.run(words, check=True, capture_output=True)
-        binary = f"binaries/{here(version)}/{model}{SUFFIX}"  # type: ignore[arg-type]
-        return write_fmu(path, {"modelDescription.xml": description.encode(), binary: target.read_bytes()})
+    binary = f"binaries/{here(version)}/{model}{SUFFIX}"  # type: ignore[arg-type]
+    library = compile_with_fault(f"{model}.c", fault)
+    return write_fmu(path, {"modelDescription.xml": description.encode(), binary: library})

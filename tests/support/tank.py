@@ -1,15 +1,12 @@
 """The tank: FMUs in C of FMI 2.0 and 3.0, of all interfaces, built by the tests; they read a resource."""
 
 import re
-import subprocess
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
-import fmpy
-
 from orchestrator.checking.binaries import here
 from tests.support.c_fmu import SUFFIX, write_fmu
+from tests.support.c_library import compile_source
 
 HERE = Path(__file__).parent
 _MODELS = {
@@ -36,12 +33,7 @@ def build_tank(path: Path, model: str, *macros: str, changes: Mapping[str, str] 
     for old, new in (changes or {}).items():
         assert old in text
         text = text.replace(old, new)
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / f"tank{SUFFIX}"
-        words = [f"-D{m}" for m in (*macros, 'GUID="g"', *(["SE"] if number == "se" else []))]
-        words += [str(HERE / source), f"-I{Path(fmpy.__file__).parent / 'c-code'}", "-lm", "-lpthread"]
-        command = ["cc", "-std=gnu11", "-O1", "-g0", "-shared", "-fPIC", "-w", "-o", str(target), *words]
-        subprocess.run(command, check=True, capture_output=True)
-        binary = f"binaries/{here(version)}/tank{SUFFIX}"  # type: ignore[arg-type]
-        files = {"modelDescription.xml": text.encode(), binary: target.read_bytes(), "resources/scale.txt": b"1.0\n"}
-        return write_fmu(path, files)
+    library = compile_source(source, *macros, 'GUID="g"', *(["SE"] if number == "se" else []))
+    binary = f"binaries/{here(version)}/tank{SUFFIX}"  # type: ignore[arg-type]
+    files = {"modelDescription.xml": text.encode(), binary: library, "resources/scale.txt": b"1.0\n"}
+    return write_fmu(path, files)
