@@ -60,11 +60,13 @@ LONG = ("test_readme.py", "test_contributing.py", "test_notebooks.py", "test_pub
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Look for no garbage while tests are collected, which stay: it is a third of the time."""
+    """Look for no garbage while tests are collected, which stay: it is a third of the time. Afterwards, rarely."""
     gc.disable()
     try:
         return (yield)
     finally:
+        gc.freeze()
+        gc.set_threshold(20_000, 20, 20)
         gc.enable()
 
 

@@ -7,6 +7,7 @@ import ast
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
+from functools import cache
 from itertools import chain
 from pathlib import Path
 
@@ -94,12 +95,15 @@ def _titles(nodes: Iterable[ast.AST]) -> dict[str, str]:
     return {name: found for name in bases if (found := title(name))}
 
 
-def _scope_nodes(scope: ast.AST) -> Iterator[ast.AST]:
-    """Yield what is in a module or function and in no function within it."""
-    for child in ast.iter_child_nodes(scope):
-        if not isinstance(child, ast.FunctionDef):
-            yield child
-            yield from _scope_nodes(child)
+@cache
+def _scope_nodes(scope: ast.AST) -> list[ast.AST]:
+    """Return what is in a module or function and in no function within it."""
+    found = []
+    waiting = [scope]
+    while waiting:
+        found.append(node := waiting.pop())
+        waiting += [child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.FunctionDef)][::-1]
+    return found[1:]
 
 
 def _messages(scope: ast.AST, titles: dict[str, str], takers: set[str]) -> Iterator[tuple[str, ast.expr]]:
