@@ -116,7 +116,7 @@ class Result(ABC):
         return place / "report.html"
 
     def __str__(self) -> str:
-        return "\n".join(_text(plain_block(block)) for block in self.blocks())
+        return text_of(self.blocks())
 
     def __repr__(self) -> str:
         return str(self)
@@ -149,6 +149,11 @@ def plain_block(block: Block) -> TextTable | str:
     rows = [[plain_text(cell_text(v, c.digits)) for v, c in zip(row, block.columns, strict=True)] for row in block.rows]
     headings = tuple(plain_text(column.heading) for column in block.columns)
     return TextTable(plain_text(block.title), headings, tuple(map(tuple, rows)))
+
+
+def text_of(blocks: Sequence[Block]) -> str:
+    """Return lines and tables as a terminal shows them."""
+    return "\n".join(_text(plain_block(block)) for block in blocks)
 
 
 def _text(block: TextTable | str) -> str:

@@ -20,15 +20,15 @@ _PERIODIC = ("fixed", "tunable")
 
 
 class Tick(NamedTuple):
-    """When a clock ticks next: ``origin + count * interval`` [s]; an infinite interval is none."""
+    """When a clock ticks next: ``origin + number * interval`` [s]; an infinite interval is none."""
 
     origin: float
     interval: float
-    count: int = 0
+    number: int = 0
 
     @property
     def time(self) -> float:
-        return self.origin if self.count == 0 else self.origin + self.count * self.interval
+        return self.origin if self.number == 0 else self.origin + self.number * self.interval
 
 
 class ClockedSlave(EventInstance, Fmu3Instance):
@@ -156,7 +156,7 @@ class ClockedSlave(EventInstance, Fmu3Instance):
         for reference in due:
             tick = self._ticks[reference]
             if self._kinds[reference] in _PERIODIC:
-                self._ticks[reference] = tick._replace(count=tick.count + 1)
+                self._ticks[reference] = tick._replace(number=tick.number + 1)
             elif self._kinds[reference] == "changing":  # as before, unless the FMU says another interval
                 self._ticks[reference] = Tick(time + tick.interval, tick.interval)
             else:

@@ -97,14 +97,14 @@ def model_text(base: Path | None, changes: Mapping[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _parameter_lines(name: str, kept: ModelParameter | None, change: Mapping[str, float], said: str) -> list[str]:
-    stated = {} if kept is None else {"value": kept.value, "uncertainty": kept.uncertainty}
+def _parameter_lines(name: str, parameter: ModelParameter | None, change: Mapping[str, float], said: str) -> list[str]:
+    stated = {} if parameter is None else {"value": parameter.value, "uncertainty": parameter.uncertainty}
     values = {**stated, **change}
     changed = values != stated
-    remark = f"{kept.unit if kept and kept.unit else '1'}: {YOURS}" if changed else said
+    remark = f"{parameter.unit if parameter and parameter.unit else '1'}: {YOURS}" if changed else said
     notes = {"value": f"   # {plain_text(remark)}" if remark else ""}
     lines = [f"{_key(key)} = {value!r}{notes.get(key, '')}" for key, value in values.items()]
-    assumed = kept is not None and kept.assumed and not changed
+    assumed = parameter is not None and parameter.assumed and not changed
     return [f"[parameters.{toml_text(name)}]", *lines, *(["assumed = true"] * assumed)]
 
 

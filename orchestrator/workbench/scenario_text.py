@@ -29,9 +29,9 @@ Drawn = _table("Drawn", {
     "stop": float,
     "record": Annotated[list[Name], MOST],
     "master": _table("Master", {}, "algorithm step"),
-    "instances": dict[Name, _table("Instance", {"fmu": str}, "parameters", dict[Name, Value])],
-    "connections": Annotated[list[_table("Connection", {"from": Name, "to": Name})], MOST],
-    "sources": Annotated[list[_table("Source", {"to": Name}, _SOURCE)], MOST],
+    "instances": dict[Name, _table("Instance", {"fmu": str}, "parameters", dict[Name, Value])],  # type: ignore[misc]
+    "connections": Annotated[list[_table("Connection", {"from": Name, "to": Name})], MOST],  # type: ignore[misc]
+    "sources": Annotated[list[_table("Source", {"to": Name}, _SOURCE)], MOST],  # type: ignore[misc]
 })  # fmt: skip
 
 

@@ -293,7 +293,7 @@ def application(session: SessionFolder, settings: WorkbenchSettings) -> Starlett
         Route("/file/{reference:path}", workbench.file),
     ]
     errors = dict.fromkeys((*_STATUS, ClientDisconnect), _in_words)
-    return Starlette(routes=routes, lifespan=lifespan, exception_handlers=errors)  # type: ignore[arg-type]
+    return Starlette(routes=routes, lifespan=lifespan, exception_handlers=errors)
 
 
 def serve(

@@ -60,8 +60,8 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
     )
 
 
-def outcome_found(kind: type[F], diagnosis: DiagnosisOutcome, search: SearchResult, **own: Any) -> F:
-    """Return results of a ``kind``: what those of any diagnosis have in common, and the ``own`` of this kind."""
+def outcome_found(kind: type[F], diagnosis: DiagnosisOutcome, search: SearchResult, **more: Any) -> F:
+    """Return results of a ``kind``: what those of any diagnosis have in common, and ``more`` of this kind."""
     common: dict[str, Any] = {
         "verdict": diagnosis.verdict,
         "trust": diagnosis.trust.to_result(),
@@ -74,7 +74,7 @@ def outcome_found(kind: type[F], diagnosis: DiagnosisOutcome, search: SearchResu
         "library": library_found(search),
         "summary": tuple(summarise(diagnosis)),
     }
-    return kind(**common | own)
+    return kind(**common | more)
 
 
 def parameters_found(diagnosis: DiagnosisOutcome) -> dict[str, ParameterFound]:

@@ -75,8 +75,8 @@ def _test_part(results: FmuDiagnosisFound, table: dict[str, Array]) -> dict[str,
 def _output_plots(results: FmuDiagnosisFound, table: dict[str, Array]) -> Iterator[Plot]:
     """Yield each output, measured and simulated, and what each simulation misses of it; shaded: test data."""
     units = {name: (name, misfit.unit) for test in results.test for name, misfit in test.misfit.items()}
-    start, time = results.test_start, table.get("time", ())
-    test = () if start is None or not len(time) else (Span(start, float(time[-1]), "test data"),)
+    start, time = results.test_start, table.get("time")
+    test = () if start is None or time is None or not len(time) else (Span(start, float(time[-1]), "test data"),)
     return signal_plots(table, signals=units, shaded=test)
 
 
