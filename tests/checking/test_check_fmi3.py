@@ -188,7 +188,7 @@ def test_no_green_for_what_nobody_sees(name: str, tmp_path: Path) -> None:
     (mutant,) = (m for m in STATIC if m.name == name)
     path = tmp_path / "broken.fmu"
     mutant.make(path)
-    report = check_fmu(path, replace(QUICK, static=False))
+    report = check_fmu(path, replace(QUICK, static=False, probes=("life cycle",)))
     assert mutant.rule in {f.rule for f in report.findings}
     assert not report.ok
 

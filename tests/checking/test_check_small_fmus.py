@@ -1,6 +1,7 @@
 """Faults of two small FMUs: behind a threshold far from driven values, in arrays, and in arrays of other sizes."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.shared.isolation.limits import Limits
 from tests.support.c_fmu import have_compiler
+from tests.support.outlined_findings import probes_of
 from tests.support.small_fmus import build_small_fmu
 
 pytestmark = pytest.mark.skipif(
@@ -41,6 +43,8 @@ def test_what_acts_far_away_or_later_is_no_fault(variant: str, tmp_path: Path) -
     assert report.findings == ()
 
 
+# What shows these is no run of the rule's own probe.
+OF_ALL_PROBES = ("time_by_count", "resized_lost")
 # Their rules are met by day in test_check_plants.py.
 AT_NIGHT = ("lose_heat", "switch_in_step", "late_loss", "voltage_late")
 
@@ -50,7 +54,8 @@ AT_NIGHT = ("lose_heat", "switch_in_step", "late_loss", "voltage_late")
     [pytest.param(*row, marks=pytest.mark.night if row[1] in AT_NIGHT else ()) for row in FAULTS],
 )
 def test_a_fault_is_named_by_its_rule(model: str, fault: str, rule: str, tmp_path: Path) -> None:
-    report = check_fmu(build_small_fmu(tmp_path / "broken.fmu", model, fault), OPTIONS)
+    options = OPTIONS if fault in OF_ALL_PROBES else replace(OPTIONS, probes=probes_of(rule))
+    report = check_fmu(build_small_fmu(tmp_path / "broken.fmu", model, fault), options)
     assert rule in {f.rule for f in report.findings}
 
 
