@@ -6,7 +6,7 @@ import pytest
 
 from tools import mutants
 
-COMPUTE = "import time\nwhile time.process_time() < 4.0: pass"
+COMPUTE = "import time\nwhile time.process_time() < 3.0: pass"
 TESTS = {
     "passes": ("def test_it(): pass", "survived", ""),
     "fails": ("def test_it(): assert False", "caught", "test_one.py::test_it"),
@@ -32,9 +32,9 @@ def root(tmp_path):
 @pytest.mark.parametrize("what", TESTS)
 def test_the_outcome_of_a_run(root, monkeypatch, what):
     text, *expected = TESTS[what]
-    monkeypatch.setattr(mutants, "TIME_LIMIT", 3.0)
+    monkeypatch.setattr(mutants, "TIME_LIMIT", 2.0)
     if what.startswith("waits"):
-        monkeypatch.setattr(mutants, "CLOCK_LIMIT", 5.0)
+        monkeypatch.setattr(mutants, "CLOCK_LIMIT", 4.0)
     (root / "test_one.py").write_text(text)
     assert mutants.outcome(root, ("test_one.py",)) == (expected[0], [name for name in expected[1:] if name])
 

@@ -57,8 +57,11 @@ COMMANDS = list(
         line for lines in LINES.values() for line in lines if line != OWN_CHECK and line not in TO_A_CONTROLLER
     )
 )
-BY_DAY = {"compensate": "--plants 2", "--design": "--duration 1"}
-"""What a command gets besides by day, so that it does less; at night each is run as it stands."""
+BY_DAY = {" compensate": "--plants 2", " --design": "--duration 1", " estimate docs": "--no-diagnose"}
+"""What a command gets besides by day, so that it does less; at night each is run as it stands.
+
+What `estimate` asks of a diagnosis by itself, `diagnose` does here too.
+"""
 WAYS = pytest.mark.parametrize(
     "more", [BY_DAY, pytest.param({}, marks=pytest.mark.night)], ids=["by day", "as it stands"]
 )
@@ -87,7 +90,7 @@ def done_in(folder, line, whole, more=MappingProxyType({})):
 
 
 def done_there(folder, line, more):
-    words = shlex.split(" ".join([line, *(text for word, text in more.items() if word in line.split())]))
+    words = shlex.split(" ".join([line, *(text for words, text in more.items() if words in line)]))
     done = run([sys.executable, *words[1:]], folder)
     assert done.returncode == 0, done.stderr
     return json.loads((folder / "results" / words[3] / f"{words[3]}.json").read_text(encoding="utf-8"))["results"]
@@ -128,7 +131,7 @@ def test_the_diagnosis_finds_what_the_readme_says(diagnosed):
 def test_the_tutorial_goes_from_a_log_in_amperes_to_an_fmu_of_the_machine(tmp_path, more):
     copy_examples(tmp_path / "docs" / "examples")
     _, _, estimated, _, diagnosed, _, _ = (done_there(tmp_path, line, more) for line in TUTORIAL)
-    assert estimated["alpha"] == pytest.approx(SERVO_GAP, rel=5e-3)
+    assert estimated["alpha"] == pytest.approx(SERVO_GAP, rel=1e-2 if more else 5e-3)
     found = {effect["name"]: effect["parameters"] for effect in diagnosed["effects"]}
     assert found["backlash"]["alpha"]["value"] == pytest.approx(SERVO_GAP, rel=5e-3)
     assert found["coulomb_friction"]["torque"]["value"] == pytest.approx(SERVO_FRICTION, rel=0.1)

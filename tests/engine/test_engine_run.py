@@ -44,8 +44,8 @@ def test_every_fault_becomes_its_row_and_the_rest_is_right(tmp_path):
     expected = {
         "raises": ("error", "SlaveError: plant: doStep returned fmi2Error at <object object at 0x…>"),
         "exits": ("error", "SystemExit: 3"),
-        "hangs": ("time_limit", "took more than 3 s"),
-        "hangs in C": ("time_limit", "took more than 3 s"),
+        "hangs": ("time_limit", "took more than 1.5 s"),
+        "hangs in C": ("time_limit", "took more than 1.5 s"),
         "crashes": ("crash", "the worker process died"),
         "killed": ("crash", "the worker process died"),
         "nan": ("non_finite", "not finite: square"),
@@ -54,7 +54,7 @@ def test_every_fault_becomes_its_row_and_the_rest_is_right(tmp_path):
         "none": ("done", ""),
     }
     cases = DesignCases(Product((Listed("fault", tuple(expected)), Listed("size", (1.0, 3.0)))), seed=1)
-    text = table(tmp_path, cases, engine_work.work(engine_work.run_faulty), limits=CaseLimits(3.0, 100_000_000))
+    text = table(tmp_path, cases, engine_work.work(engine_work.run_faulty), limits=CaseLimits(1.5, 100_000_000))
     rows = list(csv.DictReader(text.splitlines()))
     assert len(rows) == 2 * len(expected)
     for row in rows:

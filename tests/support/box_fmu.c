@@ -219,7 +219,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean ns) {
 #elif defined(FAULT_drifts)
     m->x[0] += 1e-3 * life++ / 1e4;
 #elif defined(FAULT_slow)
-    usleep(20000);
+    usleep(5000);
 #elif defined(FAULT_eats)
     { char *p = malloc(1 << 26); if (p) memset(p, 1, 1 << 26); }
 #endif

@@ -1,6 +1,6 @@
 """Runs the command line without what POSIX has: modules, functions and `/proc` are hidden, in children too.
 
-python -m tests.support.without_posix WORD ...
+python -m tests.support.without_posix WORD ... [+ WORD ...]    # commands one after the other
 """
 
 import builtins
@@ -54,7 +54,8 @@ def main() -> int:
     surroundings._PYTHON = (
         f"import runpy; runpy.run_path({here!r})['hide'](); {surroundings._PYTHON}"  # children start afresh
     )
-    return command_line(sys.argv[1:])
+    lines = [words.split("\n") for words in "\n".join(sys.argv[1:]).split("\n+\n")]
+    return max(map(command_line, lines))
 
 
 if __name__ == "__main__":

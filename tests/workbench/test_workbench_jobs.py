@@ -50,6 +50,10 @@ def is_fitting(job) -> bool:
     return job["stage"].startswith("fitted")
 
 
+def is_running(job) -> bool:
+    return job["state"] == "running"
+
+
 @pytest.mark.slow
 def test_the_numbers_are_those_of_the_command_line(served, log: Path, tmp_path: Path) -> None:
     """Columns by clicks, then `inspect`: the JSON is the one that the same files give on the command line."""
@@ -162,7 +166,7 @@ def test_results_of_a_server_that_is_killed_are_whole_or_absent(tmp_path: Path, 
         model = first.ask("POST", "models", MACHINE)[1]["file"]
         whole = first.wait(first.start("inspect", [reference], model=model))["name"]
         cut = first.start("diagnose", [reference], model=model)
-        first.wait(cut, is_fitting)
+        first.wait(cut, is_running)
         running = children(first.process.pid)
         first.process.send_signal(signal.SIGKILL)
         first.process.wait()
@@ -184,7 +188,7 @@ def test_the_end_of_the_server_stops_its_jobs(tmp_path: Path, log: Path) -> None
         shutil.copy(log, folder / "files" / "drive.csv")
         model = first.ask("POST", "models", MACHINE)[1]["file"]
         name = first.start("diagnose", ["files/drive.csv"], model=model)
-        first.wait(name, is_fitting)
+        first.wait(name, is_running)
         running = children(first.process.pid)
         first.process.send_signal(signal.SIGTERM)
         first.process.wait(HANGS)

@@ -202,7 +202,7 @@ def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault):
 def test_an_fmu_that_hangs_is_ended(made, fault):
     _, *files = made(SPRING, rows=300, fault=fault)
     with pytest.raises(OrchestratorError, match="no answer within"):
-        diagnose(*files, settings=DiagnosisSettings(fmu=FmuSettings(loading=3.0, patience=2.0, most_lost=1)))
+        diagnose(*files, settings=DiagnosisSettings(fmu=FmuSettings(loading=2.0, patience=1.0, most_lost=1)))
 
 
 def test_a_run_whose_fed_back_effort_runs_away_is_given_up_before_the_fmu_meets_it(made):
@@ -258,7 +258,7 @@ def test_a_run_that_hangs_is_given_up_soon_and_others_go_on(made):
 
 def test_an_fmu_that_is_too_slow_for_its_budget_is_refused_with_an_estimate(made):
     _, *files = made(SPRING, rows=100, fault="slow")
-    files[2].write_text(files[2].read_text() + "[options]\nbudget = 20\n")
+    files[2].write_text(files[2].read_text() + "[options]\nbudget = 5\n")
     with pytest.raises(OrchestratorError, match="a run takes about"):
         diagnose(*files)
 
