@@ -94,13 +94,10 @@ def _zig(targets: tuple[Target, ...]) -> Compiler | None:
 
 
 def _local(targets: tuple[Target, ...]) -> Compiler | None:
-    path = local_compiler()
-    return Compiler((path,), f"cc {_first_line(path)}", targets) if path is not None and targets else None
-
-
-def _first_line(path: str) -> str:
+    if (path := local_compiler()) is None or not targets:
+        return None
     run = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
-    return (run.stdout.splitlines() or ["unknown"])[0]
+    return Compiler((path,), f"cc {(run.stdout.splitlines() or ['unknown'])[0]}", targets)
 
 
 def compile_library(compiler: Compiler, target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:

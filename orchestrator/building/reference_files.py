@@ -31,14 +31,10 @@ def reference_files(recipe: Recipe) -> dict[str, bytes]:
     if recipe.starts or not path.exists():
         return {}
     rows = list(csv.reader(io.StringIO(path.read_text(encoding="ascii"))))
-    table = "".join(",".join(row) + "\n" for row in _with_parameters(rows, dict(PARAMETERS[recipe.class_name])))
-    return {f"{FOLDER}/fmi-ls-manifest.xml": _manifest(), f"{FOLDER}/reference.csv": table.encode("ascii")}
-
-
-def _with_parameters(rows: list[list[str]], parameters: dict[str, float]) -> list[list[str]]:
-    """Return the rows with a constant column for each parameter, so that the file says all by itself."""
+    parameters = PARAMETERS[recipe.class_name]  # each is a constant column, so that the file says all by itself
     extra = [list(parameters), *([repr(value) for value in parameters.values()] for _ in rows[1:])]
-    return [[row[0], *more, *row[1:]] for row, more in zip(rows, extra, strict=True)]
+    table = "".join(",".join([row[0], *more, *row[1:]]) + "\n" for row, more in zip(rows, extra, strict=True))
+    return {f"{FOLDER}/fmi-ls-manifest.xml": _manifest(), f"{FOLDER}/reference.csv": table.encode("ascii")}
 
 
 def _manifest() -> bytes:

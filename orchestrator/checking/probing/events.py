@@ -1,4 +1,4 @@
-"""Event mode: what model exchange and co-simulation share, in both versions of FMI.
+"""Event mode: what model exchange and co-simulation share, in both versions of FMI; and scheduled execution.
 
 In all functions: ``t``: time [s].
 """
@@ -21,6 +21,7 @@ declare("""
 event.endless | E | 3.2.2 | 2.3.5 | the discrete states settle after a few updates | say that nothing is left to do when it is so
 event.next-time | E | 3.2.2 | 2.3.5 | the next event is in the future | return the time of the next event, or say that there is none
 clock.interval-value | E | - | 2.2.8.4 | intervals and qualifiers of clocks are valid, and those of constant clocks as described | return what the description says
+partition.preemption | E | - | 5.2.1 | preemption is unlocked as often as it is locked | call unlockPreemption on every way out
 clock.deactivation | E | - | 2.2.8.2 | output clocks are inactive after the update of the discrete states | deactivate them in fmi3UpdateDiscreteStates
 """)  # noqa: E501
 
@@ -215,3 +216,25 @@ class EventDriver(Driver):
             raise StatusError("UpdateDiscreteStates", 0, text, "event.next-time")
         next_time: Any = float(time) if defined else None
         return EventOutcome(again, terminate, nominals, states, next_time)
+
+
+class ScheduledExecution(EventDriver):
+    """Scheduled execution of FMI 3.0."""
+
+    def advance(self, t: float, size: float, when: str = "") -> None:
+        end = t + size
+        while self.next_instant(end) < end:
+            now = self.next_instant(end)
+            for clock in self.due(now):
+                at = f"for the clock `{clock.name}` at t = {now:g}"
+                self.library.threaded = self.habits.threads
+                try:
+                    self.call("ActivateModelPartition", clock.reference, now, when=at)
+                finally:
+                    self.library.threaded = False
+                self._hold({clock.reference}, at)
+                self._advance_clocks([clock], now)
+        _, locks = self.library.updates()
+        if locks:
+            message = "preemption must be unlocked as often as it is locked, but is not"
+            self.report("partition.preemption", message, when=when)

@@ -97,6 +97,11 @@ class ProbeJob:
         return self.interface == "ModelExchange" or (self.interface == "CoSimulation" and "hasEventMode" in self.flags)
 
     @property
+    def sizes(self) -> list[ProbedVariable]:
+        """The structural parameters that can be the size of a dimension."""
+        return [v for v in self.variables if v.causality == "structuralParameter" and v.base == "UInt64"]
+
+    @property
     def varies(self) -> bool:
         return "canHandleVariableCommunicationStepSize" in self.flags
 

@@ -180,7 +180,7 @@ def _probe_partitions(context: Context) -> None:
 def structure(context: Context) -> None:
     """Structural parameters can be set in configuration mode, and arrays then have the size that follows."""
     bench, job = context.bench, context.bench.job
-    chosen = [v for v in job.variables if v.causality == "structuralParameter" and v.base == "UInt64"]
+    chosen = job.sizes
     if not chosen:
         raise SkippedError("the FMU has no structural parameters")
     for change in (0, 1):
@@ -239,8 +239,7 @@ def _run_resized(context: Context, driver: Driver, sizes: Mapping[int, int]) -> 
 def _probe_reconfiguration(context: Context) -> None:
     """Tunable structural parameters can be set in mid-run, and the run goes on."""
     bench, job = context.bench, context.bench.job
-    chosen = [v for v in job.variables if v.causality == "structuralParameter" and v.variability == "tunable"]
-    chosen = [v for v in chosen if v.base == "UInt64"]
+    chosen = [v for v in job.sizes if v.variability == "tunable"]
     if not chosen or job.interface == "ScheduledExecution":
         return
     with bench.instance() as driver:

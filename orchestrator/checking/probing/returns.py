@@ -183,8 +183,8 @@ def reset(context: Context) -> None:
 
 def _reset_sizes(context: Context) -> None:
     """A reset gives arrays their sizes back."""
-    chosen = [v for v in context.bench.job.variables if v.causality == "structuralParameter" and v.base == "UInt64"]
-    sizes = {v: x for v in chosen if v.size == 1 and (x := moved(v, v.start or ())) is not None}
+    chosen = [v for v in context.bench.job.sizes if v.size == 1]
+    sizes = {v: x for v in chosen if (x := moved(v, v.start or ())) is not None}
     if not sizes:
         return
     with context.bench.instance(initialised=False) as driver:

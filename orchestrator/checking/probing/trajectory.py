@@ -13,10 +13,10 @@ from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.cosimulation2 import CoSimulation2
 from orchestrator.checking.probing.cosimulation3 import CoSimulation3
 from orchestrator.checking.probing.driver import Driver, Habits
+from orchestrator.checking.probing.events import ScheduledExecution
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.movement import Movement, moved
-from orchestrator.checking.probing.scheduled import ScheduledExecution
 from orchestrator.checking.probing.statuses import SkippedError, StatusError
 from orchestrator.checking.probing.variables import ProbedVariable, shown
 
