@@ -127,14 +127,11 @@ def check_dynamic(
     d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits, walls: bool = True,
     chosen: tuple[str, ...] = (), tell: Callable[[str, float], None] = lambda stage, share: None,
 ) -> tuple[list[Finding], tuple[Execution, ...]]:  # fmt: skip
-    """Run each interface of the FMU in a child process and report what it did.
+    """Run each interface of the FMU in a child process; return what it did wrong, and which probes were carried out.
 
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
     ``chosen``: names of the probes to carry out (default: all); ``tell``: called with each probe, and the share of them
     that are done.
-
-    Returns:
-        What it did wrong, and which probes were carried out.
     """
     findings: list[Finding] = []
     executions: list[Execution] = []

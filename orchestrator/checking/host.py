@@ -159,15 +159,12 @@ class Host:
         self._locks = 0
         self._around = Surroundings()
         # Kept here, for the library keeps pointers to them.
-        self._logger, self._log3 = _LOGGER(self._log), _LOG(self._log_3)
+        self._log3, self._logger = _LOG(self._log), _LOGGER(lambda at, _name, *rest: self._log(at, *rest))
         self._update = _UPDATE(self._intermediate)
         self._clock_update = _CLOCK_UPDATE(lambda _: None)
         self._lock, self._unlock = _LOCK(lambda: self._count(1)), _LOCK(lambda: self._count(-1))
 
-    def _log(self, environment: int, _name: bytes, status: int, category: bytes, message: bytes) -> None:
-        self._log_3(environment, status, category, message)
-
-    def _log_3(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
+    def _log(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
         self._errors += status in _ERRORS
         self._take((message or b"").decode("utf-8", "replace").strip(), status)
 

@@ -31,13 +31,10 @@ class _DoctypeError(Exception):
 
 
 def parse(data: bytes, name: str) -> tuple[etree._Element | None, list[Finding]]:
-    """Parse ``data``; a document that is refused yields None and the reason.
+    """Parse ``data``. Return the root, or None where the document is refused, and the findings.
 
     Entities are never expanded and nothing is fetched: a document type, which is where entities and
     external subsets live, ends the reading at once.
-
-    Returns:
-        The root, or None, and the findings.
     """
     if len(data) > MAXIMUM_BYTES:
         return None, [Finding("xml.too-large", name, f"the file must have at most {MAXIMUM_BYTES} bytes, but has more")]

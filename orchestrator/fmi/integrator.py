@@ -66,11 +66,7 @@ class Integrator:
         self._solver, self._begins = None, True
 
     def step(self, stop: float) -> bool:
-        """Take one step of the method's own length, not beyond ``stop`` [s]; return whether it ends at an event.
-
-        Raises:
-            IntegrationError: the method cannot.
-        """
+        """Take one step of the method's own length, not beyond ``stop`` [s]; return whether it ends at an event."""
         if self._begins and self._has_event(self.time, self.states):
             return True
         self._begins = False
