@@ -120,6 +120,7 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
         return add_test_evidence(evidence, search, misfits, misses_of(own), lambda point: None), misfits
 
     found, evidence, test = leave_out_refuted(searched, record, settings, add_tests)
+    searched, found = _add_step_error(searched), _add_step_error(found)
     placed = workings.residuals[0].placed
     graded = report_effects(
         searched, found, evidence, lambda label: (placed[label].values_by_name, effect_units(problem, placed[label])),
@@ -141,6 +142,19 @@ def _report(workings: FmuWorkings, notes: Sequence[str], settings: DiagnosisSett
         dict(zip(problem.outputs, map(float, left), strict=True)), remaining, test, record, trust, tuple(notes),
         settings, searched.searched, problem.map, replace(workings, search=found),
     )  # fmt: skip
+
+
+def _add_step_error(result: SearchResult) -> SearchResult:
+    """Return a search whose final model knows how far the communication steps of its runs move its values.
+
+    FMUs that are coupled, and effects at ports, are exact to the first order of the step: steps half as long have half
+    the error, so that twice what they change is all of it.
+    """
+    problem, final = result.problem, result.final
+    seen = zip(problem.models, problem.whitenings, problem.record_points(final.point), strict=True)
+    parts = [w.apply(model.change_by_steps(point)) for model, w, point in seen if isinstance(model, FmuResiduals)]
+    error = 2.0 * final.covariance @ final.jacobian.T @ np.concatenate(parts)
+    return replace(result, final=replace(final, step_error=error))
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ measured pulse responses. With them the analysis whitens residuals as it does th
 
 from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -94,6 +95,17 @@ class FmuResiduals(ResidualModel):
         for key in list(self._kept)[: max(len(self._kept) - KEPT // self.size, 0)]:
             del self._kept[key]
         return runs
+
+    def change_by_steps(self, point: ModelPoint) -> Array:
+        """Return (outputs, n) what communication steps half as long change of the residuals.
+
+        Zero where the FMU steps by a clock of its own, or does not run so.
+        """
+        model, problem = self.fmu_model(point), self.problem
+        finer = replace(problem, m=(1 if problem.short else 2) * problem.m)
+        (plain,), (fine,) = self._runs([model]), finer.simulate([model])
+        none = np.zeros((len(self.channels), self.size))
+        return none if plain is None or fine is None else np.ascontiguousarray((plain - fine).T)
 
     def start_change(self, point: ModelPoint, rows: int) -> Array:
         """Return (outputs, rows) what the state at the start changes; a quarter more rows than the record's at most."""

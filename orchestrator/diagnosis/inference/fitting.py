@@ -31,6 +31,7 @@ class FittedModel:
     held_out: Array  # (rows,) residuals of each block, predicted from the others
     blocks: NDArray[np.int64]  # (rows,) block of each residual
     block_shifts: Array  # (blocks, coordinates) how the values move when a block is left out
+    step_error: Array | float = 0.0  # (coordinates,) how far the steps of simulated runs move the values
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -59,10 +60,13 @@ class FittedModel:
 
 
 def value_covariance(fitted: FittedModel) -> Array:
-    """Return the covariance (coordinates, coordinates) of white residuals, no error below what blocks differ by."""
+    """Return the covariance (coordinates, coordinates) of white residuals, no error below what blocks differ by.
+
+    What the steps of runs move comes on top: all blocks have it in common.
+    """
     white, blocks = fitted.covariance, fitted.jackknife
     wider = np.sqrt(np.maximum(np.diag(blocks) / np.maximum(np.diag(white), 1e-300), 1.0))
-    return np.asarray(white * np.outer(wider, wider))
+    return np.asarray(white * np.outer(wider, wider) + np.outer(fitted.step_error, fitted.step_error))
 
 
 def jackknife_covariance(shifts: Array) -> Array:

@@ -64,7 +64,11 @@ def test_what_made_up_for_coarse_steps_is_not_named_beside_a_gap(tmp_path):
     found.close()
     (effect,) = found.diagnosis.graded(Grade.LIKELY)
     assert effect.label == "backlash@coupling"
-    assert effect.parameters["width"].value == pytest.approx(0.006, rel=0.01)
+    width = effect.parameters["width"]
+    assert width.value == pytest.approx(0.006, rel=0.03)
+    low, high = width.interval
+    assert low < 0.006 < high
+    assert high - low < 0.001
 
 
 def test_a_gap_between_two_fmus_is_delivered(tmp_path):
