@@ -9,7 +9,6 @@ from tests.support.sources import ROOT, SOURCES, nodes_of, tree_of
 
 # What others build on: base classes and protocols, beside all that `orchestrator` exports.
 PROTOCOLS = (
-    "orchestrator.diagnosis.model.interface",
     "orchestrator.estimation.protocol",
     "orchestrator.master.protocol",
 )

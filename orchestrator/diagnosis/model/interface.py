@@ -51,40 +51,19 @@ class UncertainParameter:
         return float(np.log1p(self.spread)) if self.scale is None else self.spread
 
     def limit(self, value: float) -> float:
-        """Return a value within the limits.
-
-        Args:
-            value: in the unit of the parameter.
-
-        Returns:
-            The value, or the limit that it went beyond.
-        """
+        """Return a value within the limits, in the unit of the parameter."""
         return min(max(value, self.minimum), self.maximum)
 
     def stops(self, value: float, way: float) -> bool:
-        """Tell whether a limit keeps a value from going on.
-
-        Args:
-            value: in the unit of the parameter.
-            way: its sign is the direction.
-
-        Returns:
-            Whether the value stands at the limit that lies that way.
-        """
+        """Tell whether a value stands at the limit that lies in the direction of the sign of ``way``."""
         return (way > 0.0 and value >= self.maximum) or (way < 0.0 and value <= self.minimum)
 
 
 def as_uncertain(given: ModelParameter, local: bool = False) -> UncertainParameter:
     """Return what is fitted of a parameter that a model file or a map gives.
 
-    A value at zero, or nearer to it than it may be off where its limits allow either sign, has a normal prior.
-
-    Args:
-        given: with an uncertainty above 0.
-        local: it belongs to one record alone, such as a start value; its prior is normal.
-
-    Returns:
-        What a fit begins with: nominal value, prior and limits.
+    A value at zero, or nearer to it than it may be off where its limits allow either sign, has a normal prior; so has
+    one that belongs to one record alone (``local``), such as a start value.
     """
     near = abs(given.value) < given.uncertainty and given.minimum < 0.0 < given.maximum
     if local or near or given.value == 0.0:
@@ -173,15 +152,7 @@ class CandidateEffect:
         return self.label.partition("@")[2]
 
     def clip_value(self, place: int, value: float) -> float:
-        """Return a value within its bounds.
-
-        Args:
-            place: of the value among those of the effect.
-            value: in the effect's own unit.
-
-        Returns:
-            The value, or the bound that it went beyond.
-        """
+        """Return a value within its bounds."""
         low = self.lower[place] if self.lower else -np.inf
         high = self.upper[place] if self.upper else np.inf
         return min(max(value, low), high)
@@ -196,37 +167,15 @@ class ModelPoint:
 
     @staticmethod
     def nominal(parameters: Sequence["UncertainParameter"]) -> "ModelPoint":
-        """Return the nominal values of parameters, without effects.
-
-        Args:
-            parameters: of the model, those of one record last.
-
-        Returns:
-            The point at which every fit without effects begins.
-        """
+        """Return the nominal values of parameters, those of one record last, without effects."""
         return ModelPoint(tuple(entry.nominal for entry in parameters))
 
     def with_effect(self, label: str, values: Values) -> "ModelPoint":
-        """Return the point with an effect added or moved.
-
-        Args:
-            label: of the effect, ``name@site``.
-            values: of the effect, in its order.
-
-        Returns:
-            A new point with all other effects as they are.
-        """
+        """Return the point with an effect added or moved."""
         return ModelPoint(self.parameters, {**self.effects, label: values})
 
     def without_effects(self, labels: Sequence[str]) -> "ModelPoint":
-        """Return the point without some effects.
-
-        Args:
-            labels: of effects, of which the point may lack some.
-
-        Returns:
-            A new point with all other effects as they are.
-        """
+        """Return the point without some effects, of which it may lack some."""
         return ModelPoint(self.parameters, {name: v for name, v in self.effects.items() if name not in labels})
 
 
@@ -292,76 +241,31 @@ class ResidualModel(Protocol):
     edges: float
 
     def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
-        """Return the residuals (channels, n) at each of some points.
-
-        Args:
-            points: values of the model.
-
-        Returns:
-            One array for each.
-        """
+        """Return the residuals (channels, n) at each of some points."""
 
     def noise_sources(self, frequencies: Array) -> NoiseSources:
-        """Return what makes noise in the residuals.
-
-        Args:
-            frequencies: (f,) [Hz].
-
-        Returns:
-            The sources, at the nominal values.
-        """
+        """Return what makes noise in the residuals at the nominal values, at frequencies (f,) [Hz]."""
 
     def approximate_changes(self, point: ModelPoint, trials: Sequence[tuple[str, Values]]) -> list[Array | None]:
-        """Return what effects would change of the residuals, where that is known without working these out.
+        """Return the change (channels, n) of the residuals by each effect that a point lacks.
 
-        Args:
-            point: values of the model.
-            trials: an effect that the point lacks and its values, each.
-
-        Returns:
-            The change (channels, n) for each; None: the residuals must be worked out.
+        None: it is not known without working these out.
         """
         del point
         return [None] * len(trials)
 
     def is_possible(self, label: str, point: ModelPoint) -> bool:
-        """Tell whether a machine can have an effect as a point has it, and the record can show it.
-
-        Args:
-            label: of the effect, ``name@site``.
-            point: values of the model, those of the effect among them.
-
-        Returns:
-            False for sizes that no machine has, or that act nowhere in the record.
-        """
+        """Tell whether a machine can have an effect as a point has it, and the record can show it."""
 
     def reference_signals(self, point: ModelPoint) -> Array:
-        """Return the signals that residuals are compared with: torques that drive the bodies, or outputs.
-
-        Args:
-            point: values of the model.
-
-        Returns:
-            Shape (channels, n), in the unit of the residuals.
-        """
+        """Return the signals (channels, n) that residuals are compared with: driving torques, or outputs."""
 
     def inertia_shares(self) -> Mapping[str, float]:
-        """Return the inertias that a record must show.
-
-        Returns:
-            Name of each -> its share of the whole; empty: there are none.
-        """
+        """Return the inertias that a record must show: name -> share of the whole."""
         return {}
 
     def without_priors(self, spread: float) -> Self:
-        """Return the model as a plain regression of torque on motion, each parameter unknown within a factor.
-
-        Args:
-            spread: of every parameter, as a share.
-
-        Returns:
-            A new model beside the same record.
-        """
+        """Return the model as a plain regression of torque on motion, with ``spread`` for that of each parameter."""
         other = copy(self)
         other.parameters = tuple(entry if entry.local else replace(entry, spread=spread) for entry in self.parameters)
         return other
