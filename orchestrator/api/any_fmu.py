@@ -72,7 +72,7 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
             FmuDiagnosisFound,
             d,
             d.workings.search,
-            validation=None if self.validation is None else misfit_found(self.validation, d.settings.report),
+            validation=None if self.validation is None else misfit_found(self.validation, d.settings),
             remaining=FmuRemainingFound(dict(d.left), tuple(dependence_found(one) for one in d.remaining)),
             model=None if not self.delivered else str(place / self.delivered[0].file),
             delivery=tuple(self.delivered),

@@ -67,7 +67,7 @@ class CalibrationResult(Result):
             trust=self.trust.to_result(),
             parameters=parameters,
             not_told_apart=c.confounded,
-            test=tuple(misfit_found(test, d.settings.report) for test in d.test),
+            test=tuple(misfit_found(test, d.settings) for test in d.test),
             notes=c.notes,
             settings=as_tables(d.settings),
             seconds=self.seconds,

@@ -114,9 +114,7 @@ class DiagnosisResult(AnyDiagnosisResult):
             notes=(*doubts_of((self.record, *self.more)), *found.notes),
             model=str(place / self.fmu_name),
             cosimulation=DifferenceFound(self.runs.difference, "rad"),
-            validation=None
-            if self.validation is None
-            else misfit_found(self.validation, self.diagnosis.settings.report),
+            validation=None if self.validation is None else misfit_found(self.validation, self.diagnosis.settings),
             live=self._live_model(),
             angle_unit=self.record.angle_unit,
             seconds=self.seconds,

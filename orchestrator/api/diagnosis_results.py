@@ -59,8 +59,8 @@ class AnyDiagnosisResult(SampledResult):
         yield from (f"  {reason}" for reason in self.trust.reasons)
 
     def _misfit_tables(self) -> Iterator[Block]:
-        report = self.diagnosis.settings.report
-        tests = [misfit_found(test, report) for test in self.test]
-        other = None if self.validation is None else misfit_found(self.validation, report)
+        settings = self.diagnosis.settings
+        tests = [misfit_found(test, settings) for test in self.test]
+        other = None if self.validation is None else misfit_found(self.validation, settings)
         yield from misfit_tables(tests, other)
         yield from torque_tables([*tests, *([] if other is None else [other])])

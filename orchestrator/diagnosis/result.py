@@ -121,19 +121,21 @@ class TestMisfit:
     torque: tuple[float, ...] = ()
     still: bool = False  # nothing moves in it: it tests nothing
 
-    def is_worse(self, more: float, of_noise: float) -> bool:
+    def is_worse(self, settings: DiagnosisSettings) -> bool:
         """Tell whether the final model predicts test data worse than re-fitted parameters do.
 
         Free runs that drift tell little of it; the torque that either leaves decides then, where it is worked out.
         """
+        more = np.sqrt(1.0 + settings.grades.confirmed_share)  # in rms
         if self.torque and not self.still and any(one.is_missed for one in self.signals):
-            return self.torque[2] > (1.0 + more) * self.torque[1]
+            return bool(self.torque[2] > more * self.torque[1])
         before, after = (
             np.array([getattr(one, stage) / one.noise for one in self.signals]) for stage in ("parameters", "final")
         )
         if self.still or not np.all(np.isfinite(before)):
             return False
-        return not float(np.sqrt(np.mean(after**2))) <= (1.0 + more) * float(np.sqrt(np.mean(before**2))) + of_noise
+        may_be = more * np.sqrt(np.mean(before**2)) + settings.report.of_noise
+        return not np.sqrt(np.mean(after**2)) <= may_be
 
 
 @dataclass(frozen=True)

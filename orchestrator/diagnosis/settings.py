@@ -87,19 +87,23 @@ class GradeSettings(Settings, frozen=True):
     test_t: Annotated[float, setting("paired gain over its error on test data that confirms or refutes an effect")] = (
         2.0
     )
+    most_missed: Annotated[
+        float,
+        setting("misfit of free runs, over what noise and the values' errors account for, from which a law is missing"),
+    ] = 10.0
     inertia_error: Annotated[float, share("largest relative error of the record's inertia for *certain*")] = 0.35
 
 
 class ReportSettings(Settings, frozen=True):
     """What is reported: free runs over the test part, what is left, laws learned from it."""
 
-    runs: Annotated[int, setting("fewest free runs of the test part", ge=1)] = 2
     longest_run: Annotated[
         float, share("length of a free run over the record: impacts hide the initial state of longer runs", le=1.0)
     ] = 0.075
     least_rows: Annotated[int, setting("fewest rows of a free run", ge=10)] = 40
-    worse: Annotated[float, share("relative increase of the misfit on test data that may be chance")] = 0.05
-    of_noise: Annotated[float, share("and relative to the encoder's noise")] = 0.1
+    of_noise: Annotated[
+        float, share("increase of the misfit on test data over the encoder's noise that may be chance")
+    ] = 0.1
     level: Annotated[float, share("probability of the reported intervals")] = 0.95
     possible_share: Annotated[
         float, share("probability of an effect that is only possible: the share that was right of 170 such names")

@@ -163,7 +163,7 @@ def test_what_test_data_refute_is_not_in_the_corrected_model(tmp_path) -> None:
 )
 def test_a_model_is_worse_by_its_torque_where_free_runs_drift(final, torque, still, worse) -> None:
     signal = SignalMisfit("theta_m", "rad", 0.01, 3.0, 1.0, final)
-    assert MisfitOnTest("record", 100, (signal,), torque, still).is_worse(0.05, 0.1) is worse
+    assert MisfitOnTest("record", 100, (signal,), torque, still).is_worse(DiagnosisSettings()) is worse
 
 
 def test_a_miss_is_judged_by_noise_and_by_what_the_values_leave_open() -> None:

@@ -75,7 +75,7 @@ def test_one_effect_is_named_with_its_size(effects, label, parameter, value, tol
     assert effect.evidence.motion_share > 0.5
     assert effect.evidence.test_torque.gain > 0.1
     assert effect.evidence.test_torque.t > 2.5
-    assert not found.test[0].is_worse(0.05, 0.1)
+    assert not found.test[0].is_worse(found.settings)
     assert any(label.partition("@")[0].split("_")[0] in line.lower() for line in summarise(found))
 
 
@@ -167,7 +167,7 @@ def test_missing_samples_are_passed_over(effects: list[str] | None) -> None:
     found = diagnose(record_from_columns(columns, "gaps"), MODEL, effects=effects)
     assert likely(found) == ["coulomb_friction@motor"]
     assert found.effects[0].parameters["torque"].value == pytest.approx(0.8, rel=0.05)
-    assert not found.test[0].is_worse(0.05, 0.1)
+    assert not found.test[0].is_worse(found.settings)
 
 
 def test_an_axis_with_friction_and_a_learned_law_for_what_is_none(tmp_path) -> None:

@@ -162,8 +162,7 @@ def _steps(plant: Plant, start: Array, signals: RunSignals, free: tuple[int, ...
 def run_parts(first: int, size: int, settings: ReportSettings) -> list[slice]:
     """Return the parts of a record over which free runs go: from a row to its end, of one length."""
     rows = size - first
-    count = max(settings.runs, round(rows / (settings.longest_run * size)))
-    count = max(min(count, rows // settings.least_rows), 1)
+    count = max(min(round(rows / (settings.longest_run * size)), rows // settings.least_rows), 1)
     length = rows // count
     return [slice(first + n * length, first + (n + 1) * length) for n in range(count)]
 

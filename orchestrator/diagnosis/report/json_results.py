@@ -11,7 +11,7 @@ from orchestrator.diagnosis.report.missing_torque import MissingTorque, missing_
 from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, TestMisfit, ValueEstimate
 from orchestrator.diagnosis.selection.outcome import Dependence, SearchResult
-from orchestrator.diagnosis.settings import ReportSettings
+from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.effects.words import effect_words
 from orchestrator.shared.arrays import Array
 from orchestrator.shared.results.diagnose import (
@@ -67,7 +67,7 @@ def outcome_found(kind: type[F], diagnosis: DiagnosisOutcome, search: SearchResu
         "trust": diagnosis.trust.to_result(),
         "effects": tuple(effect_found(effect) for effect in diagnosis.effects),
         "parameters": parameters_found(diagnosis),
-        "test": tuple(misfit_found(test, diagnosis.settings.report) for test in diagnosis.test),
+        "test": tuple(misfit_found(test, diagnosis.settings) for test in diagnosis.test),
         "notes": diagnosis.notes,
         "settings": as_tables(diagnosis.settings),
         "candidates": steps_found(search),
@@ -107,7 +107,7 @@ def library_found(search: SearchResult, more: Sequence[str] = ()) -> dict[str, L
     return {label: LibraryFound(effect_words(label), label in has) for label in [*more, *search.problem.effects]}
 
 
-def misfit_found(test: TestMisfit, report: ReportSettings) -> TestFound:
+def misfit_found(test: TestMisfit, settings: DiagnosisSettings) -> TestFound:
     """Return how the models do on test data of one record."""
     misfit = {
         one.signal: SignalMisfitFound(
@@ -118,7 +118,7 @@ def misfit_found(test: TestMisfit, report: ReportSettings) -> TestFound:
     names = ("nominal", "parameters", "final")
     left = dict(zip(names, map(_finite, test.torque), strict=True)) if test.torque else {}
     r_squared = {one.signal: _finite(one.r_squared) for one in test.signals}
-    return TestFound(test.source, test.rows, misfit, test.is_worse(report.worse, report.of_noise), r_squared, left)
+    return TestFound(test.source, test.rows, misfit, test.is_worse(settings), r_squared, left)
 
 
 def effect_found(effect: GradedEffect) -> EffectFound:

@@ -63,7 +63,7 @@ def judge_trust(
             "inertias, the units and the scale of the torque, of which every size is a multiple"
         )
     for one in test:
-        if one.is_worse(settings.report.worse, settings.report.of_noise):
+        if one.is_worse(settings):
             red.append(
                 f"the final model predicts the test part of {one.source} worse than re-fitted parameters do: its "
                 "effects may stand for others; judge it on another record"

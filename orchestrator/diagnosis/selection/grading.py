@@ -9,7 +9,6 @@ from orchestrator.diagnosis.selection.outcome import EffectEvidence, Grade, Reco
 from orchestrator.diagnosis.settings import DiagnosisSettings, GradeSettings
 
 FOLLOWING = ("wave", "limit", "timing", "constant")  # kinds that follow whatever another law leaves
-FAR = 10.0  # times what noise and the values' uncertainty account for: so far off something else is missing
 
 
 @dataclass(frozen=True)
@@ -110,7 +109,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "confirmed", Grade.LIKELY,
-        lambda e, r, s: _is_confirmed(e, s.grades) and r.missed < FAR,
+        lambda e, r, s: _is_confirmed(e, s.grades) and r.missed < s.grades.most_missed,
         "share of the motion's misfit, or of the torque's, on test data; what free runs still miss",
         "grades.confirmed_share",
         "test data do not confirm it, or are missed with it too: it may stand in the place of another effect",
