@@ -13,13 +13,21 @@ from orchestrator.api.plotted import PlottedResult
 from orchestrator.api.records import as_record
 from orchestrator.api.shown import Block, doubts_of
 from orchestrator.diagnosis.data.records import check_whole
+from orchestrator.effects.effect import AXIS
 from orchestrator.estimation.inspection.channels import (
     channels_of,
     delay_between,
     excitation_of,
     reversals_of,
 )
-from orchestrator.estimation.inspection.machine import RoughMachine, as_model, is_of, rough_machine, visible_effects
+from orchestrator.estimation.inspection.machine import (
+    RoughMachine,
+    as_model,
+    is_of,
+    rough_axis,
+    rough_machine,
+    visible_effects,
+)
 from orchestrator.estimation.inspection.starter import OF_DEFAULT, assume_columns, blank_starter, starter
 from orchestrator.estimation.inspection.sufficiency import SEEN, Sufficiency, sufficiency
 from orchestrator.estimation.inspection.verdict import verdict_of
@@ -245,13 +253,16 @@ def _longest_part(record: Record) -> Record:
 def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Model, Mapping[str, str], tuple[str, ...]]:
     """Return the machine that the judgement is for, where each of its values is from, and what was assumed."""
     said_of = {name: OF_GIVEN if name in base.stated else OF_DEFAULT for name in base.plant.linear}
-    if base.fmu != DEFAULT or all(name in base.stated for name in said_of):
-        return base, said_of | dict.fromkeys(set(said_of) - set(base.stated), OF_FMU), ()
-    rough = rough_machine(record)
-    if given and any(name in base.stated for name in said_of):
-        lacking = [name for name in said_of if name not in base.stated]
-        origin = {**rough.origin, **{n: OF_GIVEN for n in base.stated if n in said_of}}
-        return _complete(base, rough), origin, (f"{', '.join(lacking)} {ROUGHLY}",)
+    axis = base.fmu == AXIS and record.has_torque
+    lacking = [name for name in said_of if name not in base.stated]
+    if not lacking or not (axis or base.fmu == DEFAULT):
+        return base, said_of | dict.fromkeys(lacking, OF_FMU), ()
+    rough = rough_axis(record) if axis else rough_machine(record)
+    if axis or (given and len(lacking) < len(said_of)):
+        held = dict.fromkeys(said_of, OF_FMU) if axis else {}
+        origin = {**held, **rough.origin, **{n: OF_GIVEN for n in base.stated if n in said_of}}
+        told = ", ".join(name for name in lacking if name in rough.values)
+        return _complete(base, rough), origin, (f"{told} {ROUGHLY}",) if told else ()
     if not record.has_torque:
         return as_model(rough, base), rough.origin, ()
     if sure and is_of(record, base):

@@ -20,7 +20,9 @@ LEAST_FREQUENCY = 5.0  # Hz, of a shaft
 SAME_RATIO = 0.1  # of two gear ratios, as a share
 SAME_INERTIA = 2.0  # factor between two inertias, of which one is from a record
 # How far the rough values may be off, as a share.
-ROUGH = {"J_m": 0.5, "J_l": 0.5, "k": 0.6, "c": 0.9, "b_m": 0.9, "b_l": 0.9, "tau": 0.5, "i": 0.0}
+ROUGH = {
+    "J_m": 0.5, "J_l": 0.5, "k": 0.6, "c": 0.9, "b_m": 0.9, "b_l": 0.9, "tau": 0.5, "i": 0.0, "J": 0.9, "b": 0.9
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,13 @@ def is_of(record: Record, model: Model) -> bool:
     inertia, _, _ = momentum_balance(*smooth(record, p["tau"]))
     relative = inertia / (p["J_m"] + p["J_l"] / p["i"] ** 2)
     return same and 1.0 / SAME_INERTIA < relative < SAME_INERTIA
+
+
+def rough_axis(record: Record) -> RoughMachine:
+    """Return inertia and friction of a single axis that could have made the record."""
+    _, inertia, friction, share = _balance(record.fill_missing())
+    said = f"ASSUMED: momentum balance of the record, explains {100.0 * share:.1f} %; put in the machine's"
+    return RoughMachine({"J": inertia, "b": max(friction, 1e-9)}, {"J": said, "b": said})
 
 
 def rough_machine(record: Record) -> RoughMachine:

@@ -193,6 +193,18 @@ def test_an_axis_without_teeth_is_inspected(lag: float, tmp_path: Path) -> None:
     assert again.parameters["J"].value == 1.0
 
 
+@pytest.mark.parametrize("size", [1.0, 0.02])
+def test_an_axis_of_which_nothing_is_known_is_drafted_from_its_record(size: float, tmp_path: Path) -> None:
+    (tmp_path / "axis.toml").write_text('fmu = "ServoAxis"\n')
+    record = axis_record(DEFAULTS._replace(J=size, b=size), 5, "axis")
+    (tmp_path / "starter.toml").write_text(oc.inspect(record, oc.read_model(tmp_path / "axis.toml")).starter)
+    drafted = read_model(tmp_path / "starter.toml").parameters
+    for name in ("J", "b"):
+        assert drafted[name].value == pytest.approx(size, rel=0.02), name
+        assert drafted[name].uncertainty > 0.5 * size, name
+        assert drafted[name].assumed, name
+
+
 def test_a_small_joint_is_no_thesis_drivetrain() -> None:
     """A joint of a hundredth of the inertia: its starter says that values are rough, not the given model's."""
     joint = {"J_m": 0.004, "J_l": 0.05, "k": 40.0, "c": 0.02, "b_m": 0.01, "b_l": 0.02, "i": 3.984, "tau": 0.02}
