@@ -148,7 +148,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
         verdict=verdict, effects=effects, nuisances=_nuisances(result, graded, parameters, model, settings),
         parameters=parameters, left=dict(zip(workings.balances[0].channels, map(float, left), strict=True)),
         remaining=remaining, law=_law(verdict, remaining, settings), test=test, record=record, trust=trust,
-        notes=_notes(result, record, test, settings), settings=settings, searched=searched.searched,
+        notes=_notes(result, record, settings), settings=settings, searched=searched.searched,
         model=model, workings=workings,
     )  # fmt: skip
 
@@ -198,14 +198,8 @@ def _law(verdict: str, remaining: Sequence[Dependence], settings: DiagnosisSetti
     return best if strong else None
 
 
-def _notes(
-    result: SearchResult, record: RecordEvidence, test: Sequence[TestMisfit], settings: DiagnosisSettings
-) -> tuple[str, ...]:  # fmt: skip
-    notes = [
-        f"nothing moves in the last {one.rows} rows of {one.source}, which are its test part: the test says nothing"
-        for one in test
-        if one.still
-    ]
+def _notes(result: SearchResult, record: RecordEvidence, settings: DiagnosisSettings) -> tuple[str, ...]:
+    notes = []
     if not result.complete:
         notes.append("the time limit ended the search: effects that were not tried may be missing")
     if not record.shows_inertia and not record.inertia_is_off(settings.selection.prior_deviations):

@@ -223,6 +223,8 @@ def test_a_test_part_at_rest_says_nothing_of_an_effect(model: Model) -> None:
     assert found.effects
     assert all(np.isnan(one.evidence.motion_share) and "confirmed" in one.lowered_by for one in found.effects)
     assert "on test data" not in " ".join(sureness(one) + words_on_test_data(one) for one in found.effects)
+    assert "the test says nothing" in str(found.trust)
+    assert "times its noise" not in str(found.trust)
 
 
 @pytest.mark.parametrize(("hidden", "seed", "hinted"), [("by hand", 7021, True), ("one push", 7611, False)])
