@@ -11,6 +11,7 @@ from pathlib import Path
 from tests.support.engine_process import ROOT, children
 from tests.support.waiting import HANGS, wait_until
 
+ENDS = 10.0  # s
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
 
 
@@ -35,7 +36,13 @@ class DaskProcesses:
         for process in processes:
             process.terminate()
         for process in processes:
-            process.wait(timeout=HANGS)
+            try:
+                process.wait(timeout=ENDS)
+            except subprocess.TimeoutExpired:  # a worker whose scheduler was killed may ask for it for ever
+                for pid in (*children(process.pid), process.pid):
+                    with contextlib.suppress(OSError):
+                        os.kill(pid, signal.SIGKILL)
+                process.wait(timeout=HANGS)
 
     def kill_worker(self, index: int) -> None:
         """Kill a worker's working process with SIGKILL; its supervisor starts a new one."""
