@@ -30,6 +30,7 @@ _BESIDE = (
     "seconds",
     "block_values",
     "candidates",
+    "diagnostics",
     "live",
     "arcmin",
     "summary",
@@ -104,7 +105,7 @@ def compare_results(first: Path, second: Path) -> Report:
     summary = (
         f"{len(sure)} of {len(compared)} numbers with an interval differ by more than their intervals; of the others "
         f"{len(others)} differ{_list_names([_with_spaces(name) for name in others])}. "
-        f"{len(apart)} of {len(curves)} curves differ{_list_names([f'{c.name} by {c.rms:.3g} (rms)' for c in apart])}."
+        f"{len(apart)} of {len(curves)} curves differ{_list_names([c.words() for c in apart])}."
     )
     return Report(
         f"{names[0]} and {names[1]}",
@@ -128,10 +129,14 @@ def _changes(documents: Sequence[Mapping[str, Any]]) -> str:
     """Return which arguments of two commands differ, in words."""
     first, second = (document.get("arguments") or {} for document in documents)
     return ", ".join(
-        f"{name} {first.get(name)} -> {second.get(name)}"
+        f"{name} {_stated(first.get(name))} -> {_stated(second.get(name))}"
         for name in dict.fromkeys([*first, *second])
         if name != "out" and first.get(name) != second.get(name)
     )
+
+
+def _stated(value: Any) -> str:
+    return "not given" if value is None else str(value)
 
 
 def _list_names(names: list[str]) -> str:
@@ -221,6 +226,10 @@ class ComparedCurve:
     plots: tuple[Plot, ...]
     rms: float
     apart: bool
+
+    def words(self) -> str:
+        """Return how far it differs; rows at other places have no difference."""
+        return f"{self.name} (other rows)" if math.isnan(self.rms) else f"{self.name} by {self.rms:.3g} (rms)"
 
 
 def _curves(first: Path, second: Path) -> Iterator[ComparedCurve]:

@@ -104,6 +104,10 @@ def test_runs_are_compared_by_their_curves_and_never_green(tmp_path: Path) -> No
     ]  # fmt: skip
     assert list(plots[1].series[0].y) == [117.0 * n for n in range(5)]
     assert "simulate-3 minus simulate-1" in render(report)
+    (other / "simulate.csv").write_text("time,plant.1,plant.2\n0,1,2\n7,1,2\n")
+    assert (
+        "2 of 2 curves differ: plant.1 (other rows), plant.2 (other rows)." in compare_results(same[0], other).summary
+    )
 
 
 def test_symbols_stay_whole_and_plain_numbers_have_no_unit(tmp_path: Path) -> None:
