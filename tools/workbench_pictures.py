@@ -67,7 +67,7 @@ def _show_scenario(driver: Any, served: Served) -> None:
         _press(driver, "Add it to the scenario")
         _wait(driver, f"[data-port^='{name.lower()}.']")
     _press(driver, "Connect what has the same name")
-    _save(driver, "fmus", 1180)
+    _save(driver, "fmus", 900, "#panel-fmus > h2:last-of-type")
 
 
 def _wait(driver: Any, css: str) -> Any:
@@ -98,9 +98,12 @@ def _run(driver: Any, served: Served, tab: str, text: str) -> None:
     _wait(driver, f"#panel-{tab} iframe")
 
 
-def _save(driver: Any, name: str, height: int) -> None:
+def _save(driver: Any, name: str, height: int, top: str = "header") -> None:
     set_screen(driver, WIDTH, height, "light")
-    driver.execute_script("scrollTo({ top: 0, behavior: 'instant' }); document.activeElement.blur()")
+    scroll = (
+        "document.querySelector(arguments[0]).scrollIntoView({ behavior: 'instant' }); document.activeElement.blur()"
+    )
+    driver.execute_script(scroll, top)
     time.sleep(2.0)  # a frame's page draws its plots
     path = IMAGES / f"workbench-{name}.png"
     driver.save_screenshot(str(path))
