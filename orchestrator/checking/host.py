@@ -159,7 +159,7 @@ class Host:
         self._locks = 0
         self._around = Surroundings()
         # Kept here, for the library keeps pointers to them.
-        self._log3, self._logger = _LOG(self._log), _LOGGER(lambda at, _name, *rest: self._log(at, *rest))
+        self._log3, self._logger = _LOG(self._log), _LOGGER(lambda at, _name, *values: self._log(at, *values))
         self._update = _UPDATE(self._intermediate)
         self._clock_update = _CLOCK_UPDATE(lambda _: None)
         self._lock, self._unlock = _LOCK(lambda: self._count(1)), _LOCK(lambda: self._count(-1))
