@@ -10,8 +10,8 @@ from pathlib import Path
 
 from orchestrator.errors import FmuError
 from orchestrator.shared.equation_files import SOURCES, closure, module_name
-from orchestrator.shared.syntax import parse_python
 from orchestrator.shared.version import __version__
+from pyfmu_sources.hybrid.syntax import parse_python
 
 HERE = Path(__file__).parent
 SUFFIX = "_slave"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pyfmu_sources
 from orchestrator.errors import FmuError
-from orchestrator.shared.syntax import parse_python
+from pyfmu_sources.hybrid.syntax import parse_python
 
 PACKAGE = pyfmu_sources.__name__
 SOURCES = Path(pyfmu_sources.__file__).parent

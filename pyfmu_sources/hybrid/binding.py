@@ -7,6 +7,8 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
+from .syntax import parse_python
+
 
 def bind(template: Any, plant: Any) -> Any:
     """Return the module ``template`` with what the module ``plant`` has under the names in its ``SLOTS``.
@@ -20,7 +22,7 @@ def bind(template: Any, plant: Any) -> Any:
             raise ImportError(name)
         module = module_from_spec(spec)
         given = {slot: getattr(plant, slot) for slot in template.SLOTS}
-        tree = _WrittenOut(given).visit(ast.parse(Path(spec.origin).read_bytes()))
+        tree = _WrittenOut(given).visit(parse_python(Path(spec.origin).read_bytes()))
         exec(compile(ast.fix_missing_locations(tree), spec.origin, "exec"), vars(module))
         vars(module).update(given)
         sys.modules[name] = module

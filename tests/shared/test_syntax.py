@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.shared import syntax
-from orchestrator.shared.syntax import parse_expression, parse_python
+from pyfmu_sources.hybrid import syntax
+from pyfmu_sources.hybrid.syntax import parse_expression, parse_python
+from tests.support.sources import ROOT
 
 
 class Slow:
@@ -47,3 +48,9 @@ def test_an_expression_is_one():
     assert parse_expression("a + 1").lineno == 1
     with pytest.raises(SyntaxError):
         parse_expression("a = 1")
+
+
+def test_the_product_parses_in_one_place():
+    """A lock that one caller does not take guards none of them."""
+    files = [path for room in ("orchestrator", "pyfmu_sources") for path in (ROOT / room).rglob("*.py")]
+    assert [path.name for path in files if "ast.parse(" in path.read_text(encoding="utf-8")] == ["syntax.py"]

@@ -24,7 +24,7 @@ from orchestrator.building.translation.functions import translate
 from orchestrator.building.translation.kinds import NOTHING, REAL, TRUTH, WHOLE, ArrayKind, Kind, Scalar, describe
 from orchestrator.building.translation.program import Program
 from orchestrator.building.translation.source import read_source
-from orchestrator.shared.syntax import parse_python
+from pyfmu_sources.hybrid.syntax import parse_python
 
 HEADERS = tuple(Path(__file__).parents[1] / "native_fmu" / name for name in ("translated.h", "kernel.h"))
 _NUMBERS: dict[Kind, str] = {REAL: "double", WHOLE: "int64_t", TRUTH: "bool"}

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from orchestrator.building.translation.kinds import Kind, KindError, is_type, kind_of
 from orchestrator.errors import FmuError
 from orchestrator.shared.equation_files import PACKAGE, module_name, read_imports
-from orchestrator.shared.syntax import parse_expression, parse_python
+from pyfmu_sources.hybrid.syntax import parse_expression, parse_python
 
 # Their classes are the runtime's business.
 NOT_TRANSLATED = ("adapters.slave_base", "adapters.sampled_slave")
