@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from importlib.metadata import requires
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,12 @@ HOSTILE = [
 RECORDER = """#!/usr/bin/env bash
 printf '%s\\0' "$@" > "$RECORDED"
 """
+
+
+def required_by(distribution: str) -> set[str]:
+    """What a distribution needs to run, and what that needs."""
+    given = {re.split(r"[<>=!~; ]", text)[0] for text in requires(distribution) or () if "extra ==" not in text}
+    return given.union(*(required_by(name) for name in given))
 
 
 @pytest.fixture
@@ -81,7 +88,7 @@ def test_what_is_installed_has_one_version_and_hashes():
     text = (ROOT / PLACE / "requirements.lock").read_text(encoding="utf-8")
     entries = re.split(r"\n(?=\S)", text.replace("\\\n", ""))
     found = {entry.partition("==")[0]: entry for entry in entries if entry.strip()}
-    assert set(found) == wanted
+    assert set(found) == wanted | {name for given in wanted for name in required_by(given)}
     assert all(re.match(r"[\w-]+==[\w.]+ .*--hash=sha256:[0-9a-f]{64}", entry) for entry in found.values())
     runner = (ROOT / PLACE / "run").read_text(encoding="utf-8")
     lines = [line for line in runner.splitlines() if re.search(r"pip.* install|\$\{pip\[@\]\}", line)]
