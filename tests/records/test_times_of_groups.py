@@ -147,6 +147,27 @@ def test_signals_beside_each_other_end_with_their_own_times(
     assert {one.column: one.place for one in shown.columns} == {"time": 2, "u": 1, "theta_m": 3, "theta_l": None}
 
 
+@pytest.mark.parametrize("names", [("time", "time"), ("time", "time.1"), ("t_u", "t_m")])
+def test_a_signal_has_the_time_before_it_where_all_have_as_many_rows(names: tuple[str, str], tmp_path: Path) -> None:
+    levels = np.random.default_rng(6).uniform(-2.0, 2.0, ROWS)
+    table = np.column_stack([2.0 * TIME, levels, TIME, ANGLE])
+    path = tmp_path / "log.csv"
+    np.savetxt(path, table, "%.12g", ",", header=f"{names[0]},u,{names[1]},theta_m", comments="")
+    record = read_record(path)
+    assert record.step == pytest.approx(0.002)
+    np.testing.assert_allclose(record.u, np.repeat(levels, 2)[:ROWS], atol=1e-9)
+    np.testing.assert_allclose(record.theta_m, ANGLE, atol=1e-9)
+
+
+@pytest.mark.parametrize("further", [1.7e9 + TIME, np.round(20.0 + TIME, 1)], ids=["another clock", "no time"])
+def test_a_column_called_a_time_before_others_may_be_none_of_theirs(further: np.ndarray, tmp_path: Path) -> None:
+    table = np.column_stack([TIME, HELD, further, ANGLE])
+    np.savetxt(tmp_path / "log.csv", table, "%.14g", ",", header="time,u,t_motor,theta_m", comments="")
+    record = read_record(tmp_path / "log.csv")
+    np.testing.assert_allclose(record.u, HELD, atol=1e-9)
+    assert any("not used: `t_motor`" in note for note in record.notes)
+
+
 def test_times_of_merged_topics_do_not_end_together_by_chance(tmp_path: Path) -> None:
     late = OWN + 0.0007
     time = np.append(TIME, late)

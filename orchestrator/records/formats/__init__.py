@@ -9,7 +9,7 @@ from pathlib import Path
 from orchestrator.errors import RecordError
 from orchestrator.records.formats import numpy_file, text
 from orchestrator.records.formats.apart import open_apart
-from orchestrator.records.formats.lengths import split_lengths
+from orchestrator.records.formats.lengths import split_lengths, split_times
 from orchestrator.records.formats.source import MAXIMUM_BYTES, RecordSource
 
 # First bytes of a file (and where they stand) and the module that reads it.
@@ -67,7 +67,7 @@ def open_source(path: Path, header: int | None = None, apart: bool = True) -> It
     if header is not None and module != "text":
         raise RecordError(f"{path}: `header` must be left out, but is {header}: it is for text files")
     if module == "text":
-        yield split_lengths(text.open_file(path, header))
+        yield split_lengths(split_times(text.open_file(path, header)))
     elif module == "numpy_file":
         yield split_lengths(numpy_file.open_file(path))
     elif apart:

@@ -1,6 +1,7 @@
-"""Tables in which signals stand beside each other, each with a time of its own, with which its columns end."""
+"""Tables in which signals stand beside each other, each with a time of its own."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,27 @@ def split_lengths(source: RecordSource) -> RecordSource:
     heads = [replace(head, raster=number) for head, number in zip(heads, rasters, strict=True)]
     rows = {number: slice(length) for length, number in raster.items()}
     return RowView(source, heads, rows, f", {len(raster)} times that end at rows of their own")
+
+
+def split_times(source: RecordSource) -> RecordSource:
+    """Return a table with a raster for each time that stands before columns of its own, or as it is: one time is all.
+
+    Simulink's Data Inspector and scopes write such tables. Columns that do not rise as a time does, or share no
+    interval with the others, are further channels, or another clock of the same rows.
+    """
+    heads = source.heads
+    times = [n for n, head in enumerate(heads) if head.kind == "number" and names_time(head.name)]
+    apart = len(times) > 1 and all(after - time > 1 for time, after in pairwise([*times, len(heads)]))
+    if not apart or len({head.raster for head in heads}) > 1:
+        return source
+    columns = [source.times(place) for place in times]
+    filled = [values[is_filled(values)] for values in columns]
+    rise = all(values.size > 1 and np.all(np.diff(values) > 0.0) for values in filled)
+    if not rise or max(values[0] for values in filled) >= min(values[-1] for values in filled):
+        return source
+    heads = [replace(head, raster=sum(n >= time for time in times[1:])) for n, head in enumerate(heads)]
+    rows = {raster: slice(_length(is_filled(values))) for raster, values in enumerate(columns)}
+    return RowView(source, heads, rows, f", {len(times)} times, each before its own columns")
 
 
 def _filled(source: RecordSource, place: int) -> NDArray[np.bool_]:
