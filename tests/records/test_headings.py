@@ -63,6 +63,26 @@ def test_key_value_lines_of_a_scope(tmp_path: Path, columns: dict[str, np.ndarra
     assert any("`SetTorque` taken as u" in note for note in notes)
 
 
+@pytest.mark.parametrize("header", [None, 1])
+def test_rows_of_simulink_that_say_what_they_are(
+    header: int | None, tmp_path: Path, columns: dict[str, np.ndarray]
+) -> None:
+    head = "".join(
+        f",{key}: {u},{key}: {angle},{key}: {angle}\n"
+        for key, u, angle in (
+            ("Type", "double", "double"), ("Unit", "mN*m", "deg"), ("Interp", "zoh", "linear"),
+            ("BlockPath", "drive/Torque", "drive/Shaft"), ("PortIndex", "1", "2"),
+        )
+    )  # fmt: skip
+    scaled = {
+        "time": columns["time"], "u": 1e3 * columns["u"], "theta_m": np.degrees(columns["theta_m"]),
+        "theta_l": np.degrees(columns["theta_l"]),
+    }  # fmt: skip
+    path = tmp_path / "run.csv"
+    path.write_text("time,u,theta_m,theta_l\n" + head + _rows(scaled, ","))
+    _same(path, columns, {}, header)
+
+
 def test_key_value_lines_of_a_measurement_file(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
     head = (
         "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nMulti_Headings\tNo\nDate\t2024/05/13\n"

@@ -85,11 +85,13 @@ def detect(file: TextFile, header: int | None = None) -> Dialect:
     rows = [cells_of(line, separator) for line in lines[first : first + 20] if line.strip()]
     above = lines[:first]
     head = Heading(separator, decimal, width, path)
+    above, labelled = head.take_labelled(above)
     if header:
         above = [file.head(skipped - 1, SAMPLE_CHARACTERS).split("\n", 1)[0], *above]
         names, units, preamble = head.read_stated(above, header)
     else:
         names, units, preamble = (None, [""] * width, above) if header == 0 else head.read_names(above)
+    units = [own or unit for own, unit in zip(labelled, units, strict=True)]
     kinds = ["stamp" if _is_stamp_column(rows, place) else "number" for place in range(width)]
     if names is None:
         heads = [Head(f"#{n + 1}", "", kind) for n, kind in enumerate(kinds)]

@@ -11,6 +11,8 @@ from orchestrator.shared.units import is_unit
 
 UNIT_KEYS = frozenset(("unit", "units", "einheit", "einheiten", "y_unit_label", "unit label"))
 COMMENTS = frozenset(("comment", "comments", "kommentar", "bemerkung", "remark"))
+# Of the rows below the names that Simulink's Data Inspector writes: each cell says what it is.
+_LABELLED = re.compile(r"(?:Type|Enum|Unit|Interp|BlockPath|PortIndex): ?(.*)")
 Named = tuple[list[str] | None, list[str], list[str]]
 
 
@@ -22,6 +24,17 @@ class Heading:
     decimal: str
     width: int
     path: Path
+
+    def take_labelled(self, lines: list[str]) -> tuple[list[str], list[str]]:
+        """Return lines without those whose cells say what they are (`Unit: deg`), and the units in these."""
+        kept, units = [], [""] * self.width
+        for line in lines:
+            cells = self._fit_cells(line) or [""]
+            if not all(_LABELLED.fullmatch(cell) for cell in cells if cell) or not any(cells):
+                kept.append(line)
+            elif any(cell.startswith("Unit") for cell in cells):
+                units = [cell.removeprefix("Unit:").strip() for cell in cells]
+        return kept, units
 
     def read_names(self, lines: list[str]) -> Named:
         """Return names (None: there are none), units (empty where not in a row of their own) and the lines before."""
