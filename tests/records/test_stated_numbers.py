@@ -137,6 +137,35 @@ def test_rows_with_thousands_separators_are_not_left_out(first: str, tmp_path: P
         read_record(path)
 
 
+@pytest.mark.parametrize(("separator", "mark", "torque"), [
+    (";", ".", "{:.0f}"), (";", ",", "{:.0f}"), (",", ",", "{:.0f}"), (";", ".", "0,{:03.0f}"),
+])  # fmt: skip
+def test_whole_numbers_with_thousands_separators_are_refused(
+    separator: str, mark: str, torque: str, tmp_path: Path
+) -> None:
+    cells = [f"{count:,d}".replace(",", mark) for count in np.rint(1e4 * ANGLE).astype(int).tolist()]
+    rows = [
+        separator.join((str(2 * n), torque.format(abs(u)), f'"{cell}"' if separator == "," else cell))
+        for n, (u, cell) in enumerate(zip(100.0 * TORQUE, cells, strict=True))
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([separator.join(("time [ms]", "u", "theta_m [counts]")), *rows]) + "\n")
+    with pytest.raises(RecordError, match=r"column `theta_m .counts.` must hold plain numbers.*without thousands"):
+        read_record(path, {"theta_m": Column(counts_per_rev=62_832)})
+
+
+@pytest.mark.parametrize("digits", ["{:.3f}", "{:g}"])
+def test_numbers_of_three_decimals_are_no_thousands(digits: str, tmp_path: Path) -> None:
+    levels = np.where(TORQUE > 0.0, 1.125, 0.0)
+    angle = np.round(500.0 + 50.0 * ANGLE / np.abs(ANGLE).max(), 3)
+    rows = [f"{t:.3f},{u:g},{digits.format(a)}" for t, u, a in zip(TIME, levels, angle, strict=True)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time,u,theta_m", *rows]) + "\n")
+    record = read_record(path)
+    np.testing.assert_allclose(record.u, levels)
+    np.testing.assert_allclose(record.theta_m, angle, atol=1e-9)
+
+
 @pytest.mark.parametrize(("stamps", "rate", "said"), [
     (TIME, 500.0, ""), (np.floor(TIME * 100.0) / 100.0, 500.0, ""), (TIME, 1000.0, "though it says 500 Hz"),
     (TIME * 2.0, 500.0, "though it says 250 Hz"), (np.zeros(ROWS), 500.0, ""),

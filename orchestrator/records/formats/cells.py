@@ -16,6 +16,9 @@ _SIGN = rf"[+\-{DASHES}]?"
 _POINT = re.compile(rf"{_SIGN}(?:(?:\d+\.?\d*|\.\d+)(?:[eE]{_SIGN}\d+)?|(?i:{_NOT_A_NUMBER}|{_INFINITE}))")
 _COMMA = re.compile(rf"{_SIGN}(?:(?:\d+,?\d*|,\d+)(?:[eE]{_SIGN}\d+)?|(?i:{_NOT_A_NUMBER}|{_INFINITE}))")
 _SPECIAL = re.compile(rf"({_SIGN})(?:({_NOT_A_NUMBER})|{_INFINITE})")
+# A whole number with a sign between its thousands, or a number with three decimals: the cells beside it tell.
+GROUPED = re.compile(rf"{_SIGN}[1-9]\d{{0,2}}(?:[.,]\d{{3}})+")
+SMALL = re.compile(rf"{_SIGN}(?:0|[1-9]\d{{0,2}})")  # whole and below a thousand
 _HYPHENS = str.maketrans(dict.fromkeys(DASHES, "-"))
 
 

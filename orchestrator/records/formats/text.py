@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.cells import cells_of, is_number, plain_number, plain_signs
+from orchestrator.records.formats.cells import (
+    GROUPED,
+    SMALL,
+    cells_of,
+    is_missing,
+    is_number,
+    plain_number,
+    plain_signs,
+)
 from orchestrator.records.formats.dialect import Dialect, detect
 from orchestrator.records.formats.preamble import rate_of
 from orchestrator.records.formats.rows import RowBlock, TableRows
@@ -20,6 +28,8 @@ from orchestrator.records.formats.text_file import TextFile, open_text
 from orchestrator.records.stamps import StampReader, is_stamp
 from orchestrator.records.units import parse_unit
 
+FEWEST_GROUPED = 10  # different numbers of a kind that tell: a torque of two levels may be 0 and 1.125
+PIECE = 10_000  # rows that are looked at together: most columns show in the first ones that they are not grouped
 _ALL = slice(0, None)
 
 
@@ -80,7 +90,32 @@ class TextSource(RecordSource):
             size = rows.stop
         for column in stamps.values():
             column.check()
+        for place in numbers if strict else ():
+            if _may_be_grouped(out[place][:size]):
+                self._refuse_grouped(place)
         return [out[p][:size].view("datetime64[ns]") if p in stamps else out[p][:size] for p in places]
+
+    def _refuse_grouped(self, place: int) -> None:
+        """Refuse a column of whole numbers with signs between their thousands, which read as a thousandth of them.
+
+        All from a thousand on have one, and the smaller ones have no decimals (`999`, `1.000`); or it is a point among
+        decimal commas.
+        """
+        small, largest, shown = set[str](), 0.0, ""
+        for block in self._rows.blocks(self._part):
+            for cell in self.texts(block, place):
+                if GROUPED.fullmatch(cell):
+                    shown, largest = cell, max(largest, abs(float(plain_number(cell, self._dialect.decimal))))
+                elif SMALL.fullmatch(cell):
+                    small.add(cell)
+                elif not is_missing(cell):
+                    return
+        exceed = any(abs(float(plain_number(cell, "."))) > largest for cell in small)
+        if exceed or len(small) >= FEWEST_GROUPED or (self._dialect.decimal == "," and "." in shown):
+            raise RecordError(
+                f"{self._path}: column `{self.label(place)}` must hold plain numbers, but holds `{shown}`: "
+                f"{_number_cure(shown)}"
+            )
 
     def _rastered(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """Return columns of which each raster ends where its own time does."""
@@ -182,6 +217,19 @@ def open_file(path: Path, header: int | None = None) -> TextSource:
     file = open_text(path)
     dialect = detect(file, header)
     return TextSource(file, dialect, TableRows(file, dialect))
+
+
+def _may_be_grouped(values: NDArray[np.float64]) -> bool:
+    """Return whether numbers (n,) may be thousandths of whole ones, of which those below a thousand are right."""
+    different = set[float]()
+    for first in range(0, values.size, PIECE):
+        piece = values[first : first + PIECE]
+        broken = piece[np.isfinite(piece) & (piece != np.rint(piece))]
+        thousands = 1e3 * broken
+        if np.any((np.abs(broken) < 1.0) | (np.abs(thousands) > 1e6) | (np.abs(thousands - np.rint(thousands)) > 1e-6)):
+            return False
+        different.update(np.unique(broken)[:FEWEST_GROUPED].tolist())
+    return len(different) >= FEWEST_GROUPED
 
 
 def _number_cure(cell: str) -> str:
