@@ -1,5 +1,6 @@
 """Lines above the data: key-value lines of scopes and loggers, rows of units, a stated line of names."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,35 @@ def test_key_value_lines_of_a_scope(tmp_path: Path, columns: dict[str, np.ndarra
     notes = _same(path, columns, {"time": Column("#1", "ms")}, header=5)
     assert "not used" not in notes[0]
     assert any("`SetTorque` taken as u" in note for note in notes)
+
+
+TWINCAT = {
+    "Name": ("Torque", "PosMotor", "PosLoad"), "SymbolComment": ("", "", ""), "SampleTime[ms]": ("5", "5", "5"),
+    "SymbolName": ("MAIN.u", "MAIN.qm", "MAIN.ql"), "Port": ("851", "851", "851"), "ScaleFactor": ("1", "1", "1"),
+    "BitMask": ("0xffff", "0xffff", "0xffff"), "Unit": ("(None)", "deg (Angle)", "mrad (Angle)"),
+    "Unit ScaleFactor": ("1", "1", "1"), "Unit Offset": ("0", "0", "0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("keys", [TWINCAT, ("Name", "SymbolName", "BitMask", "Unit"), ("Name", "Unit")])
+@pytest.mark.parametrize("late", [0, 2])
+def test_columns_of_a_twincat_scope_have_times_of_their_own(
+    keys: Sequence[str], late: int, tmp_path: Path, columns: dict[str, np.ndarray]
+) -> None:
+    head = ["Name\tDrive Scope", "Starttime of export\t133964386997165000\tMontag, 1. Januar 2024\t10:00:00.000", ""]
+    head += ["\t".join(f"{key}\t{cell}" for cell in TWINCAT[key]) for key in keys]
+    milliseconds, torque = 1e3 * columns["time"], columns["u"]
+    times = np.append(milliseconds[late:], milliseconds[-1] + 5.0 * np.arange(1, late + 1))  # of the torque
+    table = {
+        "a": times, "u": np.append(torque[late:], torque[:late]), "b": milliseconds,
+        "theta_m": np.degrees(columns["theta_m"]), "c": milliseconds, "theta_l": 1e3 * columns["theta_l"],
+    }  # fmt: skip
+    path = tmp_path / "scope.csv"
+    path.write_text("\n".join([*head, "", _rows(table, comma=True)]))
+    record = read_record(path)
+    assert record.step == pytest.approx(0.005)
+    for name in ("u", "theta_m", "theta_l"):
+        np.testing.assert_allclose(getattr(record, name), columns[name][late:], rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("header", [None, 1])

@@ -42,6 +42,9 @@ class Heading:
         self._refuse_decimal_commas([lines[n] for n in filled])
         if not filled:
             return None, [""] * self.width, []
+        scope = self._read_scope(lines)
+        if scope is not None:
+            return scope
         last = self._fit_cells(lines[filled[-1]])
         if last is None:
             cells = cells_of(lines[filled[-1]], self.separator)
@@ -58,6 +61,20 @@ class Heading:
                 if above is not None and 2 * len(words) > len(above) and len(set(words)) > max(1, len(words) // 2):
                     return above, units, lines[:place] + lines[place + 1 : filled[-1]]
         return last, self._units_by_key(lines[: filled[-1]]), lines[: filled[-1]]
+
+    def _read_scope(self, lines: list[str]) -> Named | None:
+        """Return what a TwinCAT Scope writes above columns of times [ms] and of channels in turn; None: no such rows.
+
+        Each row has its key in each column of times: `Name`, `Unit` and others.
+        """
+        fitted = (self._fit_cells(line) for line in lines)
+        rows = {cells[0]: cells for cells in fitted if cells is not None and {*cells[::2]} == {cells[0]}}
+        if "Name" not in rows or self.width < 4:
+            return None
+        units = rows.get("Unit", [""] * self.width)
+        for place in range(0, self.width, 2):
+            rows["Name"][place], units[place] = "time", "ms"
+        return rows["Name"], ["" if unit == "(None)" else unit for unit in units], lines
 
     def read_stated(self, lines: list[str], header: int) -> Named:
         """Return names, units and the lines in between, where the first line holds the names."""
