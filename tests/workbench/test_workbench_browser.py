@@ -167,6 +167,32 @@ def test_a_line_that_names_no_unit_becomes_no_button(page: Any, served: Served, 
     assert call(page, "advice.js", "adviceOf", line)["value"] == "deg"
 
 
+CROSSED = """const done = arguments[arguments.length - 1];
+    import(new URL("static/graph.js", location)).then(({ Graph }) => {
+      const ports = (name) => [{ name, causality: "input" }, { name: `${name}_out`, causality: "output" }];
+      const variables = ["a", "b"].flatMap(ports);
+      const names = ["one", "two", "three", "four", "five"], graph = new Graph();
+      const wire = (m, n) => ["a", "b"].map((port) => ({ from: `${m}.${port}_out`, to: `${n}.${port}` }));
+      const connections = names.flatMap((m) => names.flatMap((n) => wire(m, n)));
+      document.body.append(graph.svg);
+      graph.draw(Object.fromEntries(names.map((name) => [name, { variables }])), connections);
+      const boxes = [...graph.svg.querySelectorAll(".node")].map((node) => node.getBoundingClientRect());
+      const within = (x, from, to) => x > from + 1 && x < to - 1;
+      const inside = ({ x, y }) => boxes.some((b) => within(x, b.left, b.right) && within(y, b.top, b.bottom));
+      const wires = [...graph.svg.querySelectorAll(".wire")];
+      const crossed = wires.filter((wire) => Array.from({ length: 401 }, (_, n) =>
+        wire.getPointAtLength((n / 400) * wire.getTotalLength()).matrixTransform(wire.getScreenCTM())).some(inside));
+      graph.svg.remove();
+      done([wires.length, crossed.length]);
+    })"""
+
+
+def test_no_wire_of_a_scenario_runs_through_a_box(page: Any, served: Served) -> None:
+    """Each FMU to each other and to itself, over two rows of boxes."""
+    open_workbench(page, served)
+    assert page.execute_async_script(CROSSED) == [50, 0]
+
+
 def test_advice_names_fields_and_names_keep_their_brackets(page: Any, served: Served) -> None:
     open_workbench(page, served)
     said = {

@@ -1,6 +1,7 @@
 /* global label, shape */
 // A scenario as a picture: a box for each FMU, inputs left, outputs right, and a wire for each connection.
 const WIDE = 270, LINE = 22, HEAD = 30, MOST = 12, GAP = 60, ROOM = 18;
+const LANES = 9, LANE = 4;  // wires that run beside each other in a gap, and the width of one
 
 // Whether an output may be connected to an input: kinds of numbers that convert, and units of one quantity.
 export function fits(from, to) {
@@ -19,13 +20,13 @@ export class Graph {
     this.ports = new Map();
     const places = Object.values(nodes).map((node, n) => ({ node, ...place(n) }));
     const boxes = Object.keys(nodes).map((name, n) => this.box(name, places[n]));
-    const right = Math.max(600, ...places.map(({ x }) => x + WIDE + 20));
+    const right = Math.max(600, ...places.map(({ x }) => x + WIDE + GAP));
     const low = Math.max(120, ...places.map(({ y, node }) => y + this.height(node) + 20));
     this.svg.setAttribute("viewBox", `0 0 ${right} ${low}`);
     this.svg.style.width = `${right}px`;
     this.svg.setAttribute("aria-label", `Scenario: ${Object.keys(nodes).join(", ") || "no FMU yet"}; ` +
       (connections.map(({ from, to }) => `${from} to ${to}`).join("; ") || "nothing is connected"));
-    this.svg.replaceChildren(...boxes, ...connections.map(({ from, to }) => this.line(from, to)).filter(Boolean));
+    this.svg.replaceChildren(...boxes, ...connections.map(({ from, to }, n) => this.line(from, to, n)).filter(Boolean));
   }
 
   height(node) {
@@ -59,19 +60,20 @@ export class Graph {
     const title = shape("title");
     title.textContent = `${key}${one.unit ? ` [${one.unit}]` : ""}: ${one.description || one.causality}`;
     made.append(title, dot, label);
-    this.ports.set(key, { x: box.x + x, y: box.y + y });
+    this.ports.set(key, { x: box.x + x, y: box.y + y, top: box.y });
     return made;
   }
 
-  line(from, to) {
+  line(from, to, n) {
     const [a, b] = [this.ports.get(from), this.ports.get(to)];
-    return a && b ? shape("path", { class: "wire", d: curve(a, b) }) : null;
+    return a && b ? shape("path", { class: "wire", d: route(a, b, 8 + LANE * (n % LANES)) }) : null;
   }
 }
 
-const place = (n) => ({ x: 20 + (n % 3) * (WIDE + GAP), y: 20 + Math.floor(n / 3) * (HEAD + LINE * (MOST + 1) + GAP) });
+const place = (n) => ({ x: GAP + (n % 3) * (WIDE + GAP), y: GAP + Math.floor(n / 3) * (HEAD + LINE * (MOST + 1) + GAP) });
 
-function curve(a, b) {
-  const bend = Math.max(40, Math.abs(b.x - a.x) / 2);
-  return `M${a.x} ${a.y} C${a.x + bend} ${a.y} ${b.x - bend} ${b.y} ${b.x} ${b.y}`;
+// A wire to the next column bends in the gap between both; any other one runs in the gaps, past no name of a port.
+function route(a, b, lane) {
+  if (b.x - a.x === GAP) return `M${a.x} ${a.y} C${a.x + GAP} ${a.y} ${b.x - GAP} ${b.y} ${b.x} ${b.y}`;
+  return `M${a.x} ${a.y} h${lane} V${b.top - lane} H${b.x - lane} V${b.y} H${b.x}`;
 }
