@@ -50,6 +50,33 @@ def test_one_time_for_all_channels(tmp_path: Path, columns: dict[str, np.ndarray
     np.testing.assert_allclose(named.time, columns["time"], atol=1e-8)
 
 
+@pytest.mark.parametrize("times", [["X_Value"], []])
+def test_a_comment_on_the_data_stands_behind_the_first_row(
+    times: list[str], tmp_path: Path, columns: dict[str, np.ndarray]
+) -> None:
+    names = [*("time" for _ in times), *NAMES]
+    first, *rows = _rows([columns[name] for name in names]).splitlines()
+    path = tmp_path / "log.lvm"
+    path.write_text(_head("One", ["0.005"] * 3, [*times, *NAMES]) + "\n".join([first + "\trun 1, slow", *rows]) + "\n")
+    record = read_record(path)
+    assert record.size == columns["u"].size
+    np.testing.assert_allclose(record.theta_l, columns["theta_l"], atol=1e-8)
+
+
+@pytest.mark.parametrize(("x_columns", "old", "new"), [
+    ("One", "X0\t0.0000000000000000E+0", "X0\t5.0E-2"), ("No", "X0\t0.0000000000000000E+0", "X0\t5.0E-2"),
+    ("Multi", "Channels\t3", "Channels\t3\nTime\t12:00:00.5\t12:00:00.5\t12:00:01"),
+])  # fmt: skip
+def test_channels_that_begin_apart_are_refused(
+    x_columns: str, old: str, new: str, tmp_path: Path, columns: dict[str, np.ndarray]
+) -> None:
+    text = _head(x_columns, ["0.005"] * 3, ["X_Value", *NAMES]) + _rows(list(columns.values()))
+    path = tmp_path / "log.lvm"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(RecordError, match="all channels must begin together, but begin at"):
+        read_record(path)
+
+
 def test_no_time_but_a_step(tmp_path: Path, columns: dict[str, np.ndarray]) -> None:
     path = tmp_path / "log.lvm"
     path.write_text(_head("No", ["0.005"] * 3, list(NAMES)) + _rows([columns[name] for name in NAMES]))

@@ -8,7 +8,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.formats.cells import cells_of, is_missing, is_value
 from orchestrator.records.formats.heading import UNIT_KEYS, Heading
 from orchestrator.records.formats.heads import head_of
-from orchestrator.records.formats.labview import is_labview, with_rasters
+from orchestrator.records.formats.labview import is_labview, refuse_starts, with_rasters
 from orchestrator.records.formats.source import MAXIMUM_CHANNELS, Head
 from orchestrator.records.formats.text_file import TextFile
 from orchestrator.records.stamps import is_stamp
@@ -98,6 +98,7 @@ def detect(file: TextFile, header: int | None = None) -> Dialect:
     else:
         heads = [_head(name, unit, kind) for name, unit, kind in zip(names, units, kinds, strict=True)]
     if is_labview(preamble):
+        refuse_starts([cells_of(line, separator) for line in preamble], path)
         heads = with_rasters(heads, preamble)
     texts = frozenset(place for place in range(width) if _is_text_column(rows, place, decimal))
     has_units = any(units) and names is not None
@@ -127,11 +128,12 @@ def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, in
 def _first_row(lines: list[str], first: int, separator: str, decimal: str, width: int, path: Path) -> int:
     """Return the first row of the table: rows above its longest run belong to it where no names stand between them."""
     stray: list[int] = []
+    widths = (width, width + is_labview(lines))  # a comment on the data is a further cell of the first row
     for n in range(first - 1, -1, -1):
         cells = cells_of(lines[n], separator)
         if not lines[n].strip():
             continue
-        if len(cells) == width and all(cell == "" or is_value(cell, decimal) for cell in cells):
+        if len(cells) in widths and all(cell == "" or is_value(cell, decimal) for cell in cells[:width]):
             stray.append(n)
         elif len(cells) == width and not any(is_value(cell, decimal) for cell in cells):
             break

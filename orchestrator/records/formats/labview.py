@@ -37,6 +37,18 @@ def with_rasters(heads: Sequence[Head], preamble: Sequence[str]) -> list[Head]:
     return out
 
 
+def refuse_starts(lines: Sequence[Sequence[str]], path: Path) -> None:
+    """Refuse channels that begin at different times; those of `X0` are in the X column that each one may have."""
+    rows = {cells[0]: {*cells[1:]} - {""} for cells in lines if cells}
+    stated = ("Date", "Time") if rows.get("X_Columns") == {"Multi"} else ("Date", "Time", "X0")
+    for key in stated:
+        if len(rows.get(key, ())) > 1:
+            raise RecordError(
+                f"{path}: all channels must begin together, but begin at {' and '.join(sorted(rows[key]))} (`{key}`): "
+                "save those that begin together in a file of their own"
+            )
+
+
 def refuse_segment(line: str, number: int, path: Path) -> None:
     """Refuse a second segment within the rows, which begins anew with channels and times of its own."""
     if line.startswith(END):

@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from orchestrator.records.formats.cells import cells_of, is_missing, is_value
+from orchestrator.records.formats.cells import cells_of, is_missing, is_value, is_word
 from orchestrator.records.formats.dialect import Dialect
-from orchestrator.records.formats.labview import refuse_segment
+from orchestrator.records.formats.labview import is_labview, refuse_segment
 from orchestrator.records.formats.text_file import TextFile, count_of
 
 # The start of a line that may be no row: no digit, sign, point or quote; blank lines, too.
@@ -87,9 +87,12 @@ class TableRows:
             if not entry.strip():
                 continue
             refuse_segment(entry, number, self.file.path)
-            odd = _ODD.match(entry) is not None or len(cells_of(entry, separator)) != width
-            if odd and self._is_remark(cells_of(entry, separator)):
+            cells = cells_of(entry, separator)
+            odd = _ODD.match(entry) is not None or len(cells) != width
+            if odd and self._is_remark(cells):
                 self.left_out[number], self.broken = _plain(entry), True
+            elif len(cells) == width + 1 and is_word(cells[-1]) and is_labview(self.dialect.preamble):
+                kept.append(entry.rpartition(separator)[0])  # the comment on the data stands behind a row of them
             else:
                 kept.append(entry)
         return kept
