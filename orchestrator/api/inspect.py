@@ -123,7 +123,7 @@ class InspectResult(PlottedResult):
             lag, error = self.delay
             said.append(
                 f"The load's angle lags the motor's by {1e3 * lag:.3g} ms (standard error {1e3 * error:.2g} ms, "
-                f"{lag / self.record.step:.2g} samples), the shaft's own share included."
+                f"{lag / self.record.step:.2g} samples); the elastic shaft causes a part of this lag."
             )
         return said
 

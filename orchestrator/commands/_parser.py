@@ -97,7 +97,9 @@ def word_unknown(word: str, command: str, flags: Mapping[str, str]) -> str:
     """Return the complaint about a word that a command does not take: the option that is meant, and where help is."""
     if not word.startswith("-"):
         takers = [f": say `{flags[name]} {word}`" for name in ("scenario", "model") if name in flags]
-        return f"`{word}` must be left out of `{command}`, but is given{''.join(takers[:1])}"
+        one_log = "record" in flags and not word.endswith(".toml")
+        cure = f": run `{command}` once for each log" if one_log else "".join(takers[:1])
+        return f"`{word}` must be left out of `{command}`, but is given{cure}"
     option = word.partition("=")[0]
     near = difflib.get_close_matches(option, [flag for flag in flags.values() if flag.startswith("--")], 1)
     meant = f": perhaps `{near[0]}`" if near else ""

@@ -235,7 +235,8 @@ def _content(raw: dict[str, Any], where: str) -> _Content:
 def _check_keys(table: Entry, known: tuple[str, ...], prefix: str, content: _Content) -> None:
     for key, value in table.items():
         if key not in known:
-            must = f"be one of {', '.join(prefix + name for name in known)}"
+            near = difflib.get_close_matches(key, known, 1)  # one that is near enough, else all
+            must = f"be {'one of ' * (not near)}{', '.join(prefix + name for name in near or known)}"
             if not prefix and type(value) in (int, float):
                 must += f"; of a parameter say `[parameters.{key}]` and below it `value = {value}`"
             raise content.wrong(f"{prefix}{key}", must)

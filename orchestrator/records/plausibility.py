@@ -19,6 +19,7 @@ WITH_SHAFT = ("Drivetrain", "TwoStageTrain")
 DEGREES = 180.0 / math.pi
 LARGE_TRAVEL = 0.5  # rad of the load, beyond which twist no longer disturbs the slope
 LONGEST_STEP = 1.5  # rad of the shaft's oscillation
+SHORTEST_RECORD = 2.0 * math.pi  # rad of it: in less than a period, no teeth part and meet again
 SMOOTHING_TIME = 0.05  # s
 NEEDED_FIT = 0.8
 NEARLY_STILL = 0.05  # of the rms speed, within which dry friction changes its sign
@@ -63,12 +64,17 @@ def _frequency(p: Mapping[str, float]) -> float:
 
 
 def _check_rate(record: Record, frequency: float) -> None:
-    """Refuse records that are too slow for the shaft's own oscillation."""
+    """Refuse records that are too slow or too short for the shaft's own oscillation, or tell time in another unit."""
     if frequency * record.step > LONGEST_STEP:
         raise RecordError(
             f"{record.source}: column `time` must step by at most {LONGEST_STEP / frequency:.3g} s to show a shaft "
             f"that oscillates at {frequency:.3g} rad/s, but steps by {record.step:g} s: log faster, or "
             "mend `k`, `J_m`, `J_l` (`model`)"
+        )
+    if frequency * record.duration < SHORTEST_RECORD:
+        raise RecordError(
+            f"{record.source}: column `time` must last at least {SHORTEST_RECORD / frequency:.3g} s, a period of the "
+            f"shaft, but lasts {record.duration:g} s: say `[columns.time] unit`, or mend `k`, `J_m`, `J_l` (`model`)"
         )
 
 
@@ -135,7 +141,8 @@ def _check_slope(source: str, motor: Array, load: Array, ratio: float, name: str
     if abs(math.log(relative)) > 0.3:
         raise RecordError(
             f"{source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have "
-            f"{ratio / relative:.4g}: mend `[columns.theta_m] unit` or `[parameters.{name}] value` (`model`)"
+            f"{ratio / relative:.4g}: mend `unit` and `counts_per_rev` of both columns, exchange "
+            f"their names if they are swapped, or mend `[parameters.{name}] value` (`model`)"
         )
 
 
@@ -218,8 +225,8 @@ def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
             )
         raise RecordError(
             f"{record.source}: the model's inertia must be the machine's, but is {1.0 / max(abs(relative), 1e-12):.3g} "
-            f"times as large {shown}: say {machine}, or the right `unit` in `[columns.u]` and "
-            "`[columns.theta_m]`"
+            f"times as large {shown}: say {machine}, or the right `unit` in `[columns.u]`, "
+            "`[columns.theta_m]` and `[columns.time]`"
         )
     if relative > DEGREES / 3.0:
         raise RecordError(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.columns import COLUMNS, KINDS, MEANINGS, SI, Column, lacking_numbers
-from orchestrator.records.formats import open_source
+from orchestrator.records.formats import first_bytes, open_source
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.formats.text_file import open_text
 from orchestrator.records.loading import Reading, find_all_channels, load
@@ -128,9 +128,8 @@ def _preview_source(
 
 def raw_lines(path: Path) -> tuple[str, ...]:
     """Return the first lines of a text; none of a file that is no text."""
-    with path.open("rb") as file:
-        if b"\x00\x00\x00" in file.read(4000):
-            return ()
+    if b"\x00\x00\x00" in (head := first_bytes(path)) or head.startswith(b"%PDF"):
+        return ()
     try:
         text = open_text(path).head(0, SHOWN_LINES * LINE_LENGTH)
     except RecordError:

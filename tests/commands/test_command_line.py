@@ -22,6 +22,8 @@ from orchestrator.cli import COMMANDS, main
         (["sweep", "--no\nthing"], r"`--no\nthing` must be an option of `sweep`, but is none"),
         (["estimate", "log.csv", "--modle", "m.toml"], "but is none: perhaps `--model`; see "),
         (["simulate", "loop.toml"], "`loop.toml` must be left out of `simulate`, but is given: say `--scenario loop"),
+        (["inspect", "a.csv", "b.csv"], "`b.csv` must be left out of `inspect`, but is given: run `inspect` once for"),
+        (["inspect", "a.csv", "b.toml"], "`b.toml` must be left out of `inspect`, but is given: say `--model b.toml`"),
         (["check", "--memory-limit", "0"], "`--memory-limit` must be positive"),
         (["check", ""], "`FMU` must be a path, but is empty"),
         (["estimate", "--method", "guess"], "`--method` must be one of maximum_likelihood, ekf"),

@@ -262,7 +262,7 @@ ADVICE: dict[str, tuple[Input, str, Input]] = {
         Input(EXCHANGED, {"theta_m": Column("theta_l"), "theta_l": Column("theta_m")}, model={}),
     ),
     "another ratio": (
-        Input(PLAIN, model={"i": 25.0}), "or `[parameters.i] value`", Input(PLAIN, model={}),
+        Input(PLAIN, model={"i": 25.0}), "or mend `[parameters.i] value`", Input(PLAIN, model={}),
     ),
     "sign of the load": (
         Input(_csv(None, _scaled(theta_l=-1.0)), model={}), "say `[columns.theta_l] factor = -1`",

@@ -191,6 +191,12 @@ def test_a_record_too_slow_for_the_shaft_is_refused(columns: dict[str, np.ndarra
         check_plausible(slow, default_model())
 
 
+def test_a_record_that_is_shorter_than_a_period_of_the_shaft_is_refused(columns: dict[str, np.ndarray]) -> None:
+    seconds_told_as_milliseconds = dict(columns) | {"time": 1e-3 * columns["time"]}
+    with pytest.raises(RecordError, match=r"must last at least 0\.18.* say `\[columns\.time\] unit`"):
+        check_plausible(record_from_columns(seconds_told_as_milliseconds, "short"), default_model())
+
+
 def test_exchanged_columns_are_recognised() -> None:
     columns = make_record({"alpha": 0.02}, seed=5, duration=20.0)[0]
     columns["theta_m"], columns["theta_l"] = columns["theta_l"], columns["theta_m"]

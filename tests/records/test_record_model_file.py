@@ -55,7 +55,7 @@ def test_a_model_file_is_read(tmp_path: Path) -> None:
     [
         ('fmu = "Gearbox"', "`fmu` in {} must be one of Drivetrain, ServoAxis, TwoStageTrain, but is 'Gearbox'"),
         ("fmu = 3", "`fmu` in {} must be text, but is a number"),
-        ("fum = 3", "`fum` in {} must be one of fmu, header, record, parameters, encoders, columns"),
+        ("fum = 3", "`fum` in {} must be fmu"),
         ("parameters = []", "`parameters` in {} must be a table, but is a list"),
         ("parameters.J_m = 3", "`parameters.J_m` in {} must be a table, but is a number: say `[parameters.J_m]` "),
         ("[parameters.J_q]\nvalue = 1", "`parameters.J_q` in {} must be a parameter of Drivetrain, but no such name"),
@@ -75,7 +75,7 @@ def test_a_model_file_is_read(tmp_path: Path) -> None:
             "`parameters.J_m.uncertainty` in {} must be a finite number that",
         ),
         ("[parameters.J_m]\nuncertainty = 1\nrelative_uncertainty = 1", "`parameters.J_m` in {} must have"),
-        ("[parameters.J_m]\nvalu = 1", "`parameters.J_m.valu` in {} must be one of parameters.J_m.value, param"),
+        ("[parameters.J_m]\nvalu = 1", "`parameters.J_m.valu` in {} must be parameters.J_m.value"),
         ("[encoders.x]", "`encoders.x` in {} must be one of encoders.theta_m, encoders.theta_l"),
         ("[encoders.theta_m]\ncounts_per_rev = 0", "`encoders.theta_m.counts_per_rev` in {} must be at least 1"),
         ("[columns.theta_m]\nname = 3", "`columns.theta_m.name` in {} must be text, but is a number"),

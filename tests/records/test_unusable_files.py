@@ -211,6 +211,28 @@ def test_an_unusable_file_is_one_line_that_names_the_cure(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("make", "complaint"),
+    [
+        (lambda path: None, "cannot be read: No such file"),
+        (lambda path: path.mkdir(), "must be a file"),
+        (lambda path: path.write_bytes(b"%PDF-1.4\n1 0 obj\n"), "is a PDF: export the data as CSV"),
+    ],
+)
+@pytest.mark.parametrize("option", [[], ["--columns"]])
+def test_inspect_drafts_no_model_file_of_what_is_no_log(
+    make: Callable[[Path], object], complaint: str, option: list[str], tmp_path: Path, capsys
+) -> None:
+    make(tmp_path / NAME)
+    assert _status(["inspect", str(tmp_path / NAME), "--out", str(tmp_path / "out"), *option]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert complaint in told.err
+    assert "blanks" not in told.err
+    assert told.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
 def _status(words: list[str]) -> int:
     try:
         return main(words)

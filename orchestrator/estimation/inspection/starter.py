@@ -27,9 +27,9 @@ OF_DEFAULT = "of the thesis's drivetrain, whose gear ratio and inertia the recor
 SCALES = ("counts per revolution", "N.m at 100 %", "N.m per ampere", "samples per second")
 # What a number of a column is, and where a data sheet has it.
 SHEET = {
-    "counts_per_rev": "counts of a turn; encoder: its resolution, 4 times the lines of a quadrature encoder",
+    "counts_per_rev": "counts per turn; encoder: resolution; a quadrature encoder has 4 counts per line",
     "rated_value": "what 100 % is, N.m; drive: rated or reference torque",
-    "torque_constant": "N.m/A at the motor; motor: torque constant kT, for rms amperes where the log has those",
+    "torque_constant": "N.m/A at the motor; motor: torque constant kT, per rms ampere if the log has those",
     "resistance": "ohm; motor: winding resistance, phase to phase",
     "back_emf_constant": "V.s/rad; motor: back-EMF constant, volts per 1000 rpm divided by 104.7",
     "inductance": "H; motor: winding inductance, phase to phase",

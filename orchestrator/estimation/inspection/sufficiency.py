@@ -108,7 +108,8 @@ def _reason_for_none(record: Record, model: Model) -> str:
     try:
         check_plausible(record, model)
     except RecordError as error:
-        return f"it cannot be of this machine, and `estimate` refuses it: {error}"
+        said = str(error).replace(" (`model`)", " in the model file")
+        return f"it does not fit the model, and `estimate` refuses it: {said}"
     share = _other_sign(record, model)
     if share < HELD:
         return (

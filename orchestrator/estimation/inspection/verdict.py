@@ -71,5 +71,5 @@ def _of_experiments(results: Sufficiency) -> str:
     own = f"instead of {results.own:.2g} " if math.isfinite(results.own) else ""
     return (
         f"A better excitation of the same length, torque and speed: {best.name}, bound {best.bound:.2g} {own}"
-        f"rad for a half-gap of {results.design_size:g} rad; `estimate` with `design` searches further."
+        f"rad for a half-gap of {results.design_size:g} rad; the option `design` of `estimate` searches further."
     )

@@ -55,7 +55,7 @@ def open_source(path: Path, header: int | None = None, apart: bool = True) -> It
     Yields:
         Its channels, read when they are asked for.
     """
-    head = _first_bytes(path)
+    head = first_bytes(path)
     if not head:
         raise RecordError(f"{path}: a record must have a header and rows, but the file is empty")
     for start, what in _OTHERS:
@@ -90,7 +90,8 @@ def _is_mat_4(head: bytes) -> bool:
     return False
 
 
-def _first_bytes(path: Path) -> bytes:
+def first_bytes(path: Path) -> bytes:
+    """Return the first 600 bytes of a log; a path that is no file to read is a ``RecordError``."""
     try:
         if path.is_dir():
             raise RecordError(f"{path}: a record must be a file ({FORMATS}), but this is a directory")
