@@ -69,7 +69,7 @@ def scenario_work(scenario: Scenario, cases: DesignCases, trust: bool = False) -
     summaries = (ResultColumn(f"{name}.{what}", units[name]) for name in scenario.record for what in SUMMARIES)
     columns = (*summaries, ResultColumn(REMARKS, "", str))
     bare = replace(scenario.system, instances=())
-    made = {i.name: _Made.of(i) for i in scenario.system.instances}
+    made = {i.name: _options_of(i) for i in scenario.system.instances}
     payload = _Payload(
         replace(scenario, system=bare), made, tuple(sorted(_structural(scenario.system).intersection(cases.names)))
     )
@@ -77,40 +77,25 @@ def scenario_work(scenario: Scenario, cases: DesignCases, trust: bool = False) -
     return Work(_prepare, _run, columns, payload, files, {"scenario": repr(payload)}, unpacked=True, walls=walls)
 
 
-@dataclass(frozen=True)
-class _Made:
-    """What an instance is made with, beside its FMU."""
-
-    start: Mapping[str, Any]
-    solver_tolerance: float | None
-    events: bool
-    clocks: Mapping[str, ClockTimes]
-    exchange: bool
-    resets: bool
-
-    @classmethod
-    def of(cls, instance: Instance) -> "_Made":
-        assert isinstance(instance.create, FmuFactory)
-        description = instance.create.description
-        told = {name: instance.model.clocks[name] for name in description.events.told}
-        clocks = {name: ClockTimes(clock.interval, clock.shift) for name, clock in told.items()}
-        start = {**instance.start, **description.configured}
-        exchange = description.exchange is not None
-        events = instance.model.has_events
-        return cls(start, instance.solver_tolerance, events, clocks, exchange, instance.resets)
-
-    def instance(self, name: str, path: Path, sizes: Mapping[str, Any]) -> Instance:
-        """Return the instance, of the unpacked FMU at ``path``, with further structural parameters."""
-        start = {**self.start, **sizes}
-        return fmu_instance(
-            name, path, start, self.solver_tolerance, self.events, self.clocks, self.exchange, self.resets
-        )
+def _options_of(instance: Instance) -> dict[str, Any]:
+    """Return what an instance is made with by ``fmu_instance``, beside its name and FMU."""
+    assert isinstance(instance.create, FmuFactory)
+    description = instance.create.description
+    told = {name: instance.model.clocks[name] for name in description.events.told}
+    return {
+        "start": {**instance.start, **description.configured},
+        "solver_tolerance": instance.solver_tolerance,
+        "events": instance.model.has_events,
+        "clocks": {name: ClockTimes(clock.interval, clock.shift) for name, clock in told.items()},
+        "exchange": description.exchange is not None,
+        "resets": instance.resets,
+    }
 
 
 @dataclass(frozen=True)
 class _Payload:
     scenario: Scenario
-    instances: Mapping[str, _Made]
+    instances: Mapping[str, Mapping[str, Any]]  # arguments of ``fmu_instance``, by name
     structural: tuple[str, ...]
 
 
@@ -148,7 +133,7 @@ class _Sessions:
             by_instance.setdefault(name, {})[variable] = value
         payload = self._payload
         instances = tuple(
-            made.instance(name, self._files[name], by_instance.get(name, {}))
+            fmu_instance(name, self._files[name], **{**made, "start": made["start"] | by_instance.get(name, {})})
             for name, made in payload.instances.items()
         )
         return replace(payload.scenario, system=replace(payload.scenario.system, instances=instances)).session()
