@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 import orchestrator
+from orchestrator.api.design import DesignResult
 from orchestrator.api.estimable import plausible_records, require_linear
 from orchestrator.api.live import live_fitted_model
 from orchestrator.api.methods import MethodResult, describe_record, method_entry
@@ -52,6 +53,7 @@ class EstimateResult(PlottedResult):
         repeats: what records with the same torque differ by, or None.
         settings: the thresholds that were used.
         undiagnosed: why no diagnosis followed although the model does not explain the record; else empty.
+        plan: an experiment that would show the gap better, which is shown and written with the estimate; or None.
     """
 
     command: ClassVar[str] = "estimate"
@@ -67,6 +69,7 @@ class EstimateResult(PlottedResult):
     repeats: Repeats | None = None
     settings: EstimationSettings = DEFAULT_SETTINGS
     undiagnosed: str = ""
+    plan: DesignResult | None = None
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -149,7 +152,8 @@ class EstimateResult(PlottedResult):
         sizes = [f"{self.best.method}: {self._play()}"] if self.estimates and self.best.visible else []
         floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_compare_diagnosis(self.estimates)}"]
         warnings = doubts_of((r, *self.more))
-        return [*warnings, methods, *sizes, *floor, *messages, *doubts, *unfit, *missing]
+        planned = () if self.plan is None else self.plan.blocks()
+        return [*warnings, methods, *sizes, *floor, *messages, *doubts, *unfit, *missing, *planned]
 
     def results(self, place: Path | None = None) -> EstimateFound:
         entries = {m.method: method_entry(m) for m in self.methods}
@@ -168,30 +172,23 @@ class EstimateResult(PlottedResult):
             live=None if fit is None or r.n_missing or not math.isfinite(fit.alpha) else live_fitted_model(r, fit),
             diagnosis=None if self.diagnosis is None else self.diagnosis.results((place or Path()) / DIAGNOSIS),
             undiagnosed=self.undiagnosed or None,
+            design=None if self.plan is None else self.plan.entries(),
             settings=as_tables(self.settings),
         )
-
-    def write_diagnosis(self, folder: Path, place: Path, pictures: bool = False) -> None:
-        """Write the diagnosis, if there is one, as a folder of its own.
-
-        Args:
-            folder: the folder of the estimate.
-            place: the folder that it will be moved to.
-            pictures: whether to draw the plots of each page into a PNG file beside it.
-        """
-        if self.diagnosis is not None:
-            (folder / DIAGNOSIS).mkdir()
-            self.diagnosis.write(folder / DIAGNOSIS, place / DIAGNOSIS, pictures=pictures)
 
     def write(
         self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None, pictures: bool = False
     ) -> None:
         """Write data, ``estimate.json``, ``report.html`` and the diagnosis into a folder that exists."""
-        self.write_diagnosis(folder, place, pictures)
+        if self.diagnosis is not None:
+            (folder / DIAGNOSIS).mkdir()
+            self.diagnosis.write(folder / DIAGNOSIS, place / DIAGNOSIS, pictures=pictures)
         super().write(folder, place, arguments, pictures)
 
     def write_data(self, folder: Path) -> None:
-        """Write a table of curves for each method that has some."""
+        """Write a table of curves for each method that has some, and the plan."""
+        if self.plan is not None:
+            self.plan.write_data(folder)
         for estimate in self.estimates:
             if estimate.method == "ekf":
                 write_tables(folder, self.record, [estimate], self.model.parameters["i"].value)

@@ -5,16 +5,14 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
-from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
+from orchestrator.api.design import DEFAULT_SIZE, RANGES, DesignResult, check_design, design
 from orchestrator.api.estimable import plausible_records, require_linear
 from orchestrator.api.estimate import DIAGNOSIS, EstimateResult, estimate
 from orchestrator.api.locate_gap import TRAIN, complete_record, locate_gap, require_train
-from orchestrator.api.shown import Block, write_page
 from orchestrator.commands._budget import Budget
 from orchestrator.commands._console import next_step, print_blocks
 from orchestrator.commands._parser import options_for
@@ -27,8 +25,7 @@ from orchestrator.estimation.protocol import FITTED
 from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-from orchestrator.shared.output import stage_output, write_result
-from orchestrator.shared.results.estimate import EstimateFound
+from orchestrator.shared.output import stage_output
 
 SECONDS_OF_OTHERS = 3.0  # that a method without a fit takes
 INTERRUPTED = 130  # exit code after Ctrl-C
@@ -53,38 +50,29 @@ def estimate_or_design(
     if args.design:
         check_design(model, args.size, **options)
     with stage_output(args.out, EstimateResult.replaces) as folder:
-        results = EstimateFound()
-        blocks: list[Block] = []
         found: EstimateResult | None = None
-        interrupted, following = False, list[str]()
+        plan: DesignResult | None = None
+        interrupted = False
         if records:
             budget, seconds = Budget(), _tell_cost(records, model, args, settings)
-            blocks += what_was_read(records)
             with budget.catching(), _show_stages(records, seconds, budget) as progress:
                 asked = options_for(estimate, args) | {"model": model, "settings": settings, "time_limit": _limit(args)}
                 found = estimate(records, **asked, diagnose=not args.no_diagnose, progress=progress, stop=budget.why)
             interrupted = budget.interrupted
-            blocks += found.blocks()
-            found.write_files(folder)
-            found.write_diagnosis(folder, args.out, args.pictures)
-            results = found.results(args.out)
-            following = [*next_step(found.can_compensate, args.out / "estimate.json")]
         if args.design and not interrupted:
             size = args.size if args.size is not None else _design_size(found)
             with Stages() as stages:
                 plan = design(model, size, **options, motor_only=args.motor_only, progress=stages.counter("designing"))
-            blocks += plan.blocks()
-            if not plan.shows:
-                blocks.append(
-                    f"No excitation within these limits shows a half-gap of {size:g} rad: raise `--torque-limit`, "
-                    "`--speed-limit` or `--duration`"
-                )
-            plan.write_files(folder)
-            results = msgspec.structs.replace(results, design=plan.entries())
-        given = {"record": str(args.records[0]) if args.records else None}
-        given |= {k: _plain(v) for k, v in vars(args).items() if k not in ("run", "command", "pictures")}
-        write_result(folder, "estimate", given, None, results)
-        write_page(folder, "estimate", args.pictures)
+        whole = plan if found is None else replace(found, plan=plan)
+        assert whole is not None  # there are records, or a design is asked for
+        whole.write(folder, args.out, _given(args), args.pictures)
+    blocks = [*what_was_read(records), *whole.blocks()]
+    if plan is not None and not plan.shows:
+        blocks.append(
+            f"No excitation within these limits shows a half-gap of {plan.size:g} rad: raise `--torque-limit`, "
+            "`--speed-limit` or `--duration`"
+        )
+    following = next_step(found is not None and found.can_compensate, args.out / "estimate.json")
     print_blocks([*blocks, f"Written to {args.out}", *following])
     return INTERRUPTED if interrupted else 0
 
@@ -105,9 +93,8 @@ def locate(args: argparse.Namespace, model: Model, settings: EstimationSettings,
             record, model, time_limit=_limit(args), settings=settings,
             progress=lambda work, stage, share: stages.at(stage, share),
         )  # fmt: skip
-    given = {name: _plain(value) for name, value in vars(args).items() if name not in ("run", "command", "pictures")}
     with stage_output(args.out, found.replaces) as folder:
-        found.write(folder, args.out, {"record": str(args.records[0])} | given, args.pictures)
+        found.write(folder, args.out, _given(args), args.pictures)
     print_blocks([*what_was_read([record]), *found.blocks(), f"Written to {args.out}"])
     return 0
 
@@ -132,6 +119,12 @@ def _tell_cost(records: list[Record], model: Model, args: argparse.Namespace, se
 def _limit(args: argparse.Namespace) -> float:
     """Return the time limit [s], infinity without one."""
     return math.inf if args.time_limit is None else float(args.time_limit)
+
+
+def _given(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what was asked for as ``estimate.json`` says it."""
+    given = {name: _plain(value) for name, value in vars(args).items() if name not in ("run", "command", "pictures")}
+    return {"record": str(args.records[0]) if args.records else None} | given
 
 
 def _plain(value: Any) -> Any:
