@@ -6,28 +6,24 @@ another origin must not act even if the address became known to it.
 """
 
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping
-from typing import Any
 
-Scope = MutableMapping[str, Any]
-Message = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[Message]]
-Send = Callable[[Message], Awaitable[None]]
-App = Callable[[Scope, Receive, Send], Awaitable[None]]
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-HEADERS = (
-    (b"x-content-type-options", b"nosniff"),
-    (b"referrer-policy", b"no-referrer"),
-    (b"cache-control", b"no-store"),
-    (b"cross-origin-resource-policy", b"same-origin"),
-    (b"cross-origin-opener-policy", b"same-origin"),
-    (b"x-frame-options", b"SAMEORIGIN"),
-    (
-        b"content-security-policy",
-        b"default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
-        b"connect-src 'self'; frame-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'self'",
+HEADERS = {
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cache-control": "no-store",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "x-frame-options": "SAMEORIGIN",
+    "content-security-policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+        "connect-src 'self'; frame-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'self'"
     ),
-)
+}
+"""Of every answer that does not say otherwise."""
 
 
 class Guard:
@@ -39,7 +35,7 @@ class Guard:
         port: that requests must name as the one they came to.
     """
 
-    def __init__(self, app: App, token: str, port: int) -> None:
+    def __init__(self, app: ASGIApp, token: str, port: int) -> None:
         self._app, self._token = app, token
         self._hosts = tuple(f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]"))
 
@@ -50,46 +46,31 @@ class Guard:
             return
         if scope["type"] != "http":
             return  # no other kind of connection is served
-        refusal = self._refusal(scope)
-        if refusal:
-            await _refuse(send, refusal)
+        if refusal := self._refusal(scope):
+            refused = PlainTextResponse(f"refused: {refusal}\n", 403, {**HEADERS, "connection": "close"})
+            await refused(scope, receive, send)
             return
-        await self._app({**scope, "root_path": f"/{self._token}"}, receive, _with_headers(send))
+
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        await self._app({**scope, "root_path": f"/{self._token}"}, receive, send_with_headers)
 
     def _refusal(self, scope: Scope) -> str:
         """Return why a request is not answered; empty: it is."""
-        headers: dict[bytes, list[bytes]] = {}
-        for name, value in scope["headers"]:
-            headers.setdefault(name.lower(), []).append(value)
-        hosts = [value.decode("latin-1") for value in headers.get(b"host", [])]
+        headers = Headers(scope=scope)
+        hosts = headers.getlist("host")
         if len(hosts) != 1 or hosts[0] not in self._hosts:
             return "the host must be the one in the address that the console shows"
-        for value in headers.get(b"origin", []):
-            if value.decode("latin-1") not in {f"http://{hosts[0]}"}:
-                return "the origin must be the workbench itself"
-        if headers.get(b"sec-fetch-site", [b"none"])[0] not in (b"none", b"same-origin"):
+        if any(origin != f"http://{hosts[0]}" for origin in headers.getlist("origin")):
+            return "the origin must be the workbench itself"
+        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
             return "the request must come from the workbench itself"
         parts = scope["path"].split("/")
         if len(parts) < 3 or not secrets.compare_digest(parts[1].encode("utf-8", "replace"), self._token.encode()):
             return "the address must have the token that the console shows"
         return ""
-
-
-async def _refuse(send: Send, why: str) -> None:
-    body = f"refused: {why}\n".encode()
-    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close"), *HEADERS]
-    await send({"type": "http.response.start", "status": 403, "headers": headers})
-    await send({"type": "http.response.body", "body": body})
-
-
-def _with_headers(send: Send) -> Send:
-    """Return a ``send`` that adds the headers which every answer has."""
-
-    async def sending(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            given = {name.lower() for name, _ in message["headers"]}
-            more = [entry for entry in HEADERS if entry[0] not in given]
-            message = {**message, "headers": [*message["headers"], *more]}
-        await send(message)
-
-    return sending
