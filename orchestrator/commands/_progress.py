@@ -4,7 +4,6 @@ import argparse
 import sys
 import time
 from pathlib import Path
-from types import TracebackType
 from typing import IO
 
 from orchestrator.commands._progress_lines import is_for_programs
@@ -29,25 +28,16 @@ def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--memory-limit", type=int, default=defaults.memory // MIB, metavar="MIB", help=text)
 
 
-class CaseProgress:
+class CaseProgress(Stages):
     """Shows the engine's progress: a bar on a terminal, one line per minute elsewhere, JSON with ``--progress json``.
 
     Use as a context manager and hand ``update`` to ``run_cases`` as ``on_progress``.
     """
 
     def __init__(self, what: str, stream: IO[str] | None = None) -> None:
+        super().__init__(stream)
         self._what, self._stream = what, stream or sys.stderr
-        self._stages = Stages(self._stream)
         self._start = self._last_line = time.monotonic()
-
-    def __enter__(self) -> "CaseProgress":
-        self._stages.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stages.__exit__(kind, error, trace)
 
     def update(self, progress: Progress) -> None:
         """Show where the run stands."""
@@ -58,7 +48,7 @@ class CaseProgress:
             failed = f", {progress.failed} failed" if progress.failed else ""
             counts = f": {progress.done} of {progress.total}, {rate:.1f}/s{failed}"
             share = fresh / max(progress.total - progress.resumed, 1)
-            self._stages.at(self._what + ("" if is_for_programs() else counts), share)
+            self.at(self._what + ("" if is_for_programs() else counts), share)
         elif now - self._last_line >= SECONDS_BETWEEN_LINES:
             self._last_line = now
             self._stream.write(f"{self._what}: {line(progress, rate)}\n")

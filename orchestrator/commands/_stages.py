@@ -4,7 +4,7 @@ import sys
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import IO
+from typing import IO, Self
 
 from rich.console import Console, RenderableType
 from rich.live import Live
@@ -38,7 +38,7 @@ class Stages:
         self._live = live if chosen.isatty() and not is_for_programs() else None
         self._lines = ProgressLines()
 
-    def __enter__(self) -> "Stages":
+    def __enter__(self) -> Self:
         if self._live is not None:
             self._live.start()
         return self
