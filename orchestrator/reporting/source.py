@@ -85,12 +85,6 @@ class ResultDocument:
         except (ValueError, csv.Error) as error:
             raise ScenarioError(f"{path} must be a CSV table, but is not: {error}") from None
 
-    def columns(self, name: str) -> dict[str, list[Cell]]:
-        """Return a whole CSV file by column, empty when there is no such file; see ``rows``."""
-        rows = self.rows(name)
-        header = next(rows, [])
-        return by_column(header, rows)
-
     def signals(self, name: str) -> dict[str, Array]:
         """Return a CSV or NumPy file of numbers by column, NaN where one is missing; empty without such a file."""
         path = self.directory / name
@@ -103,7 +97,9 @@ class ResultDocument:
             try:
                 table = np.loadtxt(stream, delimiter=",", ndmin=2, dtype=float)
             except ValueError:  # empty cells and words, or no table at all: slowly, and with a message
-                return {n: np.array(numbers(values), dtype=float) for n, values in self.columns(name).items()}
+                rows = self.rows(name)
+                cells = by_column(next(rows, []), rows)
+                return {n: np.array(numbers(values), dtype=float) for n, values in cells.items()}
         if not table.size:
             table = np.empty((0, len(header)))
         return dict(zip(header, table.T, strict=True))
@@ -209,11 +205,9 @@ def numbers(values: Sequence[Any]) -> list[float | None]:
     return [float(v) if isinstance(v, (int, float)) and not isinstance(v, bool) else None for v in values]
 
 
-def table_of(
-    title: str, items: Sequence[Any], *, units: Mapping[str, str] | None = None, note: str = ""
-) -> ReportTable:
+def table_of(title: str, items: Sequence[Any]) -> ReportTable:
     """Return a table of equally shaped structs or JSON objects, one column per name in order of first appearance."""
     rows: list[Mapping[str, Any]] = [as_plain(item) for item in items]
     names = list(dict.fromkeys(name for row in rows for name in row))
-    columns = tuple(TableColumn(words(name), (units or {}).get(name, "")) for name in names)
-    return ReportTable(title, columns, tuple(tuple(plain(row.get(name)) for name in names) for row in rows), note)
+    columns = tuple(TableColumn(words(name)) for name in names)
+    return ReportTable(title, columns, tuple(tuple(plain(row.get(name)) for name in names) for row in rows))

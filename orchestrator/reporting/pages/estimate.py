@@ -11,7 +11,7 @@ from orchestrator.reporting.pages.location import build_location
 from orchestrator.reporting.pages.meanings import fitted_parameters
 from orchestrator.reporting.pages.record import measured_and_fitted
 from orchestrator.reporting.quantities import interval_words
-from orchestrator.reporting.source import ResultDocument, numbers, words
+from orchestrator.reporting.source import ResultDocument, words
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import TrustFound, read
 from orchestrator.shared.results.estimate import (
@@ -118,11 +118,11 @@ def _remarks(estimates: Methods) -> list[Section]:
 
 def _profile(source: ResultDocument, limit: float) -> list[Section]:
     """Return the profile; between its points the root of the drop, with its side's sign, is interpolated linearly."""
-    table = source.columns("profile.csv")
+    table = source.signals("profile.csv")
     if not {"alpha", "drop"} <= set(table):
         return []
-    points = zip(*(numbers(table[name]) for name in ("alpha", "drop")), strict=True)
-    alpha, drop = np.array([p for p in points if None not in p], dtype=float).T
+    known = np.isfinite(table["alpha"]) & np.isfinite(table["drop"])
+    alpha, drop = table["alpha"][known], table["drop"][known]
     signed = np.sign(alpha - alpha[np.argmin(drop)]) * np.sqrt(np.maximum(drop, 0.0))
     fine = np.linspace(signed[0], signed[-1], CURVE_POINTS)
     series = (

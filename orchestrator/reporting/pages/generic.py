@@ -16,10 +16,10 @@ def build(source: ResultDocument) -> Report:
     )
 
 
-def sections_of(title: str, value: Mapping[str, Any], units: Mapping[str, str] | None = None) -> list[Section]:
+def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
     """Return an object's plain values as facts, its lists of objects as tables, its objects as further sections.
 
-    What is absent (null) is left out. ``units``: of plain values, by name.
+    What is absent (null) is left out.
     """
     facts: list[tuple[str, Any]] = []
     further: list[Section] = []
@@ -32,8 +32,7 @@ def sections_of(title: str, value: Mapping[str, Any], units: Mapping[str, str] |
         elif isinstance(item, Mapping):
             further += sections_of(sentence(heading), item)
         elif item is not None and not (isinstance(item, Sequence) and not isinstance(item, str) and len(item) > 12):
-            unit = (units or {}).get(name, "1")
-            facts.append((heading if unit == "1" else f"{heading} [{unit}]", plain(item)))
+            facts.append((heading, plain(item)))
     return [*([Facts(title, tuple(facts))] if facts else []), *further]
 
 
