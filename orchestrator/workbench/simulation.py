@@ -47,6 +47,9 @@ class SliderModel:
         live = _live(folder / f"{command}.json")
         self._plant: Plant = plants()[live.fmu]
         self._given = {name: float(value) for name, value in live.values.items()}
+        # the parameters with a slider: those of the linear plant, and what the model has besides
+        shown = {*self._plant.linear, *self._given} - {*self._plant.enumerations}
+        self._sliders = {entry.name: entry for entry in self._plant.table if entry.name in shown}
         columns = _columns(folder / f"{command}.csv", live.rows[0], max(round(SPAN / live.step), LEAST_ROWS) + 1)
         self._time = columns["time"] - columns["time"][0]
         self._requests = columns["u"]
@@ -57,7 +60,8 @@ class SliderModel:
         step = live.step
         asked = Samples(self._requests, step)
         system = System((instance,), (), (SignalSource(f"{NAME}.u", asked),))
-        self._start = {**{name: self._given.get(name, self._default(name)) for name in self._names()}, **live.starts[0]}
+        values = {name: self._given.get(name, entry.default) for name, entry in self._sliders.items()}
+        self._start = values | live.starts[0]
         self._session = Session(
             system, tuple(f"{NAME}.{name}" for name in self._measured), GaussSeidel(step), (self._time.size - 1) * step
         )
@@ -69,10 +73,9 @@ class SliderModel:
 
     def describe(self) -> dict[str, Any]:
         """Return the sliders, and what was measured."""
-        table = {entry.name: entry for entry in self._plant.table}
         sliders = []
-        for name in self._names():
-            entry, value = table[name], self._given.get(name, self._default(name))
+        for name, entry in self._sliders.items():
+            value = self._given.get(name, entry.default)
             span = 3.0 * abs(value) or 0.05
             low = value / 20.0 if name in self._plant.linear else -span if entry.minimum < 0.0 else 0.0
             sliders.append({
@@ -92,11 +95,10 @@ class SliderModel:
             InputError: a value is none, or is out of its range.
         """
         given = dict(self._start)
-        table = {entry.name: entry for entry in self._plant.table}
         for name, value in values.items():
-            if name not in self._names() or isinstance(value, bool) or not isinstance(value, (int, float)):
+            if name not in self._sliders or isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise InputError(f"`values` must be numbers of the sliders, but `{str(name)[:60]}` is none")
-            entry = table[name]
+            entry = self._sliders[name]
             if not (math.isfinite(value) and entry.minimum <= value <= entry.maximum):
                 raise InputError(f"`{name}` must be in [{entry.minimum:g}, {entry.maximum:g}], but is {value:g}")
             given[name] = float(value)
@@ -104,14 +106,6 @@ class SliderModel:
         result = self._session.run({f"{NAME}.{name}": value for name, value in given.items()})
         curves = {name: plain_numbers(result[f"{NAME}.{name}"], 9) for name in self._measured}
         return {"curves": curves, "seconds": time.perf_counter() - begun}
-
-    def _names(self) -> list[str]:
-        """Return the parameters with a slider: those of the linear plant, and what the model has besides."""
-        shown = {*self._plant.linear, *self._given} - {*self._plant.enumerations}
-        return [entry.name for entry in self._plant.table if entry.name in shown]
-
-    def _default(self, name: str) -> float:
-        return next(entry.default for entry in self._plant.table if entry.name == name)
 
 
 class SliderModels:
