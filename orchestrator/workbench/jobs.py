@@ -9,7 +9,7 @@ import signal
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +23,6 @@ from orchestrator.workbench.settings import WorkbenchSettings
 
 PROGRAM = "backlash-cosim"  # as it is called on a command line
 JOB_FILE, OUTPUT_FILE = "job.json", "output.txt"
-_SHOWN = (
-    "name", "command", "asked", "state", "stage", "share", "left", "told", "exit_code", "messages", "begun", "ended",
-    "stops",
-)  # fmt: skip
 STOPPED = (130, 143, 129)  # exit codes after Ctrl-C, SIGTERM and SIGHUP
 
 
@@ -68,7 +64,8 @@ class Job:
 
     def as_plain(self) -> dict[str, Any]:
         """Return what a page and ``job.json`` say of it."""
-        plain = {name: getattr(self, name) for name in _SHOWN}
+        own = ("words", "folder", "process")  # of the server alone
+        plain = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in own}
         found = () if not self.is_over() else (*self.folder.glob("*"), *self.folder.glob("diagnosis/*"))
         files = sorted(path.relative_to(self.folder).as_posix() for path in found if _is_result(path))
         return {**plain, "line": shlex.join([PROGRAM, *self.words]), "files": list(files)}
