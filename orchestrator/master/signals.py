@@ -147,14 +147,9 @@ class Samples(Signal):
 
     def breaks(self, start: float, stop: float) -> list[float]:
         first = math.floor((start - self.start) / self.period) + 1
-        found = (self.start + k * self.period for k in range(max(first, 1), len(self.values)))
-        within = []
-        for t in found:
-            if t >= stop:
-                break
-            if t > start:
-                within.append(t)
-        return within
+        last = math.ceil((stop - self.start) / self.period)
+        found = (self.start + k * self.period for k in range(max(first, 1), min(last + 1, len(self.values))))
+        return [t for t in found if start < t < stop]
 
 
 @dataclass(frozen=True, slots=True)
