@@ -48,7 +48,7 @@ def test_a_terminal_gets_a_bar_with_counts_rate_and_failures():
     stream = Terminal()
     with CaseProgress("sweep", stream) as progress:
         progress.update(Progress(40, 100, 3, 0))
-        progress._stages._live.refresh()
+        progress._live.refresh()
     shown = stream.getvalue()
     assert "sweep: 40 of 100, " in shown
     assert "3 failed" in shown
