@@ -25,31 +25,24 @@ _PLACES = {
     "2.0": "https://github.com/modelica/fmi-standard/releases/download/v2.0.4/FMI-Specification-2.0.4.pdf",
     "3.0": "https://fmi-standard.org/docs/3.0.2/",
 }
-# What the headings of the text of 3.0.2 are called in its address; the text of 2.0.4 is a PDF without names.
+# What the headings of the text of 3.0.2 that rules name are called in its address; 2.0.4 is a PDF without names.
 _HEADINGS = {
     "2.2.1": "_requirements_for_implementations_of_the_c_api",
-    "2.2.2": "header-files-and-naming-of-functions",
     "2.2.4": "status-returned-by-functions",
     "2.2.5": "inquire-version-number",
-    "2.2.6": "advancing-time",
-    "2.2.7": "fmu-variables",
     "2.2.7.2": "get-and-set-variable-values",
     "2.2.7.3": "min-max-violations",
     "2.2.7.4": "get-set-fmu-state",
-    "2.2.8": "Clock",
     "2.2.8.2": "clock-types",
     "2.2.8.3": "clocked-variable",
     "2.2.8.4": "_clocks_specific_api",
-    "2.2.9": "model-dependencies",
     "2.2.11": "partial-derivatives",
     "2.3": "common-state-machine",
     "2.3.1": "FMUStateSettable",
     "2.3.2": "Instantiated",
     "2.3.3": "InitializationMode",
-    "2.3.4": "Initialized",
     "2.3.5": "EventMode",
     "2.3.6": "ConfigurationMode",
-    "2.3.7": "ReconfigurationMode",
     "2.3.8": "Terminated",
     "2.4": "modelDescription.xml",
     "2.4.1": "fmiModelDescription",
@@ -58,9 +51,7 @@ _HEADINGS = {
     "2.4.4": "definition-of-types",
     "2.4.5": "definition-of-log-categories",
     "2.4.6": "DefaultExperiment",
-    "2.4.7": "ModelVariables",
     "2.4.7.2": "Dimension",
-    "2.4.7.3": "_alias_variables",
     "2.4.7.4": "_variable_attributes",
     "2.4.7.5": "_type_specific_properties",
     "2.4.7.5.1": "namingSection",
@@ -69,29 +60,21 @@ _HEADINGS = {
     "2.4.9.1": "graphicalRepresentation",
     "2.4.9.2": "definitionOfTerminals",
     "2.4.10": "BuildConfiguration",
-    "2.5": "fmu-distribution",
     "2.5.1": "structure-of-zip",
     "2.5.1.1": "documentation-directory",
-    "2.5.1.2": "terminalsAndIcons-directory",
     "2.5.1.3": "sources-directory",
     "2.5.1.4": "binaries-directory",
     "2.5.1.4.1": "platform-tuple-definition",
-    "2.5.1.6": "extra-directory",
     "2.5.3": "dependency-on-external-tool",
     "2.6": "VersioningLayered",
-    "3.2": "state-machine-model-exchange",
     "3.2.1": "ContinuousTimeMode",
     "3.4": "model-exchange-schema",
-    "4.1.1": "smoothness",
     "4.1.3": "early-return",
     "4.2": "state-machine-co-simulation",
     "4.2.1": "StepMode",
     "4.2.2": "IntermediateUpdateMode",
     "4.4": "co-simulation-schema",
-    "5.2": "state-machine-scheduled-execution",
     "5.2.1": "ClockActivationMode",
-    "5.2.2": "ClockUpdateMode",
-    "5.4": "scheduled-execution-schema",
 }
 
 
@@ -112,12 +95,12 @@ class Rule:
         return tuple(self.anchor)
 
     def link(self, version: Version) -> str:
-        """Address of the standard's text, at its heading where it has names for them; empty for a rule of our own."""
+        """Address of the standard's text, at its heading where its name is known; empty for a rule of our own."""
         section = self.anchor[version]
         if not section:
             return ""
-        heading = f"#{_HEADINGS[section]}" if version == "3.0" else ""
-        return _PLACES[version] + heading
+        known = version == "3.0" and section in _HEADINGS
+        return _PLACES[version] + (f"#{_HEADINGS[section]}" if known else "")
 
 
 RULES: dict[str, Rule] = {}
