@@ -68,20 +68,11 @@ class EventFmuSlave(ClockedSlave, Fmu3Slave):
         self._updates.feed(self._functions, self._accesses(names), values)
 
     def output_rates(self, names: Sequence[str], order: int = 1) -> list[float]:
-        accesses = self._accesses(names)
-        firsts: dict[int, int] = {}
-        total = 0
-        for access in accesses:
-            if access.reference not in firsts:
-                firsts[access.reference] = total
-                total += access.size
-        count, values = len(firsts), (c_double * total)()
-        self._call(
-            "GetOutputDerivatives",
-            (ctypes.c_uint * count)(*firsts),
-            c_size_t(count),
-            (ctypes.c_int32 * count)(*[order] * count),
-            values,
-            c_size_t(total),
-        )
-        return [values[firsts[access.reference] + access.element] for access in accesses]
+        rates = [math.nan] * len(names)
+        for batch in self._functions.batches(self._accesses(names), "Get"):
+            count, total = len(batch.references), len(batch.values)
+            orders, values = (ctypes.c_int32 * count)(*[order] * count), (c_double * total)()
+            self._call("GetOutputDerivatives", batch.references, c_size_t(count), orders, values, c_size_t(total))
+            for position, place in zip(batch.positions, batch.places, strict=True):
+                rates[position] = values[place]
+        return rates
