@@ -51,6 +51,7 @@ BENCHMARK = {"alpha": 0.02, "tau": 5e-3, "impact_speed": 0.1, "friction": 2.0, "
 PLANTS = 100  # that a machine's controller is judged on
 NOTABLE = 0.8  # standard deviations, by which the mean of wrong plants lies off in what makes them so
 CURE = "Log a record that determines the machine better (`estimate` with `design` proposes one)"
+ALL_ALIKE = "All plants are alike in this, so a better record does not help: judge the controller by the table"
 CYCLES = (
     "No weights were found with which the loop comes to rest without friction: the chosen ones have the smallest limit "
     "cycle. The table states whether friction stops it; `state_weights` sets other weights."
@@ -305,7 +306,7 @@ def _judge(task: ControlTask, measured: Sequence[LoopMeasures], seed: int) -> tu
     told = (
         f"The impact speed is exceeded by a factor of more than {HARD:g} on {_describe_difference(task, hard, seed)}."
     )
-    return text, [f"{told} {CURE}."]
+    return text, [f"{told} {ALL_ALIKE if all(hard) else CURE}."]
 
 
 def _describe_difference(task: ControlTask, wrong: Sequence[bool], seed: int) -> str:

@@ -22,6 +22,7 @@ from orchestrator.api.shown import Block, doubts_of
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation.apply import apply_method, default_method, error_bound
 from orchestrator.estimation.effort import Stop, StoppedError, never
+from orchestrator.estimation.problem import DRY
 from orchestrator.estimation.protocol import FITTED, METHODS, WITHOUT_TORQUE, Estimate, NotApplicableError
 from orchestrator.estimation.repeats import in_words, repeats_of
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
@@ -153,7 +154,18 @@ class EstimateResult(PlottedResult):
         floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_compare_diagnosis(self.estimates)}"]
         warnings = doubts_of((r, *self.more))
         planned = () if self.plan is None else self.plan.blocks()
-        return [*warnings, methods, *sizes, *floor, *messages, *doubts, *unfit, *missing, *planned]
+        told = (*messages, *doubts, *unfit, *missing, *planned)
+        return [*warnings, methods, *sizes, *self._friction(), *floor, *told]
+
+    def _friction(self) -> list[str]:
+        """Return the dry friction that the fit found, in a line, unless a diagnosis says it."""
+        fitted = {} if not self.estimates or self.diagnosis else self.best.diagnostics.get("parameters", {})
+        said = [
+            f"{found['value']:.4g} N.m at the {name.split('.')[2]} (standard error {found['standard_error']:.2g})"
+            for name in DRY
+            if (found := fitted.get(name))
+        ]
+        return [f"{self.best.method}: dry friction {', '.join(said)}"] if said else []
 
     def results(self, place: Path | None = None) -> EstimateFound:
         entries = {m.method: method_entry(m) for m in self.methods}

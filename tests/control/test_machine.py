@@ -6,12 +6,14 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import fmpy
 import numpy as np
 import pytest
 
 import orchestrator as oc
+from orchestrator.api.compensate import _judge
 from orchestrator.cli import main
 from orchestrator.control.loops import FMUS, make_task
 from orchestrator.control.machine import machine_of, thesis_machine
@@ -159,6 +161,14 @@ def test_unstable_plants_are_refused_with_what_makes_them_so_and_no_file_is_writ
     found = oc.compensate(model=write_model(tmp_path, doubtful), plants=12, force=True)
     assert found.laws[-1].unstable == 2
     assert "Do not run this controller" in found.doubts[0]
+
+
+@pytest.mark.parametrize(("hard", "cure"), [(3, "a better record does not help"), (2, "Log a record")])
+def test_a_better_record_is_no_cure_where_every_plant_lands_hard(hard: int, cure: str) -> None:
+    task = SimpleNamespace(impact_speed=0.1, machine=SimpleNamespace(draw=lambda rng: {"J_l": rng.uniform(1.0, 2.0)}))
+    impacts = [np.array([1.0 if n < hard else 0.1]) for n in range(3)]
+    _, (told,) = _judge(task, [SimpleNamespace(stable=True, impacts=each) for each in impacts], 0)
+    assert cure in told
 
 
 @pytest.mark.skipif(not have_compiler(), reason="Python FMUs take half a minute")

@@ -120,6 +120,17 @@ def test_records_that_the_model_does_not_explain_are_diagnosed_together(rubbing,
     assert len(seen) == 1
 
 
+def test_the_dry_friction_of_a_fit_is_told(rubbing, monkeypatch) -> None:
+    fitted = {"effects.coulomb_friction.motor.torque": {"value": 0.8, "standard_error": 0.01}}
+    diagnostics = {"lacking": "", "cramer_rao": 1e-5, "parameters": fitted, "measurement_noise": (1e-4, 1e-4)}
+    fit = Estimate("maximum_likelihood", 0.02, 1e-5, (0.01998, 0.02002), True, "", diagnostics)
+    monkeypatch.setattr(maximum_likelihood, "estimate", lambda *given, **options: fit)
+    told = oc.estimate(record_from_columns(rubbing[0], "rubbing"), diagnose=False).blocks()
+    assert any(
+        "dry friction 0.8 N.m at the motor (standard error 0.01)" in line for line in told if isinstance(line, str)
+    )
+
+
 @pytest.mark.night
 @pytest.mark.usefixtures("unexplained")
 @pytest.mark.slow
