@@ -3,22 +3,13 @@
 // One axis: from data to pixels and back, and where its ticks go.
 class Scale {
   constructor(low, high, from, to, logarithmic, factor = 1) {
-    this.logarithmic = logarithmic;
-    this.factor = factor; // of the unit that is shown
-    this.low = low;
-    this.high = high;
-    this.from = from;
-    this.to = to;
-  }
-
-  static forward(value, logarithmic) {
-    return logarithmic ? Math.log10(value) : value;
+    Object.assign(this, { low, high, from, to, logarithmic, factor });  // `factor`: of the unit that is shown
+    [this.inner, this.outer] = logarithmic ? [Math.log10, (v) => 10 ** v] : [Number, Number];
+    [this.a, this.b] = [low, high].map(this.inner);
   }
 
   pixel(value) {
-    const [a, b] = [this.low, this.high].map((v) => Scale.forward(v, this.logarithmic));
-    const part = (Scale.forward(value, this.logarithmic) - a) / (b - a);
-    return this.from + part * (this.to - this.from);
+    return this.from + ((this.inner(value) - this.a) / (this.b - this.a)) * (this.to - this.from);
   }
 
   holds(value) {
@@ -26,10 +17,7 @@ class Scale {
   }
 
   value(pixel) {
-    const part = (pixel - this.from) / (this.to - this.from);
-    const [a, b] = [this.low, this.high].map((v) => Scale.forward(v, this.logarithmic));
-    const inner = a + part * (b - a);
-    return this.logarithmic ? 10 ** inner : inner;
+    return this.outer(this.a + ((pixel - this.from) / (this.to - this.from)) * (this.b - this.a));
   }
 
   ticks(count) {
@@ -67,16 +55,13 @@ class Scale {
 
   // The range after moving by `part` of its width.
   moved(part) {
-    const [a, b] = [this.low, this.high].map((v) => Scale.forward(v, this.logarithmic));
-    return [a, b].map((v) => (this.logarithmic ? 10 ** (v + part * (b - a)) : v + part * (b - a)));
+    return [this.a, this.b].map((end) => this.outer(end + part * (this.b - this.a)));
   }
 
   // The range after zooming by `factor` about `centre` (both in data).
   zoomed(factor, centre) {
-    const inner = (v) => Scale.forward(v, this.logarithmic);
-    const outer = (v) => (this.logarithmic ? 10 ** v : v);
-    const middle = inner(centre);
-    return [this.low, this.high].map((end) => outer(middle + (inner(end) - middle) * factor));
+    const middle = this.inner(centre);
+    return [this.a, this.b].map((end) => this.outer(middle + (end - middle) * factor));
   }
 }
 
