@@ -22,6 +22,11 @@ from orchestrator.shared.arrays import Array
 
 DAY = 86_400.0  # s
 SERIAL_DAYS = ((20_000.0, 80_000.0), (690_000.0, 800_000.0))  # of 1954 to 2119, by spreadsheets and by MATLAB
+# Units of numbers that count from a date, seconds in one, and 1970 [s] in them: Windows counts from 1601, .NET from 1.
+EPOCHS = (
+    ("ns", 1e-9, 0.0), ("us", 1e-6, 0.0), ("ms", 1e-3, 0.0), ("100 ns", 1e-7, 11_644_473_600.0),
+    ("100 ns", 1e-7, 62_135_596_800.0),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -178,7 +183,7 @@ def _epoch(numbers: Array) -> tuple[float, str]:
     """Return factor and unit of times without one: seconds, or what makes a date of this century of them."""
     good = numbers[np.isfinite(numbers)]
     first = abs(float(good[0])) if good.size else 0.0
-    for unit, factor in (("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3)):
-        if 9e8 < first * factor < 4e9:
+    for unit, factor, start in EPOCHS:
+        if 9e8 < first * factor - start < 4e9:
             return factor, unit
     return 1.0, ""

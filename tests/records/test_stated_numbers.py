@@ -1,5 +1,6 @@
 """Numbers that a model file states of a column, and names and values that say another unit: used or refused."""
 
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +136,21 @@ def test_rows_with_thousands_separators_are_not_left_out(first: str, tmp_path: P
     path.write_text("time [ms],u,theta_m\n" + "".join(rows), encoding="utf-8")
     with pytest.raises(RecordError, match=r"row 501, column `time .ms.` must be a number"):
         read_record(path)
+
+
+@pytest.mark.parametrize(("start", "size"), [
+    (datetime(1970, 1, 1), 10**9), (datetime(1970, 1, 1), 10**3), (datetime(1601, 1, 1), 10**7),
+    (datetime(1, 1, 1), 10**7),
+], ids=["ns", "ms", "Windows", ".NET"])  # fmt: skip
+def test_numbers_that_count_from_a_date_are_known(start: datetime, size: int, tmp_path: Path) -> None:
+    first = round((datetime(2026, 3, 1) - start).total_seconds()) * size
+    stamps = (first + round(size * t) for t in TIME.tolist())
+    rows = [f"{stamp},{u:.9g},{a:.9g}" for stamp, u, a in zip(stamps, TORQUE, ANGLE, strict=True)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["timestamp,u,theta_m", *rows]) + "\n")
+    record = read_record(path)
+    assert record.step == pytest.approx(0.002)
+    np.testing.assert_allclose(record.time, TIME, atol=2e-5)  # doubles of .NET's size are 12.8 us apart
 
 
 @pytest.mark.parametrize(("separator", "mark", "torque"), [
