@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from orchestrator.building.build import ensure_built
+from orchestrator.master.algorithms import Adaptive
 from orchestrator.scenarios.scenario import load_scenario
 from orchestrator.scenarios.ssp.write import write_ssp
 from tests.support.browser import browser, draw, missing, set_screen
@@ -451,9 +452,13 @@ def test_a_source_and_its_scenario_outlast_a_reload(inspected: Any, served: Serv
     press(inspected, "Write it as TOML")
     wait_for_text(inspected, "panel-fmus", "must hold a number that makes sense there")
     inspected.execute_script(type_into, inspected.find_element("xpath", value), "0,5")
+    pick(inspected, f"#{labelled(inspected, 'Master')}", "adaptive steps")
     press(inspected, "Write it as TOML")
-    written = served.folder / "files"
-    wait(inspected, lambda d: any("time = 0.5" in path.read_text() for path in written.glob("scenario*.toml")))
+    files = served.folder / "files"
+    written = wait(
+        inspected, lambda d: [path for path in files.glob("scenario*.toml") if "time = 0.5" in path.read_text()]
+    )
+    assert load_scenario(written[0]).algorithm == Adaptive(0.001)
 
 
 def test_an_ssp_file_is_a_tree(inspected: Any, served: Served) -> None:

@@ -192,7 +192,7 @@ export class Scenario {
     }));
     const record = this.keys(outputsOf).filter((key) => !this.unwanted.includes(key));
     const instances = Object.fromEntries(Object.entries(this.nodes).map(([name, node]) => [name, { fmu: node.fmu, parameters: node.parameters }]));
-    const master = { algorithm: run.algorithm, ...(run.algorithm === "adaptive" ? {} : { step: run.step }) };
+    const master = { algorithm: run.algorithm, step: run.step };
     const made = await post("scenarios", { name: "scenario.toml", stop: run.stop, master, instances, connections: this.connections, sources, record });
     await refresh();
     fill(this.written, "Written: ", make("a", { href: fileAddress(made.file), download: made.name }, made.name));
