@@ -95,8 +95,8 @@ class Layout:
 def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: bool = False) -> Layout:
     """Plan the signals of a sound system."""
     shown = _state_outputs(system) if states else []
-    needed = _variables_in_use(system, [*record, *shown])
-    fed = _inputs_in_use(system)
+    fed = _in_use(system, [c.target for c in system.connections] + [s.target for s in system.sources])
+    needed = _in_use(system, [c.source for c in system.connections] + [*record, *shown], fed)
     slots: dict[str, int] = {}
     order = system.execution_order()
     for name in order:
@@ -113,14 +113,16 @@ def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: b
     return Layout(tuple(blocks), len(slots), slots, recorded, tuple(signals), system)
 
 
-def _variables_in_use(system: System, record: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    fed = _inputs_in_use(system)
+def _in_use(
+    system: System, addresses: Sequence[str], known: Mapping[str, Sequence[str]] | None = None
+) -> dict[str, tuple[str, ...]]:
+    """Return the variables at addresses by instance, in order; without those of ``known``."""
     wanted: dict[str, dict[str, Variable]] = {i.name: {} for i in system.instances}
-    for address in [c.source for c in system.connections] + list(record):
+    for address in addresses:
         name, variable = split(address)
         found = system.variable(address)
         assert found is not None
-        if variable not in fed[name]:
+        if known is None or variable not in known[name]:
             wanted[name][variable] = found
     return {i.name: _in_order(wanted[i.name], i.model.variables) for i in system.instances}
 
@@ -136,16 +138,6 @@ def _state_outputs(system: System) -> list[str]:
         and v.variability == "continuous"
         and not instance.model.depends_on(name)
     ]
-
-
-def _inputs_in_use(system: System) -> dict[str, tuple[str, ...]]:
-    targets: dict[str, dict[str, Variable]] = {i.name: {} for i in system.instances}
-    for address in [c.target for c in system.connections] + [s.target for s in system.sources]:
-        name, variable = split(address)
-        found = system.variable(address)
-        assert found is not None
-        targets[name][variable] = found
-    return {i.name: _in_order(targets[i.name], i.model.variables) for i in system.instances}
 
 
 def _in_order(variables: Mapping[str, Variable], declared: Mapping[str, Variable]) -> tuple[str, ...]:
@@ -182,7 +174,8 @@ def _feed(
     parts = []
     for index, signal in enumerate(system.sources):
         if signal.target == target:
-            ratio = _signal_ratio(system, target, signal.unit)
+            ratio = (1.0, 0.0) if signal.unit is None else system.ratio(signal.unit, target)
+            assert ratio is not None
             at_end = (newer and not simultaneous) if signal.at is None else signal.at == "end"
             parts.append((index, *ratio, at_end))
     row = -1
@@ -190,13 +183,3 @@ def _feed(
         row = len(signals)
         signals.append(tuple(parts))
     return Feed(slots[target], source, factor, offset, quantum, row)
-
-
-def _signal_ratio(system: System, target: str, unit: str | None) -> tuple[float, float]:
-    if unit is None:
-        return 1.0, 0.0
-    instance = system.instance(split(target)[0])
-    assert instance is not None
-    ratio = units.conversion(units.resolve(unit, instance.model.units), system.unit(target))
-    assert ratio is not None
-    return ratio

@@ -165,22 +165,21 @@ class System:
         ):
             return None, f"must name a parameter or a start value, but {address} is of causality {variable.causality}"
         if isinstance(value, Quantity):
-            converted = self._convert(address, value)
-            if converted is None:
+            ratio = self.ratio(value.unit, address)
+            if ratio is None:
                 own = self.unit(address)
                 name, why = ("no unit", "") if own is None else (own.name, units.contradiction(own))
                 why += f", or give a plain number, in {name}" if why else ""
                 return None, f"must be given in a unit that measures what {name} does, but is in {value.unit!r}{why}"
-            value = converted
+            value = ratio[0] * value.value + ratio[1]
         return coerce_value(variable, value)
 
-    def _convert(self, address: str, value: Quantity) -> float | None:
-        instance = self.instance(split(address)[0])
-        own = self.unit(address)
+    def ratio(self, unit: str, address: str) -> tuple[float, float] | None:
+        """Return factor and offset from a unit to that of the variable at an address; None where there are none."""
+        instance, own = self.instance(split(address)[0]), self.unit(address)
         if instance is None or own is None:
             return None
-        ratio = units.conversion(units.resolve(value.unit, instance.model.units), own)
-        return None if ratio is None else ratio[0] * value.value + ratio[1]
+        return units.conversion(units.resolve(unit, instance.model.units), own)
 
     def _instance_problems(self) -> list[Problem]:
         found = []
@@ -257,7 +256,7 @@ class System:
                 found.append(
                     Problem(f"{path}.to", f"must be fed once, but {source.target} is fed by something else too")
                 )
-        elif source.unit is not None and self._convert(source.target, Quantity(0.0, source.unit)) is None:
+        elif source.unit is not None and self.ratio(source.unit, source.target) is None:
             own = variable.unit or "no unit"
             found.append(
                 Problem(f"{path}.unit", f"must measure what {own} of {source.target} does, but is {source.unit!r}")
