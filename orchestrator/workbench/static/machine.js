@@ -60,7 +60,7 @@ class MachineTab {
     const entries = ([name, entry]) => make("div", {}, make("dt", {}, name), make("dd", {}, Object.entries(entry).map(([key, text]) => `${key} = ${text}`).join(", ")));
     const file = make("a", { href: fileAddress(choices.model), download: choices.model.split("/").at(-1) }, choices.model);
     fill(this.body,
-      make("p", { class: "note" }, ...(choices.model ? ["Model file: ", file] : ["No model file is chosen: these are the values of the default machine, each known to 5 %."])),
+      make("p", { class: "note" }, ...(choices.model ? ["Model file: ", file] : ["No model file is chosen: these are the values of the default machine, each known to 5 %. “Look at this log” in the tab Log drafts the file of your machine."])),
       table("Parameters", HEADS, rows(main)),
       make("details", {}, make("summary", {}, `What the machine may have besides (${rest.length} values)`), table("Further parameters", HEADS, rows(rest))),
       make("details", {}, make("summary", {}, "Encoders"), make("div", { class: "cards" }, Object.keys(ENCODERS).map((name) => this.encoderCard(name)))),

@@ -6,7 +6,7 @@ import { choices, choose, isOfFmu, isOver, session, start, whenChanged } from ".
 const CORRECTED = /(^|\/)corrected\.toml$/;
 
 export function build(panel) {
-  panel.append(make("p", { class: "note" }, "A diagnosis or an estimate leaves the corrected model: its FMU and corrected.toml stand among the files of the result."),
+  panel.append(make("p", { class: "note" }, "A diagnosis or an estimate writes the corrected model: its FMU and corrected.toml are among the files of the result."),
     make("h2", {}, "Simulate it"), ...simulation(), make("h2", {}, "A controller for it"), ...controller());
 }
 

@@ -104,7 +104,7 @@ export class Scenario {
     const [outs, ins] = [this.keys(outputsOf), this.keys(inputsOf)], names = Object.keys(this.nodes);
     const feed = () => { this.sources.push({ to: ins.find((key) => !this.sources.some((one) => one.to === key)) ?? ins[0], kind: "constant", value: 0 }); this.draw(); };
     fill(this.editor,
-      names.length ? null : make("p", { class: "note" }, "No FMU stands here yet: choose one above and add it."),
+      names.length ? null : make("p", { class: "note" }, "There is no FMU yet: choose one above and add it."),
       outs.length && ins.length ? this.connecting(outs, ins) : null,
       make("ul", { class: "files" }, this.connections.map((one) => make("li", {}, `${one.from} → ${one.to} `,
         this.remover(`connection of ${one.from} to ${one.to}`, () => { this.connections = this.connections.filter((other) => other !== one); })))),

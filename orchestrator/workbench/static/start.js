@@ -17,10 +17,10 @@ function steps() {
   const fmu = diagnosis?.files.find((name) => name.endsWith(".fmu"));
   return [
     ["log", "Log", "Drop a log, see its curves, and say what its columns are.", look && `${fileName(choices.log)} was looked at`, needsLog || "press “Look at this log”"],
-    ["machine", "Machine", "Say what is known of the machine: inertias, ratio, stiffness.", choices.model && fileName(choices.model), needsLog || "the look at the log drafts it"],
+    ["machine", "Machine", "Say what is known of the machine: inertias, ratio, stiffness.", choices.model && fileName(choices.model), needsLog || "press “Look at this log”, which drafts it"],
     ["gap", "Gap", "How large is the play? With its 95 % interval.", gap?.name, needsLog || "press “Estimate the gap”"],
     ["diagnosis", "Diagnosis", "Which effects does the model of the machine lack?", diagnosis?.name, needsLog || "press “Diagnose”"],
-    ["model", "Model", "Move the sliders of the corrected model, and design a controller for it.", fmu, "a diagnosis leaves it"],
+    ["model", "Model", "Move the sliders of the corrected model, and design a controller for it.", fmu, "run the diagnosis first"],
   ];
 }
 
@@ -42,12 +42,12 @@ export function build(panel, go) {
       make("p", { class: "note" }, make("span", { class: done ? "tag good" : "tag" }, done ? "✓ done" : "to do"), ` ${done || missing}`))));
   });
   panel.append(
-    make("p", { class: "answer" }, "From a log of a drive to the play in its gears, with an interval, and to what a model of the machine misses."),
+    make("p", { class: "answer" }, "From the log of a drive, find the play of its gears with an interval, and the effects that a model of the machine lacks."),
     make("div", { class: "row" },
       make("button", { type: "button", class: "main", onclick: () => go("log") }, "Begin with a log"),
       action("Try it with an example record", said, example),
       make("button", { type: "button", onclick: () => go("fmus") }, "Work with FMUs")),
     said.element, make("h2", {}, "The steps"), list,
-    make("p", { class: "note" }, "Beside the steps: ", link("fmus", "FMUs"), " shows, checks, and runs any FMU or SSP file, and several together. ",
+    make("p", { class: "note" }, "Apart from these steps, ", link("fmus", "FMUs"), " shows, checks, and runs any FMU or SSP file, and several together. ",
       link("compare", "Results"), " has all results: open, run again, compare, remove."));
 }
