@@ -130,6 +130,6 @@ def _source(name: str, model: Model, said: Mapping[str, str]) -> str:
     remark = said.get(name, "")
     if name not in model.stated:
         return "assumed" if name in model.plant.linear else "the FMU's own"
-    if model.parameters[name].assumed or "of the thesis" in remark:
+    if "ROUGH" not in remark and (model.parameters[name].assumed or "of the thesis" in remark):
         return "assumed"
     return "from the record" if "record" in remark or "ROUGH" in remark else YOURS

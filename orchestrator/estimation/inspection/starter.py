@@ -118,7 +118,7 @@ def starter(
             f"{mark}value = {entry.value:.6g}   # {entry.unit or '1'}; {said}",
             f"{mark}relative_uncertainty = {share:.3g}   # {says}",
         ]  # fmt: skip
-        if "ASSUMED" in said or entry.assumed:
+        if "ASSUMED" in said or "ROUGH" in said or entry.assumed:
             lines.append(f"{mark}assumed = true   # no result is doubted for this value; leave it out with your own")
         lines.append("")
     lines += ["# Effects such as friction, gravity or a torque limit: `diagnose` finds which of them the machine has."]
