@@ -83,9 +83,9 @@ def _check_directions(record: Record, theta_l: Array, p: Mapping[str, float]) ->
     width = _rows_of_swing(record, p)
     if 4 * width > record.size:
         return
-    kernel = np.ones(width) / width
-    kernel = np.convolve(np.convolve(kernel, kernel), kernel)  # leaves 1 % of what swings faster
-    motor, load = (np.convolve(angle, kernel, "valid") for angle in (record.theta_m, theta_l))
+    motor, load = record.theta_m, theta_l
+    for _ in range(3):  # leaves 1 % of what swings faster
+        motor, load = _means(motor, width), _means(load, width)
     if min(np.ptp(motor), np.ptp(load)) < LEAST_TRAVEL:
         return
     if float(np.corrcoef(motor, load)[0, 1]) < OPPOSITE:
@@ -102,10 +102,15 @@ def _rows_of_swing(record: Record, p: Mapping[str, float]) -> int:
 
 def _smooth(values: Array, rows: int) -> Array:
     """Return the means over so many rows, a quarter of all at most, about their own mean."""
-    rows = min(rows, values.size // 4)
-    sums = np.concatenate([[0.0], np.cumsum(values - values.mean())])
-    means = (sums[rows:] - sums[:-rows]) / rows
+    means = _means(values, min(rows, values.size // 4))
     return np.asarray(means - means.mean())
+
+
+def _means(values: Array, rows: int) -> Array:
+    """Return the mean of each ``rows`` rows that follow one another, (n - rows + 1,) of (n,)."""
+    rows, middle = min(rows, values.size), values.mean()
+    sums = np.concatenate([[0.0], np.cumsum(values - middle)])
+    return np.asarray(middle + (sums[rows:] - sums[:-rows]) / rows)
 
 
 def _check_slope(source: str, motor: Array, load: Array, ratio: float, name: str = "i") -> None:
@@ -156,11 +161,10 @@ def smooth(record: Record, tau: float) -> tuple[Array, Array, Array, Array]:
         had when the record began, which nobody knows.
     """
     width = smooth_rows(record)
-    kernel = np.ones(width) / width
     first = np.cumsum(np.exp(-record.step / max(tau, 1e-9) * np.arange(record.size))) * record.step
     impulse = np.cumsum(lag_torque(record.u, tau, record.step)) * record.step
     speed = np.gradient(record.theta_m, record.step)
-    impulse, speed, angle, first = (np.convolve(v, kernel, "valid") for v in (impulse, speed, record.theta_m, first))
+    impulse, speed, angle, first = (_means(v, width) for v in (impulse, speed, record.theta_m, first))
     return impulse, speed, angle, first
 
 
@@ -241,10 +245,7 @@ def lag_torque(u: Array, tau: float, step: float) -> Array:
 
     ``tau``: time constant of the drive [s]; ``step``: over which each request is held [s].
     """
+    from scipy.signal import lfilter  # a tenth of a second that most commands need not pay
+
     keep = math.exp(-step / tau)
-    torque = np.empty_like(u)
-    value = 0.0
-    for n, request in enumerate(u.tolist()):
-        torque[n] = value
-        value = keep * value + (1.0 - keep) * request
-    return torque
+    return np.asarray(lfilter([0.0, 1.0 - keep], [1.0, -keep], u))
