@@ -84,31 +84,6 @@ class _Event:
         return attempt.error > 0.1 * smooth
 
 
-@dataclass
-class _Counts:
-    accepted: int = 0
-    rejected: int = 0
-    sweeps: int = 0
-
-
-def run_adaptive(
-    wiring: Wiring,
-    signals: Mapping[int, Signal],
-    start: float,
-    stop: float,
-    settings: Adaptive,
-    rows: Array,
-    record: NDArray[np.int64],
-) -> Statistics:
-    """Run from ``start`` to ``stop`` [s]; ``rows`` has shape (grid points, recorded) with row 0 already there.
-
-    ``signals``: signals in place of those of ``System.sources``, by index; ``record``: (recorded,) slots of the
-    recorded signals.
-    """
-    check_adaptive(wiring.layout)
-    return _Run(wiring, signals, start, stop, settings, rows, record).run()
-
-
 def check_adaptive(layout: Layout) -> None:
     """Refuse a system that cannot go back or that holds values by itself."""
     for instance in layout.system.instances:
@@ -160,8 +135,17 @@ def source_nodes(layout: Layout, signals: Sequence[Signal], times: Array, jumps:
     return table
 
 
-class _Run:
-    """One run: the windows, their lengths and the recorded points."""
+class AdaptiveRun:
+    """One run of slaves without events: the windows, their lengths and the recorded points.
+
+    Args:
+        signals: signals in place of those of ``System.sources``, by index.
+        start: [s].
+        stop: [s].
+        settings: tolerance and bounds of the step.
+        rows: results, shape (grid points, recorded); row 0 is already there.
+        record: slots of the recorded signals, shape (recorded,).
+    """
 
     def __init__(
         self,
@@ -173,6 +157,7 @@ class _Run:
         rows: Array,
         record: NDArray[np.int64],
     ) -> None:
+        check_adaptive(wiring.layout)
         self.wiring, self.settings, self.rows, self.record = wiring, settings, rows, record
         self.start, self.stop = start, stop
         system = wiring.layout.system
@@ -185,7 +170,7 @@ class _Run:
         self.outputs = self.outputs[~self.held[self.outputs]]
         self.closing = {b.name: self._feeds_through(b.name) for b in wiring.layout.blocks}
         self.before: Waveform | None = None  # the window before the present one, unless a jump lies between them
-        self.counts = _Counts()
+        self.accepted = self.rejected = self.sweeps = 0
         self.calls = dict.fromkeys((b.name for b in wiring.layout.blocks), 0)
 
     def _is_held(self, address: str) -> bool:
@@ -215,7 +200,7 @@ class _Run:
                 attempt = self._attempt(time, end, guess, share)
                 guess = attempt.guess
                 if attempt.outputs is None:
-                    self.counts.rejected += 1
+                    self.rejected += 1
                     if event is not None or attempt.error > SUSPICIOUS:
                         event = _Event(time, attempt.trouble, attempt.error)
                     length = next_length(attempt.length, attempt.error / share, self.settings.largest)
@@ -223,7 +208,7 @@ class _Run:
                     continue
                 row = self._write(attempt.outputs, row)
                 self.before = attempt.guess
-                self.counts.accepted += 1
+                self.accepted += 1
                 longest = max(longest, attempt.length)
                 length = next_length(attempt.length, attempt.error / share, self.settings.largest)
                 if event is not None and (end >= event.end or event.was_none(attempt)):
@@ -231,7 +216,7 @@ class _Run:
                 time = end
                 # Held inputs must not take a slave back across the event that it has just passed.
                 length = min(length, max(attempt.length, CAUTION * (time - crossed)))
-        return Statistics(self.counts.accepted, self.counts.rejected, self.calls, self.counts.sweeps)
+        return Statistics(self.accepted, self.rejected, self.calls, self.sweeps)
 
     def _give_up(self, time: float, length: float) -> None:
         if length < self.settings.smallest:
@@ -298,7 +283,7 @@ class _Run:
             for sweep in range(SWEEPS):
                 if sweep:
                     restore()
-                self.counts.sweeps += 1
+                self.sweeps += 1
                 for stage in self.wiring.stages:
                     self._advance(stage, start, end, nodes, feeds)
         return Waveform(start, end, nodes)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from orchestrator.errors import FmuError, ScenarioError, SimulationError, SlaveError
-from orchestrator.master.adaptive import run_adaptive
+from orchestrator.master.adaptive import AdaptiveRun
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Jacobi, step_count
 from orchestrator.master.clocks import TickSamples, clock_problems
 from orchestrator.master.divergence import divergence_remarks
@@ -253,7 +253,7 @@ class Session:
             case Adaptive() if self._events is not None:
                 return EventWindows(self._events, signals, self.start, self.stop, algorithm).run(rows, record)
             case Adaptive():
-                return run_adaptive(wiring, signals, self.start, self.stop, algorithm, rows, record)
+                return AdaptiveRun(wiring, signals, self.start, self.stop, algorithm, rows, record).run()
             case _:
                 sweeps = algorithm.run(wiring, table, self.start, steps, rows, record)
         return Statistics(steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), sweeps)
