@@ -75,43 +75,23 @@ EXPORT Status FMI(fmi2DoStep)(Component c, double time, double step, Boolean no_
 
 #define VALUES_GIVEN (n == 0 || (r && v))
 
-static Status refuse_read(Instance *s, const Reference r[], size_t n, bool real, const Fault *fault)
-{
-    for (size_t k = 0; k < n; k++)
-        if (!(real ? HAS(r[k], REAL_VALUE) : IS_WHOLE(r[k])))
-            return refuse_type(s, r[k]);
-    return concluded(s, fault);
-}
-
-EXPORT Status FMI(fmi2GetReal)(Component c, const Reference r[], size_t n, double v[])
-{
-    bool all = true;
-    ENTER(fmi2GetReal, VALUES_GIVEN)
-    NEW_FAULT(fault);
-    recompute(s, &fault);
-    for (size_t k = 0; k < n; k++) {
-        const bool there = HAS(r[k], REAL_VALUE);
-        if (there && variables[r[k]].causality == LOCAL)
-            show_states(s, &fault);
-        v[k] = there ? s->slave.real[r[k]] : NAN;
-        all = all && there;
+#define GET_VALUES(name, type, fits, value, none) \
+    EXPORT Status FMI(name)(Component c, const Reference r[], size_t n, type v[]) \
+    { \
+        ENTER(name, VALUES_GIVEN) \
+        NEW_FAULT(fault); \
+        recompute(s, &fault); \
+        for (size_t k = 0; k < n; k++) { \
+            if (HAS(r[k], REAL_VALUE) && variables[r[k]].causality == LOCAL) \
+                show_states(s, &fault); \
+            v[k] = (fits) ? (value) : (none); \
+            if (!(fits) && s->worst == OK) \
+                refuse_type(s, r[k]); \
+        } \
+        return s->worst == OK ? concluded(s, &fault) : s->worst; \
     }
-    return all && !fault.kind ? s->worst : refuse_read(s, r, n, true, &fault);
-}
-
-EXPORT Status FMI(fmi2GetInteger)(Component c, const Reference r[], size_t n, int v[])
-{
-    bool all = true;
-    ENTER(fmi2GetInteger, VALUES_GIVEN)
-    NEW_FAULT(fault);
-    recompute(s, &fault);
-    for (size_t k = 0; k < n; k++) {
-        const bool there = IS_WHOLE(r[k]);
-        v[k] = there ? s->slave.integer[r[k]] : 0;
-        all = all && there;
-    }
-    return all && !fault.kind ? s->worst : refuse_read(s, r, n, false, &fault);
-}
+GET_VALUES(fmi2GetReal, double, HAS(r[k], REAL_VALUE), s->slave.real[r[k]], NAN)
+GET_VALUES(fmi2GetInteger, int, IS_WHOLE(r[k]), s->slave.integer[r[k]], 0)
 
 #define SET_VALUES(name, type, fits, set) \
     EXPORT Status FMI(name)(Component c, const Reference r[], size_t n, const type v[]) \
