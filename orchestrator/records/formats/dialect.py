@@ -36,9 +36,7 @@ class Dialect:
     def describe(self, encoding: str) -> str:
         """Return the dialect in words."""
         words = ["CSV", f"separator {SPOKEN[self.separator]}", f"decimal {'comma' if self.decimal == ',' else 'point'}"]
-        words += [
-            {"ascii": "UTF-8", "utf-8-sig": "UTF-8 with BOM", "cp1252": "Windows-1252"}.get(encoding, encoding.upper())
-        ]
+        words += [{"utf-8-sig": "UTF-8 with BOM", "cp1252": "Windows-1252"}.get(encoding, encoding.upper())]
         filled = sum(bool(line.strip()) for line in self.preamble)
         words += [f"{filled} line{'s' * (filled > 1)} besides the names"] * (filled > 0) + [
             "a row of units"

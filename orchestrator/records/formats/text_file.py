@@ -56,7 +56,7 @@ def open_text(path: Path) -> TextFile:
         with path.open("rb") as file:
             head = file.read(4000)
         encoding = next((name for bom, name in _BOMS if head.startswith(bom)), "") or _without_bom(head)
-        for one in ("ascii", "utf-8", "cp1252") if encoding == "utf-8" else (encoding,):
+        for one in ("utf-8", "cp1252") if encoding == "utf-8" else (encoding,):
             try:
                 return _look_through(path, one)
             except UnicodeDecodeError as error:
@@ -93,14 +93,6 @@ def _count_lines(text: str) -> int:
 
 def _texts(path: Path, encoding: str) -> Iterator[str]:
     """Yield the text in blocks of whole lines, whatever ends a line in the file; raise UnicodeDecodeError."""
-    if encoding == "ascii":  # with plain line ends, as most are: nothing to decode, and nothing to carry over
-        with path.open("rb") as file:
-            while data := file.read(BLOCK):
-                data += file.readline()
-                if b"\r" in data or b"\x00" in data:
-                    raise UnicodeDecodeError(encoding, data, 0, 1, "no plain line ends")
-                yield str(data, encoding)
-        return
     plain = codecs.getincrementaldecoder(encoding)("replace" if encoding == "cp1252" else "strict")
     decoder = io.IncrementalNewlineDecoder(plain, translate=True)
     parts: list[str] = []
