@@ -176,12 +176,12 @@ def fmus() -> dict[str, Path]:
 
 @pytest.fixture(scope="session")
 def build_native(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict[str, Path]]:
-    """``(names, fmi=2)`` to paths of native FMUs for this platform; each is built once in a run."""
+    """``(names, fmi=2, here=True)`` to paths of native FMUs, for this platform or all; each is built once in a run."""
     folder = _folder_of_all_workers(tmp_path_factory)
 
-    def build(names: Sequence[str], fmi: int = 2) -> dict[str, Path]:
-        place = folder / f"native{fmi}"
-        return _build_each(names, place, partial(ensure_native, directory=place, here=True, fmi=fmi))
+    def build(names: Sequence[str], fmi: int = 2, here: bool = True) -> dict[str, Path]:
+        place = folder / f"native{fmi}{'' if here else '_everywhere'}"
+        return _build_each(names, place, partial(ensure_native, directory=place, here=here, fmi=fmi))
 
     return build
 

@@ -37,10 +37,10 @@ pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C c
 
 
 @pytest.fixture(scope="module")
-def everywhere(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def everywhere(build_native: Callable[..., dict[str, Path]]) -> dict[str, Path]:
     if not ZIG:
         pytest.skip("zig is not installed")
-    return ensure_native(NAMES, tmp_path_factory.mktemp("native"))
+    return build_native(NAMES, here=False)
 
 
 @pytest.fixture(scope="module")
