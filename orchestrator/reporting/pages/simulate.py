@@ -83,7 +83,7 @@ def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[l
 
 def _difference(time: Array, table: Columns, spans: tuple[Span, ...]) -> Plot:
     difference = table["theta_l_hat"] - table["twin_theta_l_hat"]
-    series = Series("estimated load angles, with minus without", time, difference)
+    series = Series("estimated load angle: with backlash minus without", time, difference)
     note = "S is the sum of the absolute values of this curve."
     return Plot("Difference of the loops", "time [s]", "difference [rad]", (series,), spans, note=note)
 
