@@ -42,7 +42,6 @@ class FitSettings(Settings, frozen=True):
     iterations: Annotated[
         int, setting("most iterations of a fit: Gauss-Newton steps converge quickly or not at all", ge=1)
     ] = 4
-    most_overdispersion: Annotated[float, setting("largest widening of the errors' variance by blocks", ge=1)] = 300.0
 
 
 class SelectionSettings(Settings, frozen=True):

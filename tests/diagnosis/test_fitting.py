@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.inference.fitting import compare, fit_model
+from orchestrator.diagnosis.inference.fitting import compare, fit_model, weigh_prior
 from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import ModelPoint, UncertainParameter
 from orchestrator.diagnosis.report.estimates import parameter_estimates
@@ -74,6 +74,13 @@ def test_a_value_that_changes_slowly_is_no_surer_than_its_parts(fitted):
     assert error_of(sizes, 1e-4) == pytest.approx(1.0 / np.sqrt(count), rel=0.2)  # those of a sample, spread 1
     assert error_of(np.sort(sizes), 1e-4) == pytest.approx(1.0, rel=0.1)  # it was half as large until half-way
     assert error_of(np.sort(sizes), 1.0) == pytest.approx(1.0 / np.sqrt(count), rel=0.2)  # as much is noise
+
+
+def test_a_block_counts_as_one_row_at_least(fitted):
+    problem, model = fitted
+    quiet, loud = (replace(model, block_shifts=factor * model.block_shifts) for factor in (0.1, 1e4))
+    assert weigh_prior(problem, quiet).overdispersion == 1.0
+    assert weigh_prior(problem, loud).overdispersion == problem.blocks.size / problem.block_count
 
 
 def test_of_a_value_that_changes_nothing_nothing_is_known(fitted, monkeypatch):

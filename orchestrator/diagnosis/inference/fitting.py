@@ -213,7 +213,8 @@ def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
     if not seen:
         return problem
     found = float(np.median(variance[seen] / white[seen]))
-    return replace(problem, overdispersion=float(np.clip(found, 1.0, problem.settings.most_overdispersion)))
+    most = len(fitted.residual) / problem.block_count  # a block whose rows all say the same is one observation still
+    return replace(problem, overdispersion=float(np.clip(found, 1.0, most)))
 
 
 @dataclass(frozen=True)
