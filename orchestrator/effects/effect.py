@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -140,7 +141,7 @@ class Effect:
     # names of the plants on which it stands, whose tables have its parameters; around an FMU none count
     plants: tuple[str, ...] = (DRIVETRAIN,)
 
-    @property
+    @cached_property
     def label(self) -> str:
         """Return name and site, unique in a bank."""
         return f"{self.name}@{self.site}"

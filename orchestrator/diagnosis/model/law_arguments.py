@@ -33,8 +33,8 @@ def law_arguments(
     found = []
     for (name, site, unit), signal in signals.items():
         responses = tuple(
-            partial(_respond, model.residual_scale(point)[:, None] * _gains(model, site)[:, None])
-            for model, point in zip(models, points, strict=True)
+            partial(_respond, model.residual_scale(point, p)[:, None] * _gains(model, site)[:, None])
+            for model, point, p in zip(models, points, values, strict=True)
         )
         drives = unit == "N.m"
         found.append(LawArgument(name, site, unit_in(unit), unit_in("N.m"), tuple(signal), responses, drives=drives))

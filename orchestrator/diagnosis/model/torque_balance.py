@@ -174,13 +174,12 @@ class TorqueBalance(ResidualModel):
     def residual(self, point: ModelPoint) -> Array:
         """Return the residuals (channels, n) [N.m] at a point."""
         p = self.values_at(point)
-        return np.asarray(self.balance(p, self._local(INITIAL_TORQUE, point)) * self.residual_scale(point)[:, None])
+        return np.asarray(self.balance(p, self._local(INITIAL_TORQUE, point)) * self.residual_scale(point, p)[:, None])
 
-    def residual_scale(self, point: ModelPoint) -> Array:
-        """Return (channels,) residual over missing torque, as the head of the module says."""
+    def residual_scale(self, point: ModelPoint, p: Array) -> Array:
+        """Return (channels,) residual over missing torque, as the head of the module says; ``p``: of the point."""
         if not self.scaled:
             return np.ones(len(self.channels))
-        p = self.values_at(point)
         scale = np.array([self.nominal[place] / p[place] for place in self.inertias])
         scale[0] = np.sqrt(scale[0])
         if any(self._known[label].takes_drive for label in point.effects):
