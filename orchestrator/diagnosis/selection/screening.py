@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.inference.fitting import FittedModel
 from orchestrator.diagnosis.inference.problem import FitProblem
-from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, Values
+from orchestrator.diagnosis.model.interface import CandidateEffect, Values
 from orchestrator.shared.arrays import Array
 
 MOST_PEAKS = 8  # cycles of a wave that are tried in full
@@ -152,8 +152,3 @@ def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[n
     bins = np.zeros(count, dtype=complex)
     np.add.at(bins, place % count, values * shift)
     return np.asarray(np.fft.ifft(bins)[: cycles.size] * count)
-
-
-def start_of_fit(fitted: FittedModel, screened: ScreenedEffect) -> ModelPoint:
-    """Return the point from which a model with a screened effect is fitted."""
-    return fitted.point.with_effect(screened.label, screened.values)

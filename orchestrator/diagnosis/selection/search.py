@@ -5,8 +5,9 @@ A further round begins beside it and under its whitening, until it stays. What d
 family.
 """
 
+import itertools
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from orchestrator.diagnosis.inference.fitting import FittedModel, compare, fit_m
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.selection.outcome import SearchResult, SearchStep, TriedEffect
-from orchestrator.diagnosis.selection.screening import Screening, start_of_fit
+from orchestrator.diagnosis.selection.screening import Screening
 from orchestrator.diagnosis.selection.settling import fit_base, settle_anew
 from orchestrator.diagnosis.selection.subsets import Neighbours, Score, Subset, odds_against
 from orchestrator.diagnosis.settings import SelectionSettings
@@ -30,6 +31,7 @@ FITS = 24  # subsets that a round fits in full, at most
 SHOWN = 2.0  # sizes over their errors of an effect that the record shows
 TRIALS = 2  # in which an effect may be impossible
 RIVALS = 3  # fitted in an effect's place
+PROMISING = 8  # subsets that a quiet look fits in full, at most
 
 
 def search_effects(
@@ -46,7 +48,7 @@ def search_effects(
     fits: Mapping[Subset, FittedModel] = {}
     for number in range(ROUNDS):
         around = _Round(result.problem, result.final, base, settings, progress, out_of_time, fits)
-        fits = around.fit_best()
+        fits = around.fit_best(around.nearest())
         if not number:
             result = replace(result, searched=True, alone=around.tried(frozenset()))
         result = replace(result, complete=not around.out_of_time())
@@ -78,7 +80,8 @@ def _look_quietly(result: SearchResult, around: "_Round") -> tuple[FitProblem, F
         return None
     near = _Round(quiet, fit_model(quiet, final.point), result.base, around.settings, around.progress,
                   around.out_of_time, {})  # fmt: skip
-    best = max(near.fit_best().values(), key=near.score.score_fit)
+    promising = itertools.takewhile(lambda subset: subset != near.has, near.ranked)  # more than the reference does
+    best = max(near.fit_best(list(promising)[:PROMISING]).values(), key=near.score.score_fit)
     if set(best.labels) == set(final.labels):
         return None
     own, better = settle_anew(quiet, best)
@@ -104,7 +107,8 @@ def fit_effects(
     while missing := result.asked - set(result.final.labels):
         problem, model = result.problem, result.final
         screened = Screening(problem, model).screen([problem.effects[label] for label in sorted(missing)])
-        points = [start_of_fit(model, one) for one in screened] or [_small_start(problem, model, min(missing))]
+        points = [model.point.with_effect(one.label, one.values) for one in screened]
+        points = points or [_small_start(problem, model, min(missing))]
         fits = [fit for point in points if (fit := _fit(problem, point)) is not None]
         if not fits:
             raise ScenarioError(f"`effects` must leave out {min(missing)}: no size of it fits this record")
@@ -160,18 +164,21 @@ class _Round:
         self.farthest = max(settings.prior_deviations, farthest_parameter(problem, base) + 1.0)
         self.fits: dict[Subset, FittedModel | None] = {self.has: reference}
 
-    def fit_best(self) -> dict[Subset, FittedModel]:
-        """Return the most promising subsets that are allowed, fitted in full, the reference among them.
+    def nearest(self) -> list[Subset]:
+        """Return all subsets, first those that are like the reference, known of the round before, or of one effect."""
+        alone = [subset for subset in self.ranked if len(subset) == 1 and not self.has]
+        known = sorted(self.earlier, key=lambda subset: -self.score.score_fit(self.earlier[subset]))
+        beside = [one for label in self.has for one in (self.has - {label}, *self.rivals(label))]
+        return [*beside, *known[:KNOWN], *alone[:ALONE], *self.ranked]
+
+    def fit_best(self, subsets: Sequence[Subset]) -> dict[Subset, FittedModel]:
+        """Return the first of some subsets that are allowed, fitted in full, the reference among them.
 
         An effect that is impossible in its first fits is not tried again: every subset of it would be. A subset that
         has effects which no machine has so, or which the record does not show, is followed by what is left of it.
         """
-        alone = [subset for subset in self.ranked if len(subset) == 1 and not self.has]
-        known = sorted(self.earlier, key=lambda subset: -self.score.score_fit(self.earlier[subset]))
-        beside = [one for label in self.has for one in (self.has - {label}, *self.rivals(label))]
-        first = [*beside, *known[:KNOWN], *alone[:ALONE]]
         found, possible, impossible = {self.has: self.reference}, set(self.has), Counter[str]()
-        waiting, seen = deque(dict.fromkeys([*first, *self.ranked])), set[Subset]()
+        waiting, seen = deque(dict.fromkeys(subsets)), set[Subset]()
         while waiting and len(self.fits) <= FITS and not self.out_of_time():
             subset = waiting.popleft()
             if subset in seen or any(impossible[label] >= TRIALS and label not in possible for label in subset):
