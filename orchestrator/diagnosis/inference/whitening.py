@@ -151,13 +151,12 @@ def _most_likely_levels(
             return np.inf
         return float(np.sum(determinant + np.einsum("fcd,fdc->f", np.linalg.inv(matrix), spectra).real))
 
-    shares = PROCESS_LEVELS
     ones = np.ones(scale.size)
-    pairs = [(share, part) for share in MEASUREMENT_LEVELS for part in shares]
+    pairs = [(share, part) for share in MEASUREMENT_LEVELS for part in PROCESS_LEVELS]
     measurement, common = min(pairs, key=lambda pair: cost(pair[0], pair[1] * ones))
     process = common * ones
     for n in range(scale.size if scale.size > 1 else 0):  # torques at one body need not be those at another
-        trials = [np.where(np.arange(scale.size) == n, part, process) for part in shares]
+        trials = [np.where(np.arange(scale.size) == n, part, process) for part in PROCESS_LEVELS]
         process = min(trials, key=lambda trial: cost(measurement, trial))
     return measurement * sources.levels, np.maximum(process * scale, sources.floors)
 

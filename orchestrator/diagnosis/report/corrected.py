@@ -41,7 +41,6 @@ class BeforeAfter:
     before: Array
     after: Array
     difference: float  # largest one between the corrected FMU and the compiled simulation of the same equations
-    restarts: tuple[float, ...] = ()  # times at which a free run starts anew [s], the first included
     rows: tuple[int, ...] = ()  # where each run begins
     starts: tuple[dict[str, float], ...] = ()  # start values of the corrected FMU in each run
 
@@ -121,8 +120,7 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     return BeforeAfter(
         np.asarray(step * np.arange(signals.size)[covered]), signals.requests_of(plant, w.final)[covered],
         signals.angles_in_time(plant, w.final)[covered], np.concatenate(runs["before"]), np.concatenate(runs["after"]),
-        difference, tuple(step * part.start for part in parts), tuple(part.start - parts[0].start for part in parts),
-        tuple(starts),
+        difference, tuple(part.start - parts[0].start for part in parts), tuple(starts),
     )  # fmt: skip
 
 
