@@ -10,7 +10,6 @@ from orchestrator.api.cases import AnySweepResult, RunOptions, Varied, draws_of,
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
 from orchestrator.engine import DesignCases, Row, Status, Sweep
-from orchestrator.engine.work import file_hash
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import Calibration
 from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system, loop_values
@@ -19,6 +18,7 @@ from orchestrator.paired.metric import ErrorStatistics, trust_of_sweep
 from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sweep import OWN_PARAMETERS, SweepArrays, SweepPlan, gather, sweep_work
 from orchestrator.scenarios.sweep import check_parameters
+from orchestrator.shared.isolation.archives import content_hash
 from orchestrator.shared.numbers import exact_text
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import CalibrationFound, ErrorsFound, SweepFound
@@ -105,7 +105,7 @@ class SweepResult(AnySweepResult):
             trust=self.trust.to_result(),
             experiment=asdict(self.plan.experiment),
             calibrations={f"{level:g}": _provenance(c) for level, c in self.calibrations.items()},
-            fmus={name: file_hash(path) for name, path in self.fmus.items()},
+            fmus={name: content_hash(path) for name, path in self.fmus.items()},
             fmu_kind=self.fmu_kind,
         )
 

@@ -24,9 +24,9 @@ from orchestrator.building.native_build import ensure_native
 from orchestrator.building.native_sources import slave_class
 from orchestrator.building.sources import recipe_of, recipes_of
 from orchestrator.errors import FmuError, SlaveError
-from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import make_slave
 from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.isolation.archives import content_hash
 
 NATIVE = "native"
 PYTHON = "Python"

@@ -10,8 +10,9 @@ from pathlib import Path
 from orchestrator.engine.cases import Case, Cases, Outcome, Progress, Row
 from orchestrator.engine.journal import Journal
 from orchestrator.engine.pools import CaseLimits, LocalProcesses, OpenPool, Pool
-from orchestrator.engine.work import Work, file_hash
+from orchestrator.engine.work import Work
 from orchestrator.errors import SimulationError
+from orchestrator.shared.isolation.archives import content_hash
 from orchestrator.shared.version import __version__
 
 QUEUED_PER_SLOT = 2
@@ -103,7 +104,7 @@ def _definition(cases: Cases, work: Work) -> dict[str, object]:
         "version": __version__,
         "cases": cases.definition(),
         "work": dict(work.definition),
-        "files": {name: file_hash(Path(path)) for name, path in work.files.items()},
+        "files": {name: content_hash(Path(path)) for name, path in work.files.items()},
         "columns": [column.name for column in work.columns],
     }
 

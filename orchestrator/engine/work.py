@@ -1,6 +1,5 @@
 """The work that is done for each case, and its evaluation inside a worker process."""
 
-import hashlib
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -9,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.engine.cases import Case, Outcome, ResultColumn, Status, Value
-from orchestrator.errors import FmuError, OrchestratorError, SlaveError
+from orchestrator.errors import OrchestratorError, SlaveError
 
 
 @dataclass(frozen=True)
@@ -34,15 +33,6 @@ class Work:
     unpacked: bool = False  # the files are FMUs, and ``prepare`` gets the folders into which they are unpacked
     # the files hold code that is not ours: workers read and write no other files of the user, and have no network
     walls: bool = False
-
-
-def file_hash(path: Path) -> str:
-    """Return the sha256 of a file's content, 64 hexadecimal digits."""
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise FmuError(f"cannot read {path}: {error.strerror}") from None
 
 
 def evaluate(work: Work, prepared: Any, case: Case) -> tuple[Outcome, bool]:

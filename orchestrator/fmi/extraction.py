@@ -1,27 +1,16 @@
 """FMUs unpacked once per process, into a private folder that goes away with the process or with the next run."""
 
 import atexit
-import hashlib
 import os
 import threading
 from pathlib import Path
 
-from orchestrator.errors import FmuError
-from orchestrator.shared.isolation.archives import unpack
+from orchestrator.shared.isolation.archives import content_hash, unpack
 from orchestrator.shared.scratch import Scratch
 
 _lock = threading.Lock()
 _folders: dict[tuple[int, str], Path] = {}
 _root: tuple[int, Scratch] | None = None
-
-
-def content_hash(path: Path) -> str:
-    """Return the SHA-256 of a file's content: 64 hexadecimal digits."""
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise FmuError(f"`fmu` must be a readable file, but {path} is not: {error.strerror}") from None
 
 
 def extract_fmu(path: Path) -> Path:

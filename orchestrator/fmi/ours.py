@@ -8,8 +8,8 @@ import contextlib
 from pathlib import Path
 
 from orchestrator.errors import FmuError
-from orchestrator.fmi.extraction import content_hash
 from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.isolation.archives import content_hash
 
 _known: set[str] = set()
 

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.access import Access
 from orchestrator.fmi.batches import Functions, VariableBatch, native_calls, shares
-from orchestrator.fmi.extraction import content_hash, extract_fmu
+from orchestrator.fmi.extraction import extract_fmu
 from orchestrator.fmi.messages import DISCARD, ERROR, FATAL, OK, PENDING, STATUS, WARNING, Inbox
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.python_modules import PythonModules
@@ -33,6 +33,7 @@ from orchestrator.master.protocol import (
     Value,
 )
 from orchestrator.master.result import RunRemark
+from orchestrator.shared.isolation.archives import content_hash
 from orchestrator.shared.stopping import stop_was_asked
 
 SETS_KEPT = 16

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.errors import ChildError, FmuError, SimulationError
-from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.ours import is_ours
 from orchestrator.fmi.remote import RemoteFactory, without_feed
@@ -21,7 +20,7 @@ from orchestrator.master.result import MOST_REMARKS, Recording
 from orchestrator.master.system import System
 from orchestrator.plain_text import name_folder, plain_text
 from orchestrator.scenarios.definition import Scenario
-from orchestrator.shared.isolation.archives import unpack
+from orchestrator.shared.isolation.archives import content_hash, unpack
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
 from orchestrator.shared.isolation.walls import support

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from orchestrator.api.scenario_sweep import sweep_scenario
-from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.scenarios.scenario import load_scenario
+from orchestrator.shared.isolation.archives import content_hash
 from tests.support.answers_fmu import build_answers_fmu
 from tests.support.c_fmu import have_compiler
 from tests.support.python_fmus import build_python_fmu, slave_source

@@ -10,12 +10,11 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import FmuError, SimulationError
-from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.fmi.ours import is_ours, record
 from orchestrator.scenarios.isolated import Safety, foreign_fmus
 from orchestrator.scenarios.scenario import load_scenario, simulate
-from orchestrator.shared.isolation.archives import ArchiveLimits, unpack
+from orchestrator.shared.isolation.archives import ArchiveLimits, content_hash, unpack
 from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
 
 compiled = pytest.mark.skipif(not have_compiler(), reason="there is no C compiler")

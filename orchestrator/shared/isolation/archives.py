@@ -1,5 +1,6 @@
 """Archives of others: one set of limits for every command, and unpacking whole or not at all."""
 
+import hashlib
 import os
 import re
 import shutil
@@ -29,6 +30,15 @@ class ArchiveLimits:
     total: int = 1024 * MEBIBYTE  # bytes of all files unpacked
     files: int = 20_000
     ratio: float = 200.0  # unpacked over packed size of a file larger than 1 MiB
+
+
+def content_hash(path: Path) -> str:
+    """Return the SHA-256 of a file's content: 64 hexadecimal digits."""
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise FmuError(f"`fmu` must be a readable file, but {path} is not: {error.strerror}") from None
 
 
 def unpack(path: Path, target: Path, limits: ArchiveLimits | None = None) -> None:
