@@ -59,12 +59,13 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
 
     def blocks(self) -> Sequence[Block]:
         """Return the summary, and the tables of parameters, candidates and misfits."""
-        lines: list[Block] = [*self.summary(), *_tables(self)]
-        for d in self.delivered:
-            lines.append(
-                f"Corrected system: {d.file}; differs from the fit by {d.difference_over_noise:.2g} of the noise"
-            )
-        return lines
+        parameters = parameters_found(self.diagnosis)
+        fitted = [fields_table("Parameters", parameters, names="parameter")] if parameters else []
+        delivered = (
+            f"Corrected system: {d.file}; differs from the fit by {d.difference_over_noise:.2g} of the noise"
+            for d in self.delivered
+        )
+        return [*self.summary(), *fitted, *self._misfit_tables(), *delivered]
 
     def results(self, place: Path) -> FmuDiagnosisFound:
         d, problem = self.diagnosis, self.diagnosis.workings.problem
@@ -110,13 +111,6 @@ class FmuDiagnosisResult(AnyDiagnosisResult):
     def close(self) -> None:
         """End the child processes now; else they end with the result."""
         self.diagnosis.workings.close()
-
-
-def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
-    parameters = parameters_found(diagnosis.diagnosis)
-    if parameters:
-        yield fields_table("Parameters", parameters, names="parameter")
-    yield from diagnosis._misfit_tables()
 
 
 def read_records(records: Sequence[Path | str], given: Map, settings: DiagnosisSettings) -> list[FmuRecord]:
