@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Guess: a command of moteus whose registers are set to 16 bits, so that more of them fit into a CAN frame, is refused where a value does not
 #   fit, or needs more bits then; other values are rounded to the nearest step of 0.1 mrev, 0.25 mrev/s or 0.01 N.m.
-# What happens: values beyond the range are sent as its end: 5 revolutions are 3.2767, which a motor behind a gear leaves within one turn of
-#   the load, and 20 rev/s are 8.19 rev/s. Values within are cut towards zero: a maximum torque of 0.019 N.m is 0.01 N.m, one of
-#   0.009 N.m is none at all, and of the positions 0, 0.0001, ... 1 rev, all of them whole steps, one in four is a step too small.
-#   Nothing is said. With the default, floats, the command is what it should be.
+# What happens: values beyond the range are sent as its end: 5 revolutions as 3.2767, and 20 rev/s as 8.19 rev/s. Values within the
+#   range are cut towards zero: a maximum torque of 0.019 N.m is sent as 0.01 N.m, and one of 0.009 N.m as 0. Of the positions 0,
+#   0.0001, ... 1 rev, all of them whole steps, one in four is sent a step too small. Nothing is said. With the default, floats,
+#   the command holds the values.
 # Version: moteus 1.1.1, Python 3.11.
 set -euo pipefail
 folder=$(mktemp -d)
