@@ -44,10 +44,8 @@ class RecordSource(Protocol):
         """Return a channel as ``load`` does, with NaN or NaT where a text has no value."""
         return self.load([place])[0]
 
-    def pieces(self, places: Sequence[int], most: int | None = None) -> Iterator[tuple[int, int, list[NDArray[Any]]]]:
+    def pieces(self, places: Sequence[int]) -> Iterator[tuple[int, int, list[NDArray[Any]]]]:
         """Yield the numbers of channels of one raster piece by piece, NaN where a text has none.
-
-        ``most``: rows of each piece; the others are passed over.
 
         Yields:
             Number of the first row, how many rows the channels have at most, and the values.

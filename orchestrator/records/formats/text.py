@@ -3,7 +3,6 @@
 import io
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -55,11 +54,8 @@ class TextSource(RecordSource):
     def times(self, place: int) -> NDArray[Any]:
         return self._read([place], strict=False)[0]
 
-    def pieces(self, places: Sequence[int], most: int | None = None) -> Iterator[tuple[int, int, list[NDArray[Any]]]]:
-        for whole in self._rows.blocks(self._part):
-            block = whole
-            if most is not None and whole.count > most:
-                block = replace(whole, text="\n".join(whole.text.split("\n", most)[:most]), count=most)
+    def pieces(self, places: Sequence[int]) -> Iterator[tuple[int, int, list[NDArray[Any]]]]:
+        for block in self._rows.blocks(self._part):
             yield block.first, self._rows.most, list(self.numbers(block, places, strict=False))
 
     def within(self, rows: slice, raster: int) -> RecordSource:
