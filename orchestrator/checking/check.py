@@ -1,6 +1,5 @@
 """The check of one FMU: static first, then dynamic, unless the FMU cannot be read or has nothing that runs here."""
 
-import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,8 @@ from orchestrator.checking.findings import Execution, Finding, FmuFindings, orde
 from orchestrator.checking.places import locate_findings
 from orchestrator.checking.static import StaticResult, check_static
 from orchestrator.checking.xml_reading import MAXIMUM_BYTES
+from orchestrator.errors import FmuError
+from orchestrator.shared.isolation.archives import content_hash
 from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.isolation.walls import support
 
@@ -82,7 +83,6 @@ def _digest(path: Path) -> dict[str, str]:
     if not path.is_file():
         return {}
     try:
-        with path.open("rb") as stream:
-            return {"sha256": hashlib.file_digest(stream, "sha256").hexdigest()}
-    except OSError:  # which is a finding of the archive
+        return {"sha256": content_hash(path)}
+    except FmuError:  # which is a finding of the archive
         return {}
