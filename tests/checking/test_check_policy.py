@@ -10,7 +10,7 @@ from orchestrator.checking.policy import Policy, read_policy
 from orchestrator.checking.verdict import baseline_of, judge, read_baseline
 from orchestrator.cli import main
 from orchestrator.errors import InputError
-from tests.support.c_fmu import build_c_fmu, have_compiler
+from tests.support.c_fmu import fmu_files, have_compiler, write_fmu
 
 FINDINGS = (Finding("model.guid", "", "no Z"), Finding("misuse.guid", "", "accepted"))
 
@@ -91,13 +91,15 @@ def test_the_command_takes_policy_and_baseline(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    build_c_fmu(tmp_path, "guid_ignored", name="a")
+    files = fmu_files("guid_ignored")  # a warning of a run, and one of its date without a run
+    xml = files["modelDescription.xml"].replace(b"00:00:00Z", b"00:00:00")
+    write_fmu(tmp_path / "a.fmu", files | {"modelDescription.xml": xml})
     assert main(["check", "a.fmu", "--write-baseline", "known.json"]) == 0
-    assert main(["check", "a.fmu", "--fail-on", "warning"]) == 1
+    assert main(["check", "a.fmu", "--static", "--fail-on", "warning"]) == 1
     assert main(["check", "a.fmu", "--fail-on", "warning", "--baseline", "known.json"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].startswith("a.fmu: 1 known (executed")
+    assert capsys.readouterr().out.splitlines()[-1].startswith("a.fmu: 2 known (executed")
     Path("fmu-check.toml").write_text('fail-on = "warning"', encoding="utf-8")
-    assert main(["check", "a.fmu"]) == 1
+    assert main(["check", "a.fmu", "--static"]) == 1
     assert main(["check", "a.fmu", "--policy", "none.toml"]) == 2
 
 
