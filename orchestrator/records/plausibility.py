@@ -25,6 +25,7 @@ NEEDED_FIT = 0.8
 NEARLY_STILL = 0.05  # of the rms speed, within which dry friction changes its sign
 LEAST_TRAVEL = 0.02  # rad of load and motor, from which slow motion tells a sign
 OPPOSITE = -0.9  # correlation of slow motion from which one angle counts the other way
+TWISTS = 3.0  # of the shaft under the drive's slow torque, and of what scatters, that only a wrong ratio exceeds
 NEAR_DEGREES = 0.3  # of a logarithm: an inertia this near to 1/57 of the model's may be an angle in degrees
 
 
@@ -38,9 +39,14 @@ def check_plausible(record: Record, model: Model) -> None:
         _check_directions(record, record.theta_l, parameters)
         slow = 2 * _rows_of_swing(record, parameters)
         motor, load = (_smooth(angles, slow) for angles in (record.theta_m, record.theta_l))
-        _check_slope(record.source, motor, load, parameters["i"], "i" if "i" in model.parameters else "i_1")
+        name = "i" if "i" in model.parameters else "i_1"
+        _check_slope(record.source, motor, load, parameters["i"], name)
     _check_rate(record, _frequency(parameters))
     _check_inertia(record, parameters)
+    if record.theta_l is not None:
+        ratios = [entry for key, entry in model.parameters.items() if key in ("i", "i_1", "i_2")]
+        open_share = sum(entry.uncertainty / abs(entry.value) for entry in ratios)
+        _check_ratio(record, (motor, load), slow, parameters, open_share, name)
 
 
 def natural_frequency(model: Model) -> float:
@@ -144,11 +150,30 @@ def _check_slope(source: str, motor: Array, load: Array, ratio: float, name: str
         if abs(math.log(relative / factor)) < min(0.2, abs(math.log(relative))):  # nearer to that than to what is right
             raise RecordError(f"{source}: {text} (theta_m/theta_l is {ratio / relative:.4g}, i is {ratio:g}): {cure}")
     if abs(math.log(relative)) > 0.3:
-        raise RecordError(
-            f"{source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have "
-            f"{ratio / relative:.4g}: mend `unit` and `counts_per_rev` of both columns, exchange "
-            f"their names if they are swapped, or mend `[parameters.{name}] value` (`model`)"
-        )
+        raise _other_ratio(source, ratio, ratio / relative, name)
+
+
+def _check_ratio(
+    record: Record, angles: tuple[Array, Array], rows: int, p: Mapping[str, float], open_share: float, name: str
+) -> None:
+    """Refuse a gear ratio that means over ``rows`` contradict by more than the shaft can twist, or is left open."""
+    motor, load = angles
+    if not record.has_torque or float(np.ptp(load)) < LARGE_TRAVEL:
+        return
+    slope, stated = float(motor @ load) / float(motor @ motor), 1.0 / p["i"]
+    apart = 0.5 * max(abs(slope - stated) - open_share * abs(stated), 0.0) * float(np.ptp(motor))
+    torque = _smooth(lag_torque(record.u, p["tau"], record.step), rows)
+    twist = abs(p["i"]) * float(np.max(np.abs(torque))) / p["k"]
+    if apart > TWISTS * (twist + float(np.std(load - slope * motor))):
+        raise _other_ratio(record.source, p["i"], 1.0 / slope, name)
+
+
+def _other_ratio(source: str, ratio: float, found: float, name: str) -> RecordError:
+    return RecordError(
+        f"{source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have {found:.4g}: "
+        "mend `unit` and `counts_per_rev` of both columns, exchange their names if they are swapped, or mend "
+        f"`[parameters.{name}] value` (`model`)"
+    )
 
 
 def smooth(record: Record, tau: float) -> tuple[Array, Array, Array, Array]:

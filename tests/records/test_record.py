@@ -225,6 +225,20 @@ def test_exchanged_columns_are_recognised_though_one_of_them_moves_little(load: 
         check_plausible(_turned(load, right), default_model())
 
 
+@pytest.mark.parametrize("wrong", [0.95, 1.05])
+def test_a_ratio_that_the_shaft_cannot_twist_to_is_refused(tmp_path: Path, wrong: float) -> None:
+    columns, _ = make_record({"alpha": 0.01}, 77, 10.0, 500.0)
+    record, path = record_from_columns(columns, "r"), tmp_path / "m.toml"
+    ratio = f"[parameters.i]\nvalue = {wrong * default_model().parameters['i'].value}\n"
+    path.write_text(f"{ratio}relative_uncertainty = 0\n")
+    with pytest.raises(RecordError, match=r"gear ratio .*, but have 3\.9.*parameters\.i\] value"):
+        check_plausible(record, read_model(path))
+    path.write_text(f"{ratio}relative_uncertainty = 0\n[parameters.k]\nvalue = 400.0\n")
+    check_plausible(record, read_model(path))  # so soft a shaft may twist that far
+    path.write_text(f"{ratio}relative_uncertainty = 0.05\n")
+    check_plausible(record, read_model(path))  # the fit finds it
+
+
 def test_a_gear_ratio_that_is_the_inverse_is_told_as_that(tmp_path: Path) -> None:
     record = _turned(27.0, 3.0)
     said = {}
