@@ -168,9 +168,9 @@ def _check_ratio(
         raise _other_ratio(record.source, p["i"], 1.0 / slope, name)
 
 
-def _other_ratio(source: str, ratio: float, found: float, name: str) -> RecordError:
+def _other_ratio(source: str, ratio: float, moved: float, name: str) -> RecordError:
     return RecordError(
-        f"{source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have {found:.4g}: "
+        f"{source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have {moved:.4g}: "
         "mend `unit` and `counts_per_rev` of both columns, exchange their names if they are swapped, or mend "
         f"`[parameters.{name}] value` (`model`)"
     )
