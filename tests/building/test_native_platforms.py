@@ -1,6 +1,7 @@
 """Native FMUs for all platforms: sizes, exports, bytes, warnings, and other platforms' results."""
 
 import importlib.util
+import os
 import shutil
 import subprocess
 import sys
@@ -12,7 +13,6 @@ import pytest
 
 from orchestrator.building.archive import read_archive
 from orchestrator.building.compilers import TARGETS, find_compiler
-from orchestrator.building.native_build import ensure_native
 from orchestrator.checking.binaries import inspect
 from tests.support.native_hosts import ARM_LIBRARIES, StepHost, last_outputs
 
@@ -82,9 +82,21 @@ def test_the_library_needs_the_c_library_alone(here: dict[str, Path]) -> None:
     assert {name.split(".")[0] for name in needed} <= {"libc", "libm"}
 
 
-def test_builds_are_the_same_to_the_byte(everywhere: dict[str, Path], tmp_path: Path) -> None:
-    again = ensure_native(["LqrController"], tmp_path)["LqrController"]
-    assert again.read_bytes() == everywhere["LqrController"].read_bytes()
+BUILD = "import sys, pathlib; from orchestrator.building.native_build import ensure_native as build; "
+BUILD += "build(['LqrController'], pathlib.Path(sys.argv[1]), here=sys.argv[2] == 'True')"
+
+
+@pytest.mark.parametrize("on_this", [True, pytest.param(False, marks=pytest.mark.night)])
+def test_builds_are_the_same_to_the_byte(
+    build_native: Callable[..., dict[str, Path]], on_this: bool, tmp_path: Path
+) -> None:
+    """A process with a cache of its own has nothing that was compiled before."""
+    if not (on_this or ZIG):
+        pytest.skip("zig is not installed")
+    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    subprocess.run([sys.executable, "-c", BUILD, str(tmp_path), str(on_this)], env=environment, check=True)
+    first = build_native(["LqrController"], here=on_this)["LqrController"]
+    assert (tmp_path / "LqrController.fmu").read_bytes() == first.read_bytes()
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang", "zig"])
