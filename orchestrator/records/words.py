@@ -25,6 +25,8 @@ OTHER = _set("err error dev deviation lag temp temperature limit lim max min abs
 TIME = _set("time t zeit timestamp datetime date uhrzeit elapsed zeitstempel stamp timestamps seconds")
 SAMPLE = _set("sample samples index idx no nr k n counter cycle row samplenumber number zeile")
 FURTHER = _set("filtered smoothed axis channel ch signal value avg mean x y z a b c d side one two i")
+# What a field, an attribute or a line is called that holds a unit.
+UNIT_KEYS = _set("unit units einheit einheiten unit_string physical_unit y_unit_label") | {"unit label"}
 # Words that say what a channel is, and not in which unit.
 DESCRIBING = ANGLE | MOTOR | LOAD | TORQUE | CURRENT | ASKED | FOUND | SPEED | OTHER | TIME | SAMPLE | FURTHER
 

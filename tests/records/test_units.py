@@ -90,7 +90,8 @@ def _parquet(path: Path) -> None:
     pyarrow = pytest.importorskip("pyarrow")
     parquet = pytest.importorskip("pyarrow.parquet")
     fields = [
-        pyarrow.field(f"x{n}", pyarrow.float64(), metadata={"unit": text.encode()}) for n, text in enumerate(TEXTS)
+        pyarrow.field(f"x{n}", pyarrow.float64(), metadata={("unit", "Einheit")[n % 2]: text.encode()})
+        for n, text in enumerate(TEXTS)
     ]
     arrays = [pyarrow.array(np.arange(4.0))] * len(TEXTS)
     parquet.write_table(pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields)), path)
@@ -100,9 +101,8 @@ def _hdf5(path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(path, "w") as file:
         for n, text in enumerate(TEXTS):
-            file.create_dataset(f"x{n}", data=np.arange(4.0)).attrs[("unit", "Units")[n % 2]] = (
-                text if n % 3 else text.encode()
-            )
+            key = ("unit", "Units", "Einheit", "physical_unit", "unit_string")[n % 5]  # the last by LabVIEW
+            file.create_dataset(f"x{n}", data=np.arange(4.0)).attrs[key] = text if n % 3 else text.encode()
 
 
 def _mat(path: Path) -> None:

@@ -6,12 +6,13 @@ from pathlib import Path
 
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.cells import cells_of, is_missing, is_value
-from orchestrator.records.formats.heading import UNIT_KEYS, Heading
+from orchestrator.records.formats.heading import Heading
 from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.labview import is_labview, refuse_starts, with_rasters
 from orchestrator.records.formats.source import MAXIMUM_CHANNELS, Head
 from orchestrator.records.formats.text_file import TextFile
 from orchestrator.records.stamps import is_stamp
+from orchestrator.records.words import UNIT_KEYS
 
 SEPARATORS = (";", "\t", ",", "|", " ")
 SPOKEN = {";": "`;`", "\t": "tab", ",": "`,`", "|": "`|`", " ": "blanks"}

@@ -11,6 +11,7 @@ from orchestrator.records.formats.nested import DEEPEST, PassedOver, vectors_of
 from orchestrator.records.formats.numpy_file import ArraySource
 from orchestrator.records.formats.packing import unpack
 from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, damage_error, extra_error
+from orchestrator.records.words import UNIT_KEYS
 
 _NUMBERS = frozenset(b"double single logical int8 int16 int32 int64 uint8 uint16 uint32 uint64".split())
 
@@ -83,7 +84,7 @@ class _Reader:
         if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiubV":
             return _text(values) if isinstance(values, str | bytes) else PassedOver("text")
         values = self._unpack(item, values)
-        unit = next((_text(value) for key, value in item.attrs.items() if key.lower() in ("unit", "units")), "")
+        unit = next((_text(value) for key, value in item.attrs.items() if key.lower() in UNIT_KEYS), "")
         since = re.fullmatch(r"(\S+)\s+since\s.*", unit)  # of netCDF: since an instant, which no record needs
         unit = since[1] if since is not None else unit
         return {"values": values, "unit": unit} if unit else values

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.cells import cells_of, is_value, is_word
+from orchestrator.records.words import UNIT_KEYS
 from orchestrator.shared.units import is_unit
 
-UNIT_KEYS = frozenset(("unit", "units", "einheit", "einheiten", "y_unit_label", "unit label"))
 COMMENTS = frozenset(("comment", "comments", "kommentar", "bemerkung", "remark"))
 # Of the rows below the names that Simulink's Data Inspector writes: each cell says what it is.
 _LABELLED = re.compile(r"(?:Type|Enum|Unit|Interp|BlockPath|PortIndex): ?(.*)")

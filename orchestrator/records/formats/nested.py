@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.records.words import TIME
+from orchestrator.records.words import TIME, UNIT_KEYS
 
 DEEPEST = 6
-_UNITS = ("unit", "units")
 _LABELS = ("label", "name")
 _DATA = ("values", "data", "signal")
 _SHOWN = 6
@@ -122,7 +121,7 @@ def _collect_structure(name: str, fields: Mapping[str, Any], vectors: Vectors, d
         return
     texts = {key.lower(): value for key, value in fields.items() if isinstance(value, str) and value}
     label = next((texts[key] for key in _LABELS if key in texts), name)
-    unit = next((texts[key] for key in _UNITS if key in texts), "")
+    unit = next((text for key, text in texts.items() if key in UNIT_KEYS), "")
     _collect_fields(fields, name, vectors, depth + 1, time, label, unit)
 
 

@@ -17,6 +17,7 @@ from orchestrator.records.formats.source import (
     damage_error,
     extra_error,
 )
+from orchestrator.records.words import UNIT_KEYS
 
 
 class ParquetSource(RecordSource):
@@ -63,8 +64,8 @@ def open_file(path: Path) -> ParquetSource:
 def _head(field: Any) -> Head:
     import pyarrow
 
-    meta = {key.lower(): value for key, value in (field.metadata or {}).items()}
-    unit = next((meta[key].decode("utf-8", "replace") for key in (b"unit", b"units") if key in meta), "")
+    meta = {key.decode("utf-8", "replace").lower(): value for key, value in (field.metadata or {}).items()}
+    unit = next((value.decode("utf-8", "replace") for key, value in meta.items() if key in UNIT_KEYS), "")
     stamp = pyarrow.types.is_timestamp(field.type)
     kind = "stamp" if stamp else "number" if _is_number(field.type) else "text"
     head = head_of(field.name, "s" if _second_fraction(field.type) else unit)
