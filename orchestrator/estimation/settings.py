@@ -35,6 +35,9 @@ class MaximisationSettings(Settings, frozen=True):
     enough_traversals: Annotated[
         int, setting("fewest traversals in the first part for its fit to be used as a start", ge=0)
     ] = 6
+    worse_at_length: Annotated[
+        float, setting("deviance of a row above that of the first part from which the fit of all rows is done again")
+    ] = 0.2
 
 
 class GapVerdictSettings(Settings, frozen=True):

@@ -68,6 +68,15 @@ def test_a_fit_of_the_beginning_is_shown_on_all_rows(record: Record) -> None:
     assert np.isfinite(found.interval).all()
 
 
+def test_all_rows_are_fitted_again_where_the_beginning_leads_astray() -> None:
+    """With an exact model, errors of the beginning's values grow over the rest until no step leads back."""
+    columns, _ = make_record({"alpha": 0.01}, 81, 8.0, 500.0)
+    settings = EstimationSettings(fit=MaximisationSettings(long_record=1000, short_record=800))
+    found = maximum_likelihood.estimate(record_from_columns(columns, "r"), default_model(), settings=settings)
+    assert found.standard_error < 1e-5
+    assert found.interval[0] < 0.01 < found.interval[1]
+
+
 def test_before_a_first_size_there_is_nothing_to_keep(record: Record) -> None:
     with pytest.raises(ConvergenceError, match="a reason"):
         maximum_likelihood.estimate(record, default_model(), threads=1, stop=EndsAfter(3))

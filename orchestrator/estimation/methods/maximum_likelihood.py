@@ -117,7 +117,17 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> Fit | 
     report("fitting the whole record", BEFORE_WHOLE)
     likelihood = likelihood.with_options(soft=short.soft, information=short.information)
     steps = 2 * likelihood.settings.fit.steps_per_level
-    return _free_fit(maximise(likelihood, first.point.theta, likelihood.others, steps))
+    fit = _free_fit(maximise(likelihood, first.point.theta, likelihood.others, steps))
+    if _deviance_of_row(fit) - _deviance_of_row(first) < likelihood.settings.fit.worse_at_length:
+        return fit
+    # Without torque noise, errors of the first part grow over all rows until no step leads back: noise holds the state.
+    levels = _levels(likelihood, BOTH_ENCODERS if likelihood.problem.outputs.shape[1] == 2 else MOTOR_ENCODER)
+    start = replace(first, likelihood=likelihood, point=likelihood.at(first.point.theta))
+    return min(fit, _free_fit(_continue(_fit_at_level(start, levels[0], 1.0), levels[1:])), key=_objective)
+
+
+def _deviance_of_row(fit: Fit) -> float:
+    return fit.point.deviance / len(fit.likelihood.problem.outputs)
 
 
 def fit_record(likelihood: Likelihood, report: Report = _quiet) -> Fit:
