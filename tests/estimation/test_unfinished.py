@@ -6,6 +6,8 @@ import os
 import re
 import signal
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -75,6 +77,19 @@ def test_all_rows_are_fitted_again_where_the_beginning_leads_astray() -> None:
     found = maximum_likelihood.estimate(record_from_columns(columns, "r"), default_model(), settings=settings)
     assert found.standard_error < 1e-5
     assert found.interval[0] < 0.01 < found.interval[1]
+
+
+def test_missing_samples_do_not_make_a_fit_look_worse() -> None:
+    def deviance_of_row(outputs: np.ndarray) -> float:
+        said = SimpleNamespace(deviance=-15.0 * np.count_nonzero(np.isfinite(outputs)))
+        return maximum_likelihood._deviance_of_row(
+            cast(Any, SimpleNamespace(point=said, likelihood=SimpleNamespace(problem=SimpleNamespace(outputs=outputs))))
+        )
+
+    whole = np.zeros((40, 2))
+    some = whole.copy()
+    some[10:20, 0] = some[15:30, 1] = np.nan
+    assert deviance_of_row(some) == pytest.approx(deviance_of_row(whole)) == -30.0
 
 
 def test_before_a_first_size_there_is_nothing_to_keep(record: Record) -> None:

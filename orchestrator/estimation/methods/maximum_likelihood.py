@@ -127,7 +127,9 @@ def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> Fit | 
 
 
 def _deviance_of_row(fit: Fit) -> float:
-    return fit.point.deviance / len(fit.likelihood.problem.outputs)
+    """Return the deviance of a row that misses no sample: a missing one says nothing."""
+    outputs = fit.likelihood.problem.outputs
+    return fit.point.deviance * outputs.shape[1] / np.count_nonzero(np.isfinite(outputs))
 
 
 def fit_record(likelihood: Likelihood, report: Report = _quiet) -> Fit:
